@@ -1,0 +1,3 @@
+"""gensig: labelled gear-fault vibration data sets from physics."""
+
+__version__ = "0.1.0"

@@ -1,0 +1,210 @@
+"""A gear pair on its supports as a lumped system: six equations, one mesh, a soft speed source."""
+
+from __future__ import annotations
+
+import math
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+
+from gensig.dynamics._kernels import MeshArrays, MeshNumbers
+from gensig.dynamics.system import LumpedSystem
+from gensig.errors import ConfigError
+from gensig.mesh.load_distribution import pair_states, static_mesh
+from gensig.mesh.pair_table import GearTable, PairTable
+from gensig.operating import Operating
+from gensig.units import unit
+
+Array = NDArray[np.float64]
+
+DOFS = ("pinion_x", "pinion_y", "pinion_rotation", "wheel_x", "wheel_y", "wheel_rotation")
+APPROACH_SIGN = (0.0, -1.0, 1.0, 0.0, 1.0, -1.0)
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class Support:
+    """Bearings and shaft under one gear: x across the line of action, y along it."""
+
+    stiffness_x: float = unit("n_per_m")
+    stiffness_y: float = unit("n_per_m")
+    damping_x: float = unit("ns_per_m")
+    damping_y: float = unit("ns_per_m")
+
+    def __post_init__(self) -> None:
+        for key in ("stiffness_x", "stiffness_y", "damping_x", "damping_y"):
+            if getattr(self, key) < 0.0:
+                raise ConfigError(f"support.{key} = {getattr(self, key):g} must not be negative")
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class Body:
+    """What a gear weighs and how it is held."""
+
+    mass: float
+    inertia: float
+    support: Support
+
+
+def solid_disc(radius: float, bore_radius: float, width: float, density: float) -> tuple[float, float]:
+    """Mass in kg and moment of inertia in kg m2 of a disc with a bore: for gears whose source prints none."""
+    mass = density * math.pi * (radius**2 - bore_radius**2) * width
+    return mass, 0.5 * mass * (radius**2 + bore_radius**2)
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class PairDynamics:
+    """Everything that decides the motion of one gear pair."""
+
+    table: PairTable
+    pinion: Body
+    wheel: Body
+    operating: Operating
+    pinion_error: Array
+    wheel_error: Array
+    start_tooth_pinion: int
+    start_tooth_wheel: int
+    start_phase: float
+
+    @property
+    def equivalent_mass(self) -> float:
+        """Both inertias reduced to the line of action, kg."""
+        pair = self.table.pair
+        return 1.0 / (pair.pinion.base_radius**2 / self.pinion.inertia + pair.wheel.base_radius**2 / self.wheel.inertia)
+
+    @property
+    def mesh_force(self) -> float:
+        """Mean normal force of the set torque, N."""
+        return self.operating.torque / self.table.pair.pinion.base_radius
+
+    @property
+    def start_roll(self) -> float:
+        """Roll along the line of action at time 0, m."""
+        return self.start_phase * self.table.pair.base_pitch
+
+    @property
+    def mesh_frequency(self) -> float:
+        """Tooth meshing frequency at the set speed, Hz."""
+        return self.operating.speed / (2.0 * math.pi) * self.table.pair.pinion.n_teeth
+
+    def system(self) -> LumpedSystem:
+        """Equations (1) of the spur paper with the signs put right, without the mesh.
+
+        Action and reaction on both gears, mesh force driving the wheel: ``docs/theory/spur_dynamics.md``. The soft
+        speed source acts on the deviation from the set rotation, so it is a spring and a damper there.
+        """
+        ratio = self.table.pair.ratio
+        reduced = self.pinion.inertia + self.wheel.inertia / ratio**2
+        omega = 2.0 * math.pi * self.operating.drive_frequency
+        drive_stiffness = reduced * omega**2
+        drive_damping = 2.0 * self.operating.drive_damping_ratio * reduced * omega
+        p, w = self.pinion, self.wheel
+        torque = self.operating.torque
+        return LumpedSystem(
+            names=DOFS,
+            mass=np.array([p.mass, p.mass, p.inertia, w.mass, w.mass, w.inertia]),
+            stiffness=np.diag(
+                [p.support.stiffness_x, p.support.stiffness_y, drive_stiffness, w.support.stiffness_x, w.support.stiffness_y, 0.0]
+            ),
+            damping=np.diag(
+                [p.support.damping_x, p.support.damping_y, drive_damping, w.support.damping_x, w.support.damping_y, 0.0]
+            ),
+            force=np.array([0.0, 0.0, torque, 0.0, 0.0, -torque * ratio]),
+        )
+
+    def approach_direction(self) -> Array:
+        """Gradient of the approach along the line of action, (dof,)."""
+        radii = np.array([1.0, 1.0, self.table.pair.pinion.base_radius, 1.0, 1.0, self.table.pair.wheel.base_radius])
+        return np.array(APPROACH_SIGN) * radii
+
+    def mean_mesh_stiffness(self) -> float:
+        """Mean tangent stiffness of sound teeth over one base pitch under the set torque, N/m."""
+        # tooth pairs away from a faulty tooth are the sound ones: average where most pairs are
+        roll = self.table.pair.base_pitch * (np.arange(self.table.pair.pinion.n_teeth * 32) + 0.5) / 32
+        return float(np.median(static_mesh(self.table, pair_states(self.table, roll), self.mesh_force).stiffness.reshape(-1, 32), axis=0).mean())
+
+    def arrays(self, step: float) -> MeshArrays:
+        """The mesh as the compiled integrator takes it."""
+        table, options, pair = self.table, self.table.options, self.table.pair
+        viscous = 2.0 * options.damping_ratio * math.sqrt(self.mean_mesh_stiffness() * self.equivalent_mass)
+        one_sided = options.law == "one_sided"
+        numbers = MeshNumbers(
+            pinion_x=0,
+            pinion_y=1,
+            pinion_rotation=2,
+            wheel_x=3,
+            wheel_y=4,
+            wheel_rotation=5,
+            pinion_radius=pair.pinion.base_radius,
+            wheel_radius=pair.wheel.base_radius,
+            pitch=pair.base_pitch,
+            nodes_per_meter=options.points_per_pitch / pair.base_pitch,
+            path=pair.path_of_contact,
+            pitch_point=pair.pitch_point,
+            start_curvature=pair.start_curvature_radius,
+            tangent_length=pair.tangent_length,
+            shared=table.shared_compliance,
+            one_sided=one_sided,
+            consistent=options.roll_torque == "consistent",
+            damping=viscous / self.mesh_force if one_sided else viscous,
+            friction=options.friction_coefficient,
+            friction_half_width=0.5 * options.friction_transition * pair.base_pitch,
+            switch_half_width=0.5 * pair.pinion.base_radius * self.operating.speed * step,
+            backlash=pair.backlash,
+            start_pinion=self.start_tooth_pinion,
+            start_wheel=self.start_tooth_wheel,
+            start_roll=self.start_roll,
+            speed=self.operating.speed,
+        )
+        n_pinion_rows = len(table.pinion.compliance)
+        return MeshArrays(
+            numbers=numbers,
+            table=np.concatenate([_columns(table.pinion), _columns(table.wheel)]),
+            pinion_row=_rows(table.pinion, 0),
+            wheel_row=_rows(table.wheel, n_pinion_rows),
+            pinion_error=self.pinion_error,
+            wheel_error=self.wheel_error,
+            sound_wheel_row=n_pinion_rows,
+        )
+
+    def static_start(self) -> Array:
+        """Static equilibrium at the set speed, (dof,): supports, approach, and the drive's lag for mean friction."""
+        pair, force = self.table.pair, self.mesh_force
+        roll = self.start_roll + pair.base_pitch * (np.arange(64) + 0.5) / 64
+        states = pair_states(
+            self.table, roll, start_tooth_pinion=self.start_tooth_pinion, start_tooth_wheel=self.start_tooth_wheel
+        )
+        loads = static_mesh(self.table, states, force).load
+        now = static_mesh(
+            self.table,
+            pair_states(
+                self.table,
+                np.array([self.start_roll]),
+                start_tooth_pinion=self.start_tooth_pinion,
+                start_tooth_wheel=self.start_tooth_wheel,
+            ),
+            force,
+        )
+        arm = pair.start_curvature_radius + np.clip(states.position, 0.0, pair.path_of_contact)
+        side = np.sign(states.position - pair.pitch_point)
+        loss_arm = side * (arm - (pair.tangent_length - arm) / pair.ratio)
+        loss = self.table.options.friction_coefficient * float(np.mean((loads * loss_arm).sum(axis=1)))
+        system = self.system()
+        start = np.zeros(len(system.mass))
+        for dof, direction in ((1, 1.0), (4, -1.0)):
+            if system.stiffness[dof, dof] > 0.0:
+                start[dof] = direction * force / system.stiffness[dof, dof]
+        start[2] = -loss / system.stiffness[2, 2]
+        approach = float(now.approach[0]) if np.isfinite(now.approach[0]) else 0.0
+        start[5] = (pair.pinion.base_radius * start[2] - start[1] + start[4] - approach) / pair.wheel.base_radius
+        return start
+
+
+def _columns(side: GearTable) -> Array:
+    """Table columns [c, c', g, g'], (distinct, node, 4)."""
+    return np.stack([side.compliance, side.compliance_slope, side.gap, side.gap_slope], axis=-1)
+
+
+def _rows(side: GearTable, offset: int) -> NDArray[np.int64]:
+    """Table row of every tooth, -1 for a missing one, (tooth,)."""
+    return np.where(side.present[side.kind], side.kind + offset, -1)

@@ -1,0 +1,67 @@
+"""Lumped linear system around its meshes: M q'' + C q' + K q = f + mesh forces."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+
+from gensig.dynamics._kernels import SystemArrays
+from gensig.errors import SimulationError
+
+Array = NDArray[np.float64]
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class LumpedSystem:
+    """Masses, springs, dampers and constant forces; rotations are deviations from the nominal rotation.
+
+    ``mass`` (dof,) kg or kg m2, ``stiffness`` and ``damping`` (dof, dof), ``force`` (dof,); ``names`` name the
+    degrees of freedom, as channels call them.
+    """
+
+    names: tuple[str, ...]
+    mass: Array
+    stiffness: Array
+    damping: Array
+    force: Array
+
+    def __post_init__(self) -> None:
+        if np.any(self.mass <= 0.0):
+            worst = self.names[int(np.argmin(self.mass))]
+            raise SimulationError(f"the mass or inertia of '{worst}' must be positive")
+        for matrix, what in ((self.stiffness, "stiffness"), (self.damping, "damping")):
+            if not np.allclose(matrix, matrix.T, rtol=1e-12, atol=0.0):
+                raise SimulationError(f"the {what} matrix is not symmetric")
+            if np.linalg.eigvalsh(matrix).min() < -1e-9 * max(1.0, float(np.abs(matrix).max())):
+                raise SimulationError(f"the {what} matrix would feed energy in; check the signs of the supports")
+
+    def arrays(self) -> SystemArrays:
+        """The system as the compiled integrator takes it."""
+        rows_k, columns_k = (np.ascontiguousarray(index) for index in np.nonzero(self.stiffness))
+        rows_c, columns_c = (np.ascontiguousarray(index) for index in np.nonzero(self.damping))
+        return SystemArrays(
+            inverse_mass=1.0 / self.mass,
+            stiffness_row=rows_k,
+            stiffness_column=columns_k,
+            stiffness_value=self.stiffness[rows_k, columns_k],
+            damping_row=rows_c,
+            damping_column=columns_c,
+            damping_value=self.damping[rows_c, columns_c],
+            force=self.force,
+        )
+
+
+def slowest_decay(system: LumpedSystem, direction: Array, mesh_stiffness: float) -> float:
+    """Slowest decay rate in 1/s of the system with its mesh held at a mean stiffness.
+
+    ``direction`` (dof,) is the gradient of the approach. Rigid-body motion without restoring force is left out.
+    """
+    n = len(system.mass)
+    k = (system.stiffness + mesh_stiffness * np.outer(direction, direction)) / system.mass[:, None]
+    c = system.damping / system.mass[:, None]
+    state = np.block([[np.zeros((n, n)), np.eye(n)], [-k, -c]])
+    rates = -np.real(np.linalg.eigvals(state))
+    moving = rates[rates > 1e-3]
+    return float(moving.min()) if len(moving) else np.inf

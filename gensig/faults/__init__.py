@@ -1,0 +1,1 @@
+"""Faults as pure functions from tooth to tooth; the mesh knows none of them."""

@@ -1,0 +1,141 @@
+"""One spur gear as a rack-type cutter makes it."""
+
+from __future__ import annotations
+
+import math
+from dataclasses import dataclass
+
+from gensig.errors import GeometryError
+from gensig.geometry.involute import involute
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class Gear:
+    """Geometry of one external spur gear, lengths in m, angles in rad.
+
+    ``cutter_tip_radius_coefficient`` is the rounding of the rack's tip over the module: it makes the root curve.
+    ``name`` ("pinion" or "wheel") only serves messages.
+    """
+
+    name: str
+    n_teeth: int
+    normal_module: float
+    pressure_angle: float
+    addendum_coefficient: float
+    clearance_coefficient: float
+    cutter_tip_radius_coefficient: float
+    profile_shift: float
+    face_width: float
+    bore_radius: float
+
+    def __post_init__(self) -> None:
+        self._check_ranges()
+        if self.junction_curvature_radius <= 0.0:
+            limit = math.ceil(2.0 * (self.straight_flank_depth / self.normal_module) / math.sin(self.pressure_angle) ** 2)
+            raise GeometryError(
+                f"{self.name}: {self.n_teeth} teeth with profile shift {self.profile_shift:g} are undercut; use at least "
+                f"{limit} teeth or a larger profile_shift"
+            )
+        if self.half_tooth_angle_at(self.tip_radius) <= 0.0:
+            raise GeometryError(
+                f"{self.name}: the teeth are pointed below the tip radius {self.tip_radius * 1e3:.4g} mm; reduce "
+                f"profile_shift {self.profile_shift:g} or addendum_coefficient {self.addendum_coefficient:g}"
+            )
+        if not 0.0 < self.bore_radius < self.root_radius:
+            raise GeometryError(
+                f"{self.name}: bore_radius_mm = {self.bore_radius * 1e3:g} must lie between 0 and the root radius "
+                f"{self.root_radius * 1e3:.4g} mm"
+            )
+
+    def _check_ranges(self) -> None:
+        if self.n_teeth < 3:
+            raise GeometryError(f"{self.name}: n_teeth = {self.n_teeth} must be at least 3")
+        for key in ("normal_module", "face_width", "addendum_coefficient"):
+            if not getattr(self, key) > 0.0:
+                raise GeometryError(f"{self.name}: {key} = {getattr(self, key):g} must be positive")
+        if not math.radians(10.0) <= self.pressure_angle <= math.radians(35.0):
+            raise GeometryError(
+                f"{self.name}: pressure_angle_deg = {math.degrees(self.pressure_angle):g} must lie between 10 and 35"
+            )
+        if not 0.0 <= self.clearance_coefficient <= 1.0:
+            raise GeometryError(f"{self.name}: clearance_coefficient = {self.clearance_coefficient:g} must lie in 0..1")
+        rounding = self.cutter_tip_radius_coefficient
+        room = self.clearance_coefficient / (1.0 - math.sin(self.pressure_angle))
+        if not 0.0 < rounding <= room * 1.001:
+            raise GeometryError(
+                f"{self.name}: cutter_tip_radius_coefficient = {rounding:g} must be positive and at most "
+                f"{room:.4g}, where the rounding reaches the working flank"
+            )
+
+    @property
+    def pitch_radius(self) -> float:
+        """Reference pitch radius r = m z / 2."""
+        return 0.5 * self.normal_module * self.n_teeth
+
+    @property
+    def base_radius(self) -> float:
+        """Base radius r_b = r cos(alpha)."""
+        return self.pitch_radius * math.cos(self.pressure_angle)
+
+    @property
+    def tip_radius(self) -> float:
+        """Tip radius r_a, without tip shortening."""
+        return self.pitch_radius + (self.addendum_coefficient + self.profile_shift) * self.normal_module
+
+    @property
+    def root_radius(self) -> float:
+        """Root radius r_f that the cutter's tip generates."""
+        depth = self.addendum_coefficient + self.clearance_coefficient - self.profile_shift
+        return self.pitch_radius - depth * self.normal_module
+
+    @property
+    def base_pitch(self) -> float:
+        """Base pitch p_b, m."""
+        return 2.0 * math.pi * self.base_radius / self.n_teeth
+
+    @property
+    def half_tooth_angle_base(self) -> float:
+        """Half tooth angle on the base circle, th_b."""
+        return (
+            math.pi / (2.0 * self.n_teeth)
+            + 2.0 * self.profile_shift * math.tan(self.pressure_angle) / self.n_teeth
+            + involute(self.pressure_angle)
+        )
+
+    def half_tooth_angle_at(self, radius: float) -> float:
+        """Half tooth angle on the circle of ``radius`` (at least the base radius)."""
+        return self.half_tooth_angle_base - involute(math.acos(min(1.0, self.base_radius / radius)))
+
+    @property
+    def cutter_tip_radius(self) -> float:
+        """Radius of the rack's tip rounding, r_rho."""
+        return self.cutter_tip_radius_coefficient * self.normal_module
+
+    @property
+    def rounding_center_depth(self) -> float:
+        """Distance a_1 from the pitch line to the centre of the rack's tip rounding."""
+        depth = self.addendum_coefficient + self.clearance_coefficient - self.profile_shift
+        return depth * self.normal_module - self.cutter_tip_radius
+
+    @property
+    def rounding_center_offset(self) -> float:
+        """Distance b_1 along the pitch line from the tooth centreline to the centre of the rounding."""
+        alpha, m, rounding = self.pressure_angle, self.normal_module, self.cutter_tip_radius
+        depth = (self.addendum_coefficient + self.clearance_coefficient) * m
+        return math.pi * m / 4.0 + depth * math.tan(alpha) - rounding * math.tan(alpha) + rounding / math.cos(alpha)
+
+    @property
+    def root_half_angle(self) -> float:
+        """Half angle theta_f = b_1 / r of the tooth where its root curve meets the root circle."""
+        return self.rounding_center_offset / self.pitch_radius
+
+    @property
+    def straight_flank_depth(self) -> float:
+        """Depth below the pitch line at which the rack's straight flank ends, m."""
+        return self.rounding_center_depth + self.cutter_tip_radius * math.sin(self.pressure_angle)
+
+    @property
+    def junction_curvature_radius(self) -> float:
+        """Curvature radius of the involute where the root curve joins it; not positive when undercut."""
+        alpha = self.pressure_angle
+        return self.base_radius * math.tan(alpha) - self.straight_flank_depth / math.sin(alpha)

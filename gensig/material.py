@@ -1,0 +1,30 @@
+"""Elastic constants of the gear material."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+from gensig.errors import ConfigError
+from gensig.units import unit
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class Material:
+    """Isotropic linear-elastic material."""
+
+    youngs_modulus: float = unit("gpa")
+    poisson_ratio: float
+    density_kg_per_m3: float
+
+    def __post_init__(self) -> None:
+        if not self.youngs_modulus > 0.0:
+            raise ConfigError(f"material.youngs_modulus_gpa = {self.youngs_modulus / 1e9:g} must be positive")
+        if not 0.0 <= self.poisson_ratio < 0.5:
+            raise ConfigError(f"material.poisson_ratio = {self.poisson_ratio:g} must be at least 0 and below 0.5")
+        if not self.density_kg_per_m3 > 0.0:
+            raise ConfigError(f"material.density_kg_per_m3 = {self.density_kg_per_m3:g} must be positive")
+
+    @property
+    def shear_modulus(self) -> float:
+        """G = E / (2 (1 + nu)), Pa."""
+        return self.youngs_modulus / (2.0 * (1.0 + self.poisson_ratio))

@@ -1,0 +1,1 @@
+"""The quasi-static gear mesh: compliances, contact, load sharing, stiffness."""

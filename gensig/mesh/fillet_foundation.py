@@ -1,0 +1,86 @@
+"""Compliance of the gear body under one loaded tooth (Sainsot's fit of the clamped elastic ring)."""
+
+from __future__ import annotations
+
+import math
+import warnings
+
+import numpy as np
+from numpy.typing import NDArray
+
+from gensig.errors import ExtrapolationError
+from gensig.geometry.gear import Gear
+from gensig.material import Material
+
+Array = NDArray[np.float64]
+
+# rows of X = A/th_f^2 + B h_f^2 + C h_f/th_f + D/th_f + E h_f + F, in the order A..F
+COEFFICIENTS = {
+    "L": (-5.574e-5, -1.9986e-3, -2.3015e-4, 4.7702e-3, 0.0271, 6.8045),
+    "M": (60.111e-5, 28.100e-3, -83.431e-4, -9.9256e-3, 0.1624, 0.9086),
+    "P": (-50.952e-5, 185.50e-3, 0.0538e-4, 53.300e-3, 0.2895, 0.9236),
+    "Q": (-6.2042e-5, 9.0889e-3, -4.0964e-4, 7.8297e-3, -0.1472, 0.6904),
+}
+# where finite elements confirm the fit (docs/theory/spur_mesh.md), and where it is only plausible
+CHECKED = {"theta_f": (0.03, 0.14), "h_f": (1.4, 8.2)}
+PLAUSIBLE = {"theta_f": (0.01, 0.20), "h_f": (1.4, 8.2)}
+
+
+class ExtrapolationWarning(UserWarning):
+    """A fit used outside the range on which it was checked, but where it is still plausible."""
+
+
+def fillet_foundation_compliance(
+    gear: Gear, load_angle: Array, material: Material, *, allow_extrapolation: bool
+) -> Array:
+    """Compliance of the gear body under one loaded tooth, along the line of action.
+
+    Parameters
+    ----------
+    load_angle : (phase,) rad    between the load and the tooth thickness direction
+    allow_extrapolation : use the fit beyond theta_f 0.01..0.20 and h_f 1.4..8.2 without an error
+
+    Returns
+    -------
+    (phase,) m/N
+
+    Raises
+    ------
+    ExtrapolationError    outside the range on which the coefficients were checked, unless allowed
+
+    Source: Sainsot, Velex & Duverger (2004), spur paper eq. (7), with theta_f = b1/r, s_f = 2 r_f theta_f and
+    u_f = r_b/cos(angle) - r_f. Assumes an isolated tooth and a bore clamped all around; plane stress.
+    """
+    values = body_coefficients(gear, allow_extrapolation=allow_extrapolation)
+    height = gear.base_radius / np.cos(load_angle) - gear.root_radius
+    lever = height / (2.0 * gear.root_radius * gear.root_half_angle)
+    bracket = values["L"] * lever**2 + values["M"] * lever + values["P"] * (1.0 + values["Q"] * np.tan(load_angle) ** 2)
+    return np.cos(load_angle) ** 2 / (gear.face_width * material.youngs_modulus) * bracket
+
+
+def body_coefficients(gear: Gear, *, allow_extrapolation: bool) -> dict[str, float]:
+    """L*, M*, P* and Q* of the gear body."""
+    theta, ratio = gear.root_half_angle, gear.root_radius / gear.bore_radius
+    _check_range(gear, {"theta_f": theta, "h_f": ratio}, allow_extrapolation)
+    terms = (theta**-2, ratio**2, ratio / theta, 1.0 / theta, ratio, 1.0)
+    return {name: math.fsum(c * t for c, t in zip(row, terms, strict=True)) for name, row in COEFFICIENTS.items()}
+
+
+def _check_range(gear: Gear, found: dict[str, float], allow_extrapolation: bool) -> None:
+    for key, value in found.items():
+        low, high = PLAUSIBLE[key]
+        what = "half root angle theta_f" if key == "theta_f" else "root radius over bore radius h_f"
+        if not low <= value <= high and not allow_extrapolation:
+            mend = "change bore_radius_mm" if key == "h_f" else "change the teeth"
+            raise ExtrapolationError(
+                f"{gear.name}: {what} = {value:.3g} lies outside {low:g}..{high:g}, where the gear-body fit holds; {mend}, "
+                f"or set mesh.allow_extrapolation=true"
+            )
+        checked_low, checked_high = CHECKED[key]
+        if not checked_low <= value <= checked_high:
+            warnings.warn(
+                f"{gear.name}: {what} = {value:.3g} lies outside {checked_low:g}..{checked_high:g}, where the gear-body "
+                f"fit was checked against finite elements",
+                ExtrapolationWarning,
+                stacklevel=4,
+            )

@@ -1,0 +1,82 @@
+"""Static equilibrium of the pairs in contact: C F = approach - gap with F >= 0."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+
+from gensig.mesh.pair_table import N_PAIRS, PairTable
+
+Array = NDArray[np.float64]
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class PairStates:
+    """Compliance (less the shared part) and gap of the pairs followed at each phase, (phase, pair); pairs in order
+    of entry, the one approaching A first. An absent pair has an infinite gap."""
+
+    compliance: Array
+    gap: Array
+    position: Array
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class StaticMesh:
+    """Equilibrium under one force: ``approach`` (phase,) m, ``load`` (phase, pair) N, ``stiffness`` (phase,) N/m."""
+
+    approach: Array
+    load: Array
+    stiffness: Array
+
+
+def pair_states(table: PairTable, roll: Array, *, start_tooth_pinion: int = 0, start_tooth_wheel: int = 0) -> PairStates:
+    """Pairs at the pinion's roll, (phase,) m along the line of action; at 0 the start teeth enter at A."""
+    pitch = table.pair.base_pitch
+    newest = np.floor(roll / pitch).astype(np.int64)
+    index = newest[:, None] + 1 - np.arange(N_PAIRS)
+    position = roll[:, None] - index * pitch
+    compliance = np.full(position.shape, -table.shared_compliance)
+    gap = np.zeros(position.shape)
+    for side, start in ((table.pinion, start_tooth_pinion), (table.wheel, start_tooth_wheel)):
+        kinds = side.kind[(index + start) % len(side.kind)]
+        for kind in np.unique(kinds):
+            here = kinds == kind
+            compliance[here] += np.interp(position[here], table.position, side.compliance[kind])
+            gap[here] += np.interp(position[here], table.position, side.gap[kind])
+            if not side.present[kind]:
+                gap[here] = np.inf
+    return PairStates(compliance=compliance, gap=gap, position=position)
+
+
+def static_mesh(table: PairTable, states: PairStates, force: float) -> StaticMesh:
+    """Load sharing, approach and tangent stiffness dF/d(approach) under a total mesh force in N.
+
+    ``mesh.law=paper`` has no gaps: pairs on the path share by stiffness, and where none is on it the stiffness is 0
+    and the approach infinite.
+    """
+    if table.options.law == "paper":
+        on_path = (states.position >= 0.0) & (states.position <= table.pair.path_of_contact) & np.isfinite(states.gap)
+        gap = np.where(on_path, 0.0, np.inf)
+    else:
+        gap = states.gap
+    order = np.argsort(gap, axis=1, kind="stable")
+    sorted_gap = np.take_along_axis(gap, order, axis=1)
+    own = np.take_along_axis(states.compliance, order, axis=1)
+    touching = np.isfinite(sorted_gap)
+    stiffness = np.cumsum(np.where(touching, 1.0 / own, 0.0), axis=1)
+    reach = np.cumsum(np.where(touching, np.where(touching, sorted_gap, 0.0) / own, 0.0), axis=1)
+    with np.errstate(divide="ignore"):
+        local = (force + reach) / stiffness  # approach less the shared deflection if the first m pairs carry
+    carried = (local > sorted_gap).sum(axis=1)
+    last = np.maximum(carried - 1, 0)
+    rows = np.arange(len(last))
+    total, approach = stiffness[rows, last], local[rows, last]
+    load = np.where(np.isfinite(gap), np.maximum(approach[:, None] - gap, 0.0) / states.compliance, 0.0)
+    lost = carried == 0
+    return StaticMesh(
+        approach=np.where(lost, np.inf, approach + table.shared_compliance * force),
+        load=np.where(lost[:, None], 0.0, load),
+        stiffness=np.where(lost, 0.0, total / (1.0 + table.shared_compliance * total)),
+    )

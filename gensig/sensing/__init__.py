@@ -1,0 +1,1 @@
+"""From bearing accelerations to recorded channels: filters, gain, noise."""

@@ -1,0 +1,1 @@
+"""Whole machines, each reading like a method section."""

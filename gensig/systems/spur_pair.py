@@ -1,0 +1,210 @@
+"""A spur gear pair on its bearings: from configuration to stiffness curves and records."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass, replace
+from functools import lru_cache
+
+import numpy as np
+from numpy.typing import NDArray
+
+from gensig.dynamics.integrator import Solver, integrate
+from gensig.dynamics.pair import Body, PairDynamics, Support
+from gensig.errors import FaultError
+from gensig.faults.base import Fault, faulty_teeth
+from gensig.geometry.contact import GearPair
+from gensig.geometry.tooth import Tooth, healthy_tooth
+from gensig.geometry.tooth_profile import load_angle
+from gensig.material import Material
+from gensig.mesh.compliance import tooth_compliance
+from gensig.mesh.fillet_foundation import fillet_foundation_compliance
+from gensig.mesh.hertz import linear_contact_compliance
+from gensig.mesh.load_distribution import pair_states, static_mesh
+from gensig.mesh.options import MeshOptions
+from gensig.mesh.pair_table import PairTable, pair_compliance, pair_table
+from gensig.operating import Operating
+from gensig.sensing.chain import Sensing
+from gensig.sensing.decimation import decimator
+from gensig.sensing.manufacturing import Gearbox, Quality, Specimen, nominal_gearbox, perfect_specimen
+
+Array = NDArray[np.float64]
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class Start:
+    """Where a record begins: the teeth that enter contact at roll 0, and the roll as a share of a base pitch."""
+
+    tooth_pinion: int
+    tooth_wheel: int
+    phase: float
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class CleanRecord:
+    """Accelerations before noise, (channel, sample) m/s2 (rad/s2 for rotations), and what the run tells of itself."""
+
+    acceleration: Array
+    mean_speed: float
+    contact_loss_fraction: float
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class StiffnessCurves:
+    """Quasi-static mesh of one pair.
+
+    Per contact position (from A, base pitches): stiffness of a single pair that carries the whole load, sound and
+    (where a tooth is faulty) faulty, and the compliance terms by gear. Per roll angle of the faulted gear (pinion
+    when sound): mesh stiffness as the tangent dF/d(approach) under the set torque. SI units, angles in rad.
+    """
+
+    contact_position: Array
+    single_pair_stiffness: Array
+    faulty_pair_stiffness: Array | None
+    compliance: dict[str, dict[str, Array]]
+    roll_angle: Array
+    mesh_stiffness: Array
+    load_share: Array
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class SpurPair:
+    """One machine under one set of conventions."""
+
+    pair: GearPair
+    material: Material
+    mesh: MeshOptions
+    pinion: Body
+    wheel: Body
+    operating: Operating
+    sensing: Sensing
+    quality: Quality
+    solver: Solver
+
+    def mesh_table(self, faults: Sequence[Fault] = ()) -> PairTable:
+        """Compliance and gap tables with the given faults."""
+        return _mesh_table(self.pair, self.material, self.mesh, tuple(faults))
+
+    def simulate(
+        self,
+        faults: Sequence[Fault] = (),
+        *,
+        start: Start | None = None,
+        specimen: Specimen | None = None,
+        gearbox: Gearbox | None = None,
+    ) -> CleanRecord:
+        """Simulate one record; what is not given is perfect, nominal, and starts with teeth 0 at A."""
+        self.pair.require_continuous_drive()
+        begin = start or Start(tooth_pinion=0, tooth_wheel=0, phase=0.0)
+        gears = specimen or perfect_specimen(self.pair.pinion, self.pair.wheel)
+        housing = gearbox or nominal_gearbox(len(self.sensing.channels))
+        dynamics = PairDynamics(
+            table=self.mesh_table(faults),
+            pinion=_scaled(self.pinion, housing.stiffness_factor[:2], housing.damping_factor[:2]),
+            wheel=_scaled(self.wheel, housing.stiffness_factor[2:], housing.damping_factor[2:]),
+            operating=self.operating,
+            pinion_error=gears.pinion_error,
+            wheel_error=gears.wheel_error,
+            start_tooth_pinion=begin.tooth_pinion,
+            start_tooth_wheel=begin.tooth_wheel,
+            start_phase=begin.phase,
+        )
+        low_pass = decimator(self.solver.oversampling)
+        motion = integrate(
+            dynamics,
+            self.solver,
+            sampling_rate=self.sensing.sampling_rate,
+            channels=self.sensing.channels,
+            margin=low_pass.margin,
+        )
+        return CleanRecord(
+            acceleration=low_pass.apply(motion.acceleration) * housing.gain[:, None],
+            mean_speed=motion.mean_speed,
+            contact_loss_fraction=motion.contact_loss_fraction,
+        )
+
+    def stiffness_curves(
+        self, faults: Sequence[Fault] = (), *, n_positions: int = 201, points_per_tooth: int = 100
+    ) -> StiffnessCurves:
+        """Single-pair and mesh stiffness with their parts; no drive is needed, so contact ratios below 1 are allowed."""
+        pair = self.pair
+        table = self.mesh_table(faults)
+        position = np.linspace(0.0, pair.path_of_contact, n_positions)
+        sound = pair_compliance(table, position)
+        faulted = self._faulted_tooth(faults)
+        gear = pair.wheel if faulted is not None and faulted[0] == "wheel" else pair.pinion
+        roll = pair.base_pitch * (np.arange(gear.n_teeth * points_per_tooth) + 0.5) / points_per_tooth
+        static = static_mesh(table, pair_states(table, roll), self.operating.torque / pair.pinion.base_radius)
+        return StiffnessCurves(
+            contact_position=position / pair.base_pitch,
+            single_pair_stiffness=1.0 / sound,
+            faulty_pair_stiffness=None if faulted is None else self._faulty_stiffness(table, position, faulted),
+            compliance=self._terms(position, faults),
+            roll_angle=roll / gear.base_radius,
+            mesh_stiffness=static.stiffness,
+            load_share=static.load / np.maximum(static.load.sum(axis=1, keepdims=True), 1e-30),
+        )
+
+    @staticmethod
+    def _faulted_tooth(faults: Sequence[Fault]) -> tuple[str, int] | None:
+        return (faults[0].gear, faults[0].tooth) if faults else None
+
+    def _faulty_stiffness(self, table: PairTable, position: Array, faulted: tuple[str, int]) -> Array:
+        side = table.pinion if faulted[0] == "pinion" else table.wheel
+        kind = int(side.kind[faulted[1]])
+        if not side.present[kind]:
+            return np.zeros_like(position)
+        kinds = {"pinion_kind": kind} if faulted[0] == "pinion" else {"wheel_kind": kind}
+        return 1.0 / pair_compliance(table, position, **kinds)
+
+    def _terms(self, position: Array, faults: Sequence[Fault]) -> dict[str, dict[str, Array]]:
+        """Compliance terms in m/N of the gears' most telling tooth: the faulted one, else a sound one."""
+        odd = faulty_teeth(self.pair, faults)
+        terms = {}
+        for gear, curvature in (
+            (self.pair.pinion, np.asarray(self.pair.pinion_curvature(position))),
+            (self.pair.wheel, np.asarray(self.pair.wheel_curvature(position))),
+        ):
+            tooth: Tooth = next((tooth for (name, _), tooth in odd.items() if name == gear.name), healthy_tooth(gear))
+            parts = tooth_compliance(tooth, curvature, self.material)
+            width = np.interp(curvature, tooth.profile.curvature_radius, tooth.contact_width)
+            terms[gear.name] = {
+                "bending": parts.bending,
+                "shear": parts.shear,
+                "axial": parts.axial,
+                "foundation": fillet_foundation_compliance(
+                    gear,
+                    load_angle(gear, curvature),
+                    self.material,
+                    allow_extrapolation=self.mesh.allow_extrapolation,
+                ),
+                "contact": 0.5 * linear_contact_compliance(width, self.material),
+            }
+        return terms
+
+
+def severity(faults: Sequence[Fault], pair: GearPair) -> float:
+    """Largest severity of the faults, 0 when there is none."""
+    gears = {"pinion": pair.pinion, "wheel": pair.wheel}
+    value = max((fault.severity(gears[fault.gear]) for fault in faults), default=0.0)
+    if value > 1.0:
+        raise FaultError(f"the fault's severity is {value:.3g}, above 1: it is larger than its tooth")
+    return value
+
+
+@lru_cache(maxsize=32)
+def _mesh_table(pair: GearPair, material: Material, mesh: MeshOptions, faults: tuple[Fault, ...]) -> PairTable:
+    return pair_table(pair, material, mesh, faulty_teeth(pair, faults))
+
+
+def _scaled(body: Body, stiffness: Array, damping: Array) -> Body:
+    support = body.support
+    return replace(
+        body,
+        support=Support(
+            stiffness_x=support.stiffness_x * float(stiffness[0]),
+            stiffness_y=support.stiffness_y * float(stiffness[1]),
+            damping_x=support.damping_x * float(damping[0]),
+            damping_y=support.damping_y * float(damping[1]),
+        ),
+    )

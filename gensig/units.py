@@ -1,0 +1,142 @@
+"""The one converter between unit-suffixed names at the file boundary and SI inside.
+
+``normal_module_mm: 2`` in a file is ``normal_module = 0.002`` in the code. A name without a known suffix is a
+number without unit (``n_teeth``, ``damping_ratio``), taken as it is.
+"""
+
+from __future__ import annotations
+
+import dataclasses
+import difflib
+import math
+import types
+import typing
+from collections.abc import Mapping
+from typing import Any, TypeVar
+
+from gensig.errors import ConfigError
+
+# suffix: (factor to SI, what it measures); longer suffixes first, so that kg_m2 is not read as m2
+UNITS: dict[str, tuple[float, str]] = {
+    "kg_m2": (1.0, "moment of inertia"),
+    "n_per_m": (1.0, "stiffness"),
+    "ns_per_m": (1.0, "damping"),
+    "nm_per_rad": (1.0, "torsional stiffness"),
+    "mm": (1e-3, "length"),
+    "um": (1e-6, "length"),
+    "m": (1.0, "length"),
+    "deg": (math.pi / 180.0, "angle"),
+    "rad": (1.0, "angle"),
+    "rpm": (2.0 * math.pi / 60.0, "speed"),
+    "nm": (1.0, "torque"),
+    "kg": (1.0, "mass"),
+    "s": (1.0, "time"),
+    "hz": (1.0, "frequency"),
+    "gpa": (1e9, "stress"),
+    "mpa": (1e6, "stress"),
+    "db": (1.0, "level"),
+}
+
+T = TypeVar("T")
+
+
+def split_unit(name: str) -> tuple[str, str | None]:
+    """Split a boundary name into its bare name and its unit suffix (None where it has none)."""
+    for suffix in UNITS:
+        if name.endswith("_" + suffix):
+            return name[: -len(suffix) - 1], suffix
+    return name, None
+
+
+def to_si(name: str, value: float) -> float:
+    """Value of a suffixed name in SI units."""
+    _, suffix = split_unit(name)
+    return value if suffix is None else value * UNITS[suffix][0]
+
+
+def from_si(name: str, value: float) -> float:
+    """SI value in the unit that the suffixed name states."""
+    _, suffix = split_unit(name)
+    return value if suffix is None else value / UNITS[suffix][0]
+
+
+def read(cls: type[T], values: Mapping[str, Any], where: str, **given: Any) -> T:
+    """Build a frozen dataclass from boundary keys.
+
+    Parameters
+    ----------
+    cls : dataclass whose fields are SI quantities without suffix; ``metadata={"unit": "mm"}`` names the suffix
+        that files use (a field without it is a plain number, text or flag)
+    values : keys with suffixes, as in a configuration
+    where : how to name the place in an error, for instance ``"gear.pinion"``
+    given : fields that do not come from ``values``
+
+    Raises
+    ------
+    ConfigError    for an unknown or missing key, a wrong suffix or a value of the wrong type
+    """
+    fields = {field.name: field for field in dataclasses.fields(cls) if field.name not in given}  # type: ignore[arg-type]
+    names = {_boundary_name(field): field for field in fields.values()}
+    hints = typing.get_type_hints(cls)
+    result = dict(given)
+    for key, value in values.items():
+        if key not in names:
+            raise ConfigError(f"{where}: {_unknown(key, fields, list(names))}")
+        field = names[key]
+        result[field.name] = _convert(f"{where}.{key}", key, value, hints[field.name])
+    missing = [
+        name
+        for name, field in names.items()
+        if field.name not in result
+        and field.default is dataclasses.MISSING
+        and field.default_factory is dataclasses.MISSING
+    ]
+    if missing:
+        raise ConfigError(f"{where}: missing {', '.join(missing)}")
+    return cls(**result)
+
+
+def unit(suffix: str) -> Any:
+    """Dataclass field whose boundary name carries ``suffix``."""
+    return dataclasses.field(metadata={"unit": suffix})
+
+
+def _boundary_name(field: dataclasses.Field[Any]) -> str:
+    suffix = field.metadata.get("unit")
+    return field.name if suffix is None else f"{field.name}_{suffix}"
+
+
+def _unknown(key: str, fields: Mapping[str, Any], names: list[str]) -> str:
+    bare, suffix = split_unit(key)
+    if bare in fields or key in fields:
+        right = _boundary_name(fields[bare if bare in fields else key])
+        return f"'{key}' has the wrong unit; write it as '{right}'"
+    close = difflib.get_close_matches(key, names, n=1)
+    hint = f"did you mean '{close[0]}'?" if close else f"known: {', '.join(names)}"
+    return f"unknown key '{key}'; {hint}"
+
+
+def _convert(place: str, key: str, value: Any, hint: Any) -> Any:
+    kinds = typing.get_args(hint) if isinstance(hint, types.UnionType) else (hint,)
+    if value is None:
+        if type(None) in kinds:
+            return None
+        raise ConfigError(f"{place} is null; give a value")
+    if float in kinds:
+        if isinstance(value, bool) or not isinstance(value, int | float):
+            raise ConfigError(f"{place} = {value!r} is not a number")
+        if not math.isfinite(value):
+            raise ConfigError(f"{place} = {value} is not finite")
+        return to_si(key, float(value))
+    if int in kinds:
+        if isinstance(value, bool) or not isinstance(value, int):
+            raise ConfigError(f"{place} = {value!r} is not a whole number")
+        return value
+    if typing.get_origin(hint) is tuple:
+        if not isinstance(value, list | tuple) or not all(isinstance(item, str) for item in value):
+            raise ConfigError(f"{place} = {value!r} is not a list of names")
+        return tuple(value)
+    for kind in (bool, str):
+        if kind in kinds and not isinstance(value, kind):
+            raise ConfigError(f"{place} = {value!r} is not {'true or false' if kind is bool else 'text'}")
+    return value
