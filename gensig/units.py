@@ -107,7 +107,7 @@ def _boundary_name(field: dataclasses.Field[Any]) -> str:
 
 
 def _unknown(key: str, fields: Mapping[str, Any], names: list[str]) -> str:
-    bare, suffix = split_unit(key)
+    bare, _ = split_unit(key)
     if bare in fields or key in fields:
         right = _boundary_name(fields[bare if bare in fields else key])
         return f"'{key}' has the wrong unit; write it as '{right}'"

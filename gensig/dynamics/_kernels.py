@@ -87,7 +87,9 @@ def _friction_sign(m, position):
 
 
 @njit(cache=True, error_model="numpy", inline="always", _nrt=False)
-def mesh_law(m, table, pinion_row, wheel_row, pinion_error, wheel_error, sound_wheel, roll, approach, rate, roll_rate, work):
+def mesh_law(
+    m, table, pinion_row, wheel_row, pinion_error, wheel_error, sound_wheel, roll, approach, rate, roll_rate, work
+):
     """Forces of all pairs at one instant.
 
     Returns normal force, friction force, friction moments about pinion and wheel, force on the roll coordinate
@@ -108,7 +110,7 @@ def mesh_law(m, table, pinion_row, wheel_row, pinion_error, wheel_error, sound_w
 
 @njit(cache=True, error_model="numpy", inline="always", _nrt=False)
 def _gather(m, table, pinion_row, wheel_row, pinion_error, wheel_error, roll, approach, work):
-    """Pairs that could touch: bite, 1 / own compliance, own, gap slope, compliance slope, position. Returns how many."""
+    """Pairs that could touch: bite, 1 / own compliance, own, gap slope, compliance slope, position; and how many."""
     newest = int(np.floor(roll / m.pitch)) + 1
     tooth_p = (newest + m.start_pinion) % len(pinion_row)
     tooth_w = (newest + m.start_wheel) % len(wheel_row)

@@ -10,9 +10,9 @@ from numpy.typing import NDArray
 
 from gensig.dynamics import _kernels
 from gensig.dynamics.pair import PairDynamics
-from gensig.mesh.pair_table import N_PAIRS
 from gensig.dynamics.system import slowest_decay
 from gensig.errors import ConfigError, SimulationError
+from gensig.mesh.pair_table import N_PAIRS
 
 Array = NDArray[np.float64]
 
@@ -68,19 +68,26 @@ def integrate(
     step = 1.0 / (sampling_rate * solver.oversampling)
     _check_step(dynamics, step)
     mesh, arrays = dynamics.arrays(step), system.arrays()
-    q = dynamics.static_start()
-    v = np.zeros_like(q)
     index = np.array([system.names.index(name) for name in channels], dtype=np.int64)
     n_samples = round(dynamics.operating.duration * sampling_rate)
+    if n_samples < 1:
+        raise ConfigError(
+            f"operating.duration_s = {dynamics.operating.duration:g} holds no sample at {sampling_rate:g} Hz"
+        )
     n_settle = math.ceil(settling_time(dynamics) * sampling_rate) * solver.oversampling
     n_record = (n_samples + 2 * margin) * solver.oversampling
+    start = -n_settle - margin * solver.oversampling  # time 0 is the first recorded sample
+    q = dynamics.static_start(start * step)
+    v = np.zeros_like(q)
     scratch, work = np.empty((5, len(q))), np.empty((6, N_PAIRS))
-    _, broken = _kernels.integrate(arrays, mesh, q, v, step, 0, n_settle, index, np.empty((0, len(index))), scratch, work)
-    before = q[2]
     out = np.empty((n_record, len(index)))
     n_lost = 0
+    _, broken = _kernels.integrate(arrays, mesh, q, v, step, start, n_settle, index, out[:0], scratch, work)
+    angle = q[2]
     if broken < 0:
-        n_lost, broken = _kernels.integrate(arrays, mesh, q, v, step, n_settle, n_record, index, out, scratch, work)
+        n_lost, broken = _kernels.integrate(
+            arrays, mesh, q, v, step, start + n_settle, n_record, index, out, scratch, work
+        )
     if broken >= 0:
         raise SimulationError(
             f"the motion stopped being finite (speed {dynamics.operating.speed * 30 / math.pi:g} r/min, torque "
@@ -89,7 +96,7 @@ def integrate(
     return Motion(
         acceleration=out,
         step=step,
-        mean_speed=dynamics.operating.speed + (q[2] - before) / (n_record * step),
+        mean_speed=dynamics.operating.speed + (q[2] - angle) / (n_record * step),
         contact_loss_fraction=n_lost / n_record,
     )
 
@@ -99,11 +106,13 @@ def _check_step(dynamics: PairDynamics, step: float) -> None:
     system = dynamics.system()
     direction = dynamics.approach_direction()
     n = len(system.mass)
-    k = (system.stiffness + 1.2 * dynamics.mean_mesh_stiffness() * np.outer(direction, direction)) / system.mass[:, None]
+    k = (system.stiffness + 1.2 * dynamics.mean_mesh_stiffness() * np.outer(direction, direction)) / system.mass[
+        :, None
+    ]
     state = np.block([[np.zeros((n, n)), np.eye(n)], [-k, -system.damping / system.mass[:, None]]])
     fastest = float(np.abs(np.linalg.eigvals(state)).max())
     if fastest * step > STABILITY_LIMIT:
         raise SimulationError(
-            f"the internal step {step:.3g} s is too long for the stiffest motion at {fastest / (2 * math.pi):.4g} Hz; raise "
-            f"solver.oversampling by at least {fastest * step / STABILITY_LIMIT:.2g} times"
+            f"the internal step {step:.3g} s is too long for the stiffest motion at {fastest / (2 * math.pi):.4g} Hz; "
+            f"raise solver.oversampling by at least {fastest * step / STABILITY_LIMIT:.2g} times"
         )

@@ -11,7 +11,7 @@ from numpy.typing import NDArray
 from gensig.dynamics._kernels import MeshArrays, MeshNumbers
 from gensig.dynamics.system import LumpedSystem
 from gensig.errors import ConfigError
-from gensig.mesh.load_distribution import pair_states, static_mesh
+from gensig.mesh.load_distribution import PairStates, pair_states, static_mesh
 from gensig.mesh.pair_table import GearTable, PairTable
 from gensig.operating import Operating
 from gensig.units import unit
@@ -79,7 +79,7 @@ class PairDynamics:
 
     @property
     def start_roll(self) -> float:
-        """Roll along the line of action at time 0, m."""
+        """Roll along the line of action at time 0, the first recorded sample, m."""
         return self.start_phase * self.table.pair.base_pitch
 
     @property
@@ -91,7 +91,8 @@ class PairDynamics:
         """Equations (1) of the spur paper with the signs put right, without the mesh.
 
         Action and reaction on both gears, mesh force driving the wheel: ``docs/theory/spur_dynamics.md``. The soft
-        speed source acts on the deviation from the set rotation, so it is a spring and a damper there.
+        speed source acts on the deviation from the set rotation, so it is a spring and a damper there; its set angle
+        leads by what the mean friction torque winds up, so that the mean deviation is about 0.
         """
         ratio = self.table.pair.ratio
         reduced = self.pinion.inertia + self.wheel.inertia / ratio**2
@@ -104,12 +105,19 @@ class PairDynamics:
             names=DOFS,
             mass=np.array([p.mass, p.mass, p.inertia, w.mass, w.mass, w.inertia]),
             stiffness=np.diag(
-                [p.support.stiffness_x, p.support.stiffness_y, drive_stiffness, w.support.stiffness_x, w.support.stiffness_y, 0.0]
+                [
+                    p.support.stiffness_x,
+                    p.support.stiffness_y,
+                    drive_stiffness,
+                    w.support.stiffness_x,
+                    w.support.stiffness_y,
+                    0.0,
+                ]
             ),
             damping=np.diag(
                 [p.support.damping_x, p.support.damping_y, drive_damping, w.support.damping_x, w.support.damping_y, 0.0]
             ),
-            force=np.array([0.0, 0.0, torque, 0.0, 0.0, -torque * ratio]),
+            force=np.array([0.0, 0.0, torque + self.friction_torque(), 0.0, 0.0, -torque * ratio]),
         )
 
     def approach_direction(self) -> Array:
@@ -121,7 +129,12 @@ class PairDynamics:
         """Mean tangent stiffness of sound teeth over one base pitch under the set torque, N/m."""
         # tooth pairs away from a faulty tooth are the sound ones: average where most pairs are
         roll = self.table.pair.base_pitch * (np.arange(self.table.pair.pinion.n_teeth * 32) + 0.5) / 32
-        return float(np.median(static_mesh(self.table, pair_states(self.table, roll), self.mesh_force).stiffness.reshape(-1, 32), axis=0).mean())
+        return float(
+            np.median(
+                static_mesh(self.table, pair_states(self.table, roll), self.mesh_force).stiffness.reshape(-1, 32),
+                axis=0,
+            ).mean()
+        )
 
     def arrays(self, step: float) -> MeshArrays:
         """The mesh as the compiled integrator takes it."""
@@ -167,37 +180,32 @@ class PairDynamics:
             sound_wheel_row=n_pinion_rows,
         )
 
-    def static_start(self) -> Array:
-        """Static equilibrium at the set speed, (dof,): supports, approach, and the drive's lag for mean friction."""
-        pair, force = self.table.pair, self.mesh_force
-        roll = self.start_roll + pair.base_pitch * (np.arange(64) + 0.5) / 64
-        states = pair_states(
-            self.table, roll, start_tooth_pinion=self.start_tooth_pinion, start_tooth_wheel=self.start_tooth_wheel
-        )
-        loads = static_mesh(self.table, states, force).load
-        now = static_mesh(
-            self.table,
-            pair_states(
-                self.table,
-                np.array([self.start_roll]),
-                start_tooth_pinion=self.start_tooth_pinion,
-                start_tooth_wheel=self.start_tooth_wheel,
-            ),
-            force,
-        )
+    def friction_torque(self) -> float:
+        """Mean friction torque reduced to the pinion, from the static loads over one base pitch, N m."""
+        pair = self.table.pair
+        states = self._states(pair.base_pitch * (np.arange(64) + 0.5) / 64)
+        loads = static_mesh(self.table, states, self.mesh_force).load
         arm = pair.start_curvature_radius + np.clip(states.position, 0.0, pair.path_of_contact)
-        side = np.sign(states.position - pair.pitch_point)
-        loss_arm = side * (arm - (pair.tangent_length - arm) / pair.ratio)
-        loss = self.table.options.friction_coefficient * float(np.mean((loads * loss_arm).sum(axis=1)))
-        system = self.system()
+        loss_arm = np.sign(states.position - pair.pitch_point) * (arm - (pair.tangent_length - arm) / pair.ratio)
+        return self.table.options.friction_coefficient * float(np.mean((loads * loss_arm).sum(axis=1)))
+
+    def static_start(self, time: float) -> Array:
+        """Static equilibrium at a nominal time: deflected supports and the approach of the pairs in contact, (dof,)."""
+        pair, force, system = self.table.pair, self.mesh_force, self.system()
+        roll = self.start_roll + pair.pinion.base_radius * self.operating.speed * time
+        approach = float(static_mesh(self.table, self._states(np.array([roll])), force).approach[0])
         start = np.zeros(len(system.mass))
         for dof, direction in ((1, 1.0), (4, -1.0)):
             if system.stiffness[dof, dof] > 0.0:
                 start[dof] = direction * force / system.stiffness[dof, dof]
-        start[2] = -loss / system.stiffness[2, 2]
-        approach = float(now.approach[0]) if np.isfinite(now.approach[0]) else 0.0
-        start[5] = (pair.pinion.base_radius * start[2] - start[1] + start[4] - approach) / pair.wheel.base_radius
+        closed = approach if math.isfinite(approach) else 0.0
+        start[5] = (start[4] - start[1] - closed) / pair.wheel.base_radius
         return start
+
+    def _states(self, roll: Array) -> PairStates:
+        return pair_states(
+            self.table, roll, start_tooth_pinion=self.start_tooth_pinion, start_tooth_wheel=self.start_tooth_wheel
+        )
 
 
 def _columns(side: GearTable) -> Array:

@@ -54,8 +54,8 @@ class Crack(Fault):
         chord = self.root_chord(tooth.gear)
         if self.crack_depth >= chord:
             raise FaultError(
-                f"crack_depth {self.crack_depth * 1e3:.4g} mm reaches through the root chord {chord * 1e3:.4g} mm of the "
-                f"{self.gear} tooth (m = {tooth.gear.normal_module * 1e3:g} mm, z = {tooth.gear.n_teeth}); reduce "
+                f"crack_depth {self.crack_depth * 1e3:.4g} mm reaches through the root chord {chord * 1e3:.4g} mm of "
+                f"the {self.gear} tooth (m = {tooth.gear.normal_module * 1e3:g} mm, z = {tooth.gear.n_teeth}); reduce "
                 f"fault.crack_depth_mm"
             )
         half = tooth.cell_half_thickness

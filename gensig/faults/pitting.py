@@ -57,16 +57,16 @@ class Pitting(Fault):
             )
         if self.pit_width >= gear.face_width:
             raise FaultError(
-                f"pit_width {self.pit_width * 1e3:.4g} mm must be below the face width {gear.face_width * 1e3:.4g} mm of "
-                f"the {self.gear}: something of the flank must carry; reduce fault.pit_width_mm"
+                f"pit_width {self.pit_width * 1e3:.4g} mm must be below the face width {gear.face_width * 1e3:.4g} mm "
+                f"of the {self.gear}: something of the flank must carry; reduce fault.pit_width_mm"
             )
         edges = profile.abscissa
         overlap = np.clip(np.minimum(edges[1:], high) - np.maximum(edges[:-1], low), 0.0, None) / np.diff(edges)
         half = tooth.cell_half_thickness
         if np.any(self.pit_depth >= half[overlap > 0.0]):
             raise FaultError(
-                f"pit_depth {self.pit_depth * 1e3:.4g} mm reaches the centreline of the {self.gear} tooth (half thickness "
-                f"{float(half[overlap > 0.0].min()) * 1e3:.4g} mm there); reduce fault.pit_depth_mm"
+                f"pit_depth {self.pit_depth * 1e3:.4g} mm reaches the centreline of the {self.gear} tooth (half "
+                f"thickness {float(half[overlap > 0.0].min()) * 1e3:.4g} mm there); reduce fault.pit_depth_mm"
             )
         lost_width = self.pit_width * overlap
         lost_area = lost_width * self.pit_depth

@@ -39,7 +39,10 @@ class GearPair:
             raise GeometryError(f"gear.backlash_um = {self.backlash * 1e6:g} must not be negative")
         if self.path_of_contact <= 0.0:
             raise GeometryError("pinion and wheel never touch on the line of action; check teeth and profile shifts")
-        for gear, lowest in ((self.pinion, self.start_curvature_radius), (self.wheel, self.wheel_curvature(self.path_of_contact))):
+        for gear, lowest in (
+            (self.pinion, self.start_curvature_radius),
+            (self.wheel, self.wheel_curvature(self.path_of_contact)),
+        ):
             if lowest < gear.junction_curvature_radius:
                 raise GeometryError(
                     f"{gear.name}: contact would reach curvature radius {float(lowest) * 1e3:.4g} mm, below the end of "

@@ -7,6 +7,7 @@ from dataclasses import dataclass
 
 from gensig.errors import GeometryError
 from gensig.geometry.involute import involute
+from gensig.units import from_si, unit
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -19,22 +20,24 @@ class Gear:
 
     name: str
     n_teeth: int
-    normal_module: float
-    pressure_angle: float
+    normal_module: float = unit("mm")
+    pressure_angle: float = unit("deg")
     addendum_coefficient: float
     clearance_coefficient: float
     cutter_tip_radius_coefficient: float
     profile_shift: float
-    face_width: float
-    bore_radius: float
+    face_width: float = unit("mm")
+    bore_radius: float = unit("mm")
 
     def __post_init__(self) -> None:
         self._check_ranges()
         if self.junction_curvature_radius <= 0.0:
-            limit = math.ceil(2.0 * (self.straight_flank_depth / self.normal_module) / math.sin(self.pressure_angle) ** 2)
+            limit = math.ceil(
+                2.0 * (self.straight_flank_depth / self.normal_module) / math.sin(self.pressure_angle) ** 2
+            )
             raise GeometryError(
-                f"{self.name}: {self.n_teeth} teeth with profile shift {self.profile_shift:g} are undercut; use at least "
-                f"{limit} teeth or a larger profile_shift"
+                f"{self.name}: {self.n_teeth} teeth with profile shift {self.profile_shift:g} are undercut; use at "
+                f"least {limit} teeth or a larger profile_shift"
             )
         if self.half_tooth_angle_at(self.tip_radius) <= 0.0:
             raise GeometryError(
@@ -50,9 +53,10 @@ class Gear:
     def _check_ranges(self) -> None:
         if self.n_teeth < 3:
             raise GeometryError(f"{self.name}: n_teeth = {self.n_teeth} must be at least 3")
-        for key in ("normal_module", "face_width", "addendum_coefficient"):
-            if not getattr(self, key) > 0.0:
-                raise GeometryError(f"{self.name}: {key} = {getattr(self, key):g} must be positive")
+        for key in ("normal_module_mm", "face_width_mm", "addendum_coefficient"):
+            value = from_si(key, getattr(self, key.removesuffix("_mm")))
+            if not value > 0.0:
+                raise GeometryError(f"{self.name}: {key} = {value:g} must be positive")
         if not math.radians(10.0) <= self.pressure_angle <= math.radians(35.0):
             raise GeometryError(
                 f"{self.name}: pressure_angle_deg = {math.degrees(self.pressure_angle):g} must lie between 10 and 35"

@@ -1,4 +1,4 @@
-"""One tooth as the mesh sees it: sections that carry load, a flank that touches. Faults change these and nothing else."""
+"""One tooth as the mesh sees it: sections that carry, a flank that touches. Faults change these and nothing else."""
 
 from __future__ import annotations
 

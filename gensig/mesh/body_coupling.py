@@ -114,7 +114,15 @@ def ring_harmonic(gear: Gear, material: Material, n: int) -> Array:
     columns = []
     for power, u, v, reference in powers:
         inner, outer = (r_i / reference) ** power, (r_f / reference) ** power
-        columns.append([u * inner, v * inner, *column(u * outer, v * outer, power * u * outer, power * v * outer), u * outer, v * outer])
+        columns.append(
+            [
+                u * inner,
+                v * inner,
+                *column(u * outer, v * outer, power * u * outer, power * v * outer),
+                u * outer,
+                v * outer,
+            ]
+        )
     if n == 1:
         log = 2.0 * kappa * math.log(r_i / r_f)
         columns.append([log - 1.0, -log - 1.0, *column(-1.0, -1.0, 2.0 * kappa, -2.0 * kappa), -1.0, -1.0])

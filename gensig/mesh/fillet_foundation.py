@@ -73,14 +73,14 @@ def _check_range(gear: Gear, found: dict[str, float], allow_extrapolation: bool)
         if not low <= value <= high and not allow_extrapolation:
             mend = "change bore_radius_mm" if key == "h_f" else "change the teeth"
             raise ExtrapolationError(
-                f"{gear.name}: {what} = {value:.3g} lies outside {low:g}..{high:g}, where the gear-body fit holds; {mend}, "
-                f"or set mesh.allow_extrapolation=true"
+                f"{gear.name}: {what} = {value:.3g} lies outside {low:g}..{high:g}, where the gear-body fit holds; "
+                f"{mend}, or set mesh.allow_extrapolation=true"
             )
         checked_low, checked_high = CHECKED[key]
         if not checked_low <= value <= checked_high:
             warnings.warn(
-                f"{gear.name}: {what} = {value:.3g} lies outside {checked_low:g}..{checked_high:g}, where the gear-body "
-                f"fit was checked against finite elements",
+                f"{gear.name}: {what} = {value:.3g} lies outside {checked_low:g}..{checked_high:g}, where the "
+                f"gear-body fit was checked against finite elements",
                 ExtrapolationWarning,
                 stacklevel=4,
             )

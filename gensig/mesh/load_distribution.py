@@ -31,7 +31,9 @@ class StaticMesh:
     stiffness: Array
 
 
-def pair_states(table: PairTable, roll: Array, *, start_tooth_pinion: int = 0, start_tooth_wheel: int = 0) -> PairStates:
+def pair_states(
+    table: PairTable, roll: Array, *, start_tooth_pinion: int = 0, start_tooth_wheel: int = 0
+) -> PairStates:
     """Pairs at the pinion's roll, (phase,) m along the line of action; at 0 the start teeth enter at A."""
     pitch = table.pair.base_pitch
     newest = np.floor(roll / pitch).astype(np.int64)
@@ -73,8 +75,9 @@ def static_mesh(table: PairTable, states: PairStates, force: float) -> StaticMes
     last = np.maximum(carried - 1, 0)
     rows = np.arange(len(last))
     total, approach = stiffness[rows, last], local[rows, last]
-    load = np.where(np.isfinite(gap), np.maximum(approach[:, None] - gap, 0.0) / states.compliance, 0.0)
     lost = carried == 0
+    bite = np.where(lost, 0.0, approach)[:, None] - np.where(np.isfinite(gap), gap, np.inf)
+    load = np.maximum(bite, 0.0) / states.compliance
     return StaticMesh(
         approach=np.where(lost, np.inf, approach + table.shared_compliance * force),
         load=np.where(lost[:, None], 0.0, load),

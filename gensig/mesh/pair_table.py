@@ -1,4 +1,4 @@
-"""Compliance and gap of every distinct tooth along the line of action: all that statics and dynamics ask of the mesh."""
+"""Compliance and gap of every distinct tooth along the line of action: all that statics and dynamics ask."""
 
 from __future__ import annotations
 
@@ -83,8 +83,8 @@ def pair_table(
     stiffest = float(sides["pinion"].compliance.min() + sides["wheel"].compliance.min())
     if shared >= 0.95 * stiffest:
         raise ExtrapolationError(
-            f"the gear bodies share {shared:.3g} m/N of the stiffest pair's {stiffest:.3g} m/N, more than one pair has; "
-            f"use a larger bore_radius_mm or mesh.pair_coupling=sum"
+            f"the gear bodies share {shared:.3g} m/N of the stiffest pair's {stiffest:.3g} m/N, more than one pair "
+            f"has; use a larger bore_radius_mm or mesh.pair_coupling=sum"
         )
     return PairTable(
         pair=pair,

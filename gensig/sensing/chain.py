@@ -35,9 +35,7 @@ class Sensing:
         if not self.channels or len(set(self.channels)) != len(self.channels):
             raise ConfigError(f"sensing.channels = {list(self.channels)} must name at least one channel, each once")
         if self.snr_reference not in SNR_REFERENCES:
-            raise ConfigError(
-                f"sensing.snr_reference = {self.snr_reference!r}; allowed: {', '.join(SNR_REFERENCES)}"
-            )
+            raise ConfigError(f"sensing.snr_reference = {self.snr_reference!r}; allowed: {', '.join(SNR_REFERENCES)}")
         if not 0.0 <= self.gain_scatter < 0.5:
             raise ConfigError(f"sensing.gain_scatter = {self.gain_scatter:g} must lie in 0..0.5")
 

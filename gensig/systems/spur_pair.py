@@ -126,7 +126,7 @@ class SpurPair:
     def stiffness_curves(
         self, faults: Sequence[Fault] = (), *, n_positions: int = 201, points_per_tooth: int = 100
     ) -> StiffnessCurves:
-        """Single-pair and mesh stiffness with their parts; no drive is needed, so contact ratios below 1 are allowed."""
+        """Single-pair and mesh stiffness with their parts; contact ratios below 1 are allowed, nothing need turn."""
         pair = self.pair
         table = self.mesh_table(faults)
         position = np.linspace(0.0, pair.path_of_contact, n_positions)

@@ -1,0 +1,104 @@
+"""From typed overrides to one plain configuration that decides everything, classes included."""
+
+from __future__ import annotations
+
+import difflib
+import warnings
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Any
+
+from gensig.compose import compose, options, override_keys
+from gensig.errors import ConfigError
+from gensig.systems.registry import SIDES
+
+CONFIG_NAME = "generate"
+
+
+class DerivedValueWarning(UserWarning):
+    """A value of the chosen gear option that no longer fits and is derived instead."""
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class Request:
+    """A composed configuration and the overrides as typed.
+
+    ``config`` holds plain values only; its ``classes`` maps every class of the plan to its fault option, so that the
+    folder of a data set needs no package to be understood.
+    """
+
+    config: dict[str, Any]
+    overrides: tuple[str, ...]
+
+
+def read_request(overrides: Sequence[str], *, config_dir: str | Path | None = None) -> Request:
+    """Compose the configuration for one job.
+
+    A ``fault.key=value`` is applied to every class of the plan whose option has that key, and pinned there.
+
+    Raises
+    ------
+    ConfigError    with one line, for anything that cannot be used
+    """
+    typed = override_keys(overrides)
+    fault_words = {
+        word.lstrip("+").partition("=")[0]: word for word in overrides if word.lstrip("+").startswith("fault.")
+    }
+    others = [word for word in overrides if word not in fault_words.values()]
+    base = compose(CONFIG_NAME, others, config_dir=config_dir)
+    plan = base["plan"]
+    names = [typed["fault"]] if "fault" in typed else plan["classes"] or [base["fault"]["kind"]]
+    if not isinstance(names, list) or not all(isinstance(name, str) for name in names) or len(set(names)) < len(names):
+        raise ConfigError(f"plan.classes = {names!r} must be a list of different fault options")
+
+    def class_fault(name: str | None) -> dict[str, Any]:
+        words = [word for word in others if name is None or not word.startswith("fault=")]
+        words += [] if name is None else [f"fault={name}"]
+        plain = compose(CONFIG_NAME, words, config_dir=config_dir)["fault"]
+        mine = {key: word for key, word in fault_words.items() if key.split(".")[1] in plain}
+        unused.difference_update(mine)
+        fault = compose(CONFIG_NAME, [*words, *mine.values()], config_dir=config_dir)["fault"]
+        vary = fault.get("vary") or {}
+        return {**fault, "vary": {key: spec for key, spec in vary.items() if f"fault.{key}" not in mine}}
+
+    unused = set(fault_words)
+    selected = class_fault(None)
+    classes = {name: class_fault(name) for name in names}
+    if unused:
+        raise ConfigError(_no_such_fault_key(sorted(unused)[0], selected))
+    plan["classes"] = names
+    plan["vary"] = {key: value for key, value in (plan["vary"] or {}).items() if key not in typed}
+    config = {**base, "fault": selected, "classes": classes}
+    _reset_derived(config, set(typed) | set(plan["vary"]))
+    return Request(config=config, overrides=tuple(overrides))
+
+
+def _no_such_fault_key(key: str, selected: Mapping[str, Any]) -> str:
+    leaf = key.removeprefix("fault.")
+    known = [name for name in selected if name not in ("kind", "vary")]
+    close = difflib.get_close_matches(leaf, known, n=1)
+    if close:
+        return f"unknown key '{key}'; did you mean 'fault.{close[0]}'?"
+    has = f"it has {', '.join(known)}" if known else "it has no keys"
+    return f"unknown key '{key}' for fault={selected['kind']}, {has}; fault offers: {', '.join(options('fault'))}"
+
+
+def _reset_derived(config: Mapping[str, Any], touched: set[str]) -> None:
+    """Derive mass and inertia anew where teeth, module or width are no longer those the source weighed."""
+    gear = config["gear"]
+    for side in SIDES:
+        changed = sorted(touched & {"gear.normal_module_mm", f"gear.{side}.n_teeth", f"gear.{side}.face_width_mm"})
+        lost = [
+            key
+            for key in ("mass_kg", "inertia_kg_m2")
+            if changed and f"gear.{side}.{key}" not in touched and gear[side][key] is not None
+        ]
+        for key in lost:
+            gear[side][key] = None
+        if lost:
+            warnings.warn(
+                f"{', '.join(changed)} changed: {' and '.join(lost)} of the {side} are derived from a solid disc now",
+                DerivedValueWarning,
+                stacklevel=3,
+            )

@@ -1,0 +1,1 @@
+"""Data sets on disk: schema, shards, manifest, splits, reading. Arrays and names, no physics."""

@@ -1,0 +1,86 @@
+"""Files that appear whole or not at all, and files of strangers read with a limit."""
+
+import hashlib
+import os
+import secrets
+from pathlib import Path
+
+from gensig.errors import DatasetError
+
+TEMPORARY_SUFFIX = ".tmp"
+
+
+def temporary_name(path: Path) -> Path:
+    """A name in the same folder that no other process uses: hidden, ending in `TEMPORARY_SUFFIX`."""
+    return path.with_name(f".{path.name}.{os.getpid()}-{secrets.token_hex(4)}{TEMPORARY_SUFFIX}")
+
+
+def sync_folder(folder: Path) -> None:
+    """Make the names in a folder survive a power cut."""
+    descriptor = os.open(folder, os.O_RDONLY)
+    try:
+        os.fsync(descriptor)
+    finally:
+        os.close(descriptor)
+
+
+def sync_file(path: Path) -> None:
+    """Make the bytes of a file survive a power cut."""
+    descriptor = os.open(path, os.O_RDWR)
+    try:
+        os.fsync(descriptor)
+    finally:
+        os.close(descriptor)
+
+
+def publish(temporary: Path, path: Path) -> None:
+    """Give a finished temporary file its name: fsync, rename, fsync of the folder."""
+    sync_file(temporary)
+    os.replace(temporary, path)
+    sync_folder(path.parent)
+
+
+def write_text(path: Path, text: str) -> None:
+    """Write or replace a UTF-8 file atomically; DatasetError when the disk refuses."""
+    write_bytes(path, text.encode("utf-8"))
+
+
+def write_bytes(path: Path, content: bytes) -> None:
+    """Write or replace a file atomically; DatasetError when the disk refuses, after which no part of it is left."""
+    temporary = temporary_name(path)
+    try:
+        temporary.write_bytes(content)
+        publish(temporary, path)
+    except OSError as error:
+        raise cannot_write(path, error) from error
+    finally:
+        temporary.unlink(missing_ok=True)
+
+
+def cannot_write(path: Path, error: Exception) -> DatasetError:
+    """The one line for a disk that is full or a folder that may not be written."""
+    reason = getattr(error, "strerror", None) or str(error).splitlines()[0]
+    return DatasetError(f"cannot write {path}: {reason}; free some space or choose another out=DIR")
+
+
+def read_text(path: Path, *, limit: int) -> str:
+    """A UTF-8 file of at most `limit` bytes; DatasetError when it is absent, no ordinary file, too long or not text."""
+    try:
+        if not path.is_file():
+            raise DatasetError(f"{path} is missing or no ordinary file; the folder is damaged or no gensig data set")
+        size = path.stat().st_size
+        if size > limit:
+            raise DatasetError(
+                f"{path} has {size} bytes, at most {limit} are allowed; it is no file of a gensig data set"
+            )
+        return path.read_bytes().decode("utf-8")
+    except UnicodeDecodeError as error:
+        raise DatasetError(f"{path} is not UTF-8 text (byte {error.start}); it is damaged, restore it") from error
+    except (OSError, ValueError) as error:
+        raise DatasetError(f"{path} cannot be read: {error}; check its permissions") from error
+
+
+def sha256_file(path: Path) -> str:
+    """Hexadecimal sha256 of a file's bytes."""
+    with path.open("rb") as file:
+        return hashlib.file_digest(file, "sha256").hexdigest()

@@ -1,0 +1,60 @@
+"""HDF5 attributes of fixed size: text, numbers and lists of them go in and come back the same."""
+
+from collections.abc import Sequence
+
+import h5py
+import numpy as np
+
+from gensig.errors import DatasetError
+
+ATTRIBUTE_BYTES_LIMIT = 60_000
+# What h5py raises on damaged files, seen by fuzzing.
+HDF5_ERRORS = (OSError, RuntimeError, KeyError, ValueError, TypeError, OverflowError, MemoryError)
+
+Attribute = str | int | float | Sequence[str] | Sequence[int] | Sequence[float]
+
+
+def set_attribute(target: h5py.HLObject, name: str, value: Attribute) -> None:
+    """Store text, a number or a list of one kind as an attribute of fixed size; DatasetError for anything else."""
+    if isinstance(value, str):
+        data: np.ndarray = _text_array([value], name).reshape(())
+    elif isinstance(value, Sequence) and value and all(isinstance(item, str) for item in value):
+        data = _text_array([str(item) for item in value], name)
+    else:
+        data = np.asarray(value)
+        if data.dtype.kind == "b":
+            data = data.astype(np.int8)
+        if data.dtype.kind not in "if":
+            raise DatasetError(f"attribute {name} is {value!r}; allowed are text, int, float and lists of one of them")
+    if data.nbytes > ATTRIBUTE_BYTES_LIMIT:
+        raise DatasetError(
+            f"attribute {name} has {data.nbytes} bytes, HDF5 allows about {ATTRIBUTE_BYTES_LIMIT}; "
+            "make it a column or a file beside the shards"
+        )
+    dtype = h5py.string_dtype("utf-8", data.dtype.itemsize) if data.dtype.kind == "S" else data.dtype
+    target.attrs.create(name, data, shape=data.shape, dtype=dtype)
+
+
+def _text_array(texts: list[str], name: str) -> np.ndarray:
+    if any("\0" in text for text in texts):
+        raise DatasetError(f"attribute {name} contains a NUL character; remove it")
+    encoded = [text.encode("utf-8") for text in texts]
+    return np.array(encoded, dtype=f"S{max(1, max(map(len, encoded)))}")
+
+
+def read_attributes(target: h5py.HLObject) -> dict:
+    """Attributes as text, int, float or lists of them; those of any other type are left out."""
+    found: dict = {}
+    for name in target.attrs:
+        # A damaged name comes as bytes.
+        if not isinstance(name, str) or target.attrs.get_id(name).dtype.kind not in "Siuf":
+            continue
+        kind = target.attrs.get_id(name).dtype.kind
+        value = np.asarray(target.attrs[name])
+        found[name] = (decoded(value) if kind == "S" or value.dtype.kind == "O" else value).tolist()
+    return found
+
+
+def decoded(values: np.ndarray) -> np.ndarray:
+    """Bytes of fixed length as text; bytes that are no UTF-8 are shown as replacement characters."""
+    return np.char.decode(np.asarray(values, dtype="S"), "utf-8", "replace")

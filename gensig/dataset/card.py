@@ -1,0 +1,129 @@
+"""The data card: README.md of a data-set folder, facts read from the files beside caveats that always hold."""
+
+import html
+import re
+from pathlib import Path
+
+import numpy as np
+
+from gensig.dataset.atomic import write_text
+from gensig.dataset.layout import CARD
+from gensig.dataset.reader import Dataset, open_dataset
+
+GEOMETRY = (
+    "n_teeth_pinion", "n_teeth_wheel", "normal_module_mm", "pressure_angle_deg", "helix_angle_deg", "usable_band_hz",
+)  # fmt: skip
+
+LOAD = """```python
+import gensig
+
+with gensig.open_dataset("PATH/TO/THIS/FOLDER") as data:
+    labels = data.column("label")                    # (record,) index into data.class_names
+    signal = data.signals(0)                         # (channel, sample) float32, m/s^2
+    parts = data.split("by_unit" if "by_unit" in data.protocols else data.protocols[0])
+```
+Without gensig: every shard is plain HDF5, see `docs/format.md` of gensig.
+"""
+
+LICENCE = """Data licence: CC BY 4.0 (https://creativecommons.org/licenses/by/4.0/): free to use, name the source.
+"""
+
+CAVEATS = """- The records are simulated. A model trained on them alone has proved nothing about measured signals.
+- `random_window_leaky` puts windows of one record on every side on purpose. Never report it
+  without a clean split beside it.
+- The speed and the signal power of a record are results: a fault may change them. Report results with and
+  without RMS normalization.
+- Columns of role label, fault or result (`docs/format.md`) and fault parameters in `params/` must not be
+  inputs of a classifier.
+- Records with status 'failed' are kept with their parameters; leave them out with `data.usable`.
+- Only the band given as usable is meant to be used; above it the anti-alias filter acts.
+"""
+
+
+def write_card(out: Path) -> None:
+    """Write `README.md` of a data-set folder whose shards are all done."""
+    with open_dataset(out, allow_incomplete=True) as data:
+        write_text(out / CARD, card_text(data))
+
+
+def card_text(data: Dataset) -> str:
+    """The card as Markdown; every text that comes from a file is escaped."""
+    sections = [
+        f"# {escape(data.folder.resolve().name)}",
+        "Gear vibration, simulated and labelled by gensig " + escape(data.manifest.generator_version) + ".",
+        _table(("fact", "value"), _facts(data)),
+        "## Classes",
+        _table(("class", "records", "severity"), _classes(data)),
+        "## Splits",
+        _table(("protocol", *("train", "validation", "test")), _splits(data)),
+        "## Load it",
+        LOAD,
+        "## Caveats",
+        CAVEATS,
+        "## Licence",
+        LICENCE,
+    ]
+    return "\n\n".join(section.strip() for section in sections) + "\n"
+
+
+def escape(value: object) -> str:
+    """Text for one Markdown table cell: no HTML, no markup, no line breaks, nothing invisible."""
+    plain = "".join(c if c.isprintable() else " " for c in str(value))
+    return re.sub(r"([\\`*_\[\]|#~!])", r"\\\1", html.escape(plain, quote=False))
+
+
+def _table(header: tuple[str, ...], rows: list[tuple[object, ...]]) -> str:
+    lines = [" | ".join(header), " | ".join("---" for _ in header)]
+    lines += [" | ".join(escape(cell) for cell in row) for row in rows]
+    return "\n".join(f"| {line} |" for line in lines)
+
+
+def _facts(data: Dataset) -> list[tuple[object, ...]]:
+    units = data.attributes.get("channel_units", ["m/s^2"] * len(data.channel_names))
+    channels = ", ".join(f"{name} ({unit})" for name, unit in zip(data.channel_names, units, strict=False))
+    n_failed = int(np.count_nonzero(~data.usable))
+    rows: list[tuple[object, ...]] = [
+        ("records", f"{data.n_records}" + (f", of which {n_failed} failed" if n_failed else "")),
+        ("duration of a record", f"{data.n_samples / data.sampling_rate:g} s ({data.n_samples} samples)"),
+        ("sampling rate", f"{data.sampling_rate:g} Hz"),
+        ("channels", channels),
+    ]
+    rows += [(name, data.attributes[name]) for name in GEOMETRY if name in data.attributes]
+    rows += [
+        (name, len(np.unique(data.column(column))))
+        for name, column in (("units", "unit_id"), ("specimens", "specimen_id"), ("gearboxes", "gearbox_id"))
+    ]
+    rows += [
+        ("speed of the driving shaft", value_range(data.column("speed_rpm"), "r/min")),
+        ("torque of the driving shaft", value_range(data.column("torque_nm"), "N m")),
+    ]
+    if "snr_db" in data.column_names:
+        rows.append(("signal-to-noise ratio", value_range(data.column("snr_db"), "dB")))
+    rows += [("seed", data.manifest.seed), ("identity", data.manifest.identity)]
+    return rows
+
+
+def _classes(data: Dataset) -> list[tuple[object, ...]]:
+    names, severity = data.column("label_name"), data.column("severity")
+    order = [name for name in data.class_names if (names == name).any()]
+    order += sorted(set(names.tolist()) - set(order))
+    return [(name, int((names == name).sum()), value_range(severity[names == name], "")) for name in order]
+
+
+def _splits(data: Dataset) -> list[tuple[object, ...]]:
+    rows: list[tuple[object, ...]] = []
+    for protocol in data.protocols:
+        parts = data.split(protocol)
+        rows.append(
+            (protocol, *(f"{sum(stop - start for _, start, stop in part):g} records" for part in parts.values()))
+        )
+    return rows
+
+
+def value_range(values: np.ndarray, unit: str) -> str:
+    """'1200 to 1800 r/min', over the finite values."""
+    finite = values[np.isfinite(values)]
+    if not finite.size:
+        return "none"
+    low, high = f"{finite.min():.6g}", f"{finite.max():.6g}"
+    return (low if low == high else f"{low} to {high}") + (f" {unit}" if unit else "")

@@ -1,0 +1,221 @@
+"""The plan: one row a record with everything that was drawn, frozen before anything runs."""
+
+import csv
+import io
+import re
+from collections.abc import Mapping
+from dataclasses import dataclass
+from pathlib import Path
+from types import MappingProxyType
+
+import numpy as np
+
+from gensig.dataset.atomic import read_text, write_text
+from gensig.dataset.schema import COLUMNS, kind_of
+from gensig.errors import DatasetError
+
+PLAN_BYTES_LIMIT = 4 * 1024**3
+
+_INT = re.compile(r"[+-]?[0-9]{1,19}")
+_FLOAT = re.compile(r"[+-]?([0-9]+(\.[0-9]*)?([eE][+-]?[0-9]+)?|nan|inf)")
+_CONTROL = re.compile(r"[\x00-\x1f\x7f\ud800-\udfff]")
+_RECORD_ID = re.compile(r"[A-Za-z0-9][A-Za-z0-9_.\-]*")
+_DTYPES = {"int": np.int64, "float": np.float64}
+
+
+@dataclass(frozen=True, slots=True, kw_only=True, eq=False)
+class Plan:
+    """Immutable table of all records of a data set, in the order of shard and row.
+
+    Parameters
+    ----------
+    columns : name -> (record,) array of text, int64 or float64; `record_id`, `shard` and `row` are required
+
+    Raises
+    ------
+    DatasetError    for missing columns, unequal lengths, repeated ids, or shards and rows that do not count up from 0
+    """
+
+    columns: Mapping[str, np.ndarray]
+
+    def __post_init__(self) -> None:
+        columns = {name: _normalized(name, values) for name, values in self.columns.items()}
+        missing = [name for name in ("record_id", "shard", "row") if name not in columns]
+        if missing:
+            raise DatasetError(
+                f"the plan has no column {', '.join(missing)}; every plan needs record_id, shard and row"
+            )
+        lengths = {name: len(values) for name, values in columns.items()}
+        n = lengths["record_id"]
+        wrong = [f"{name} ({length})" for name, length in lengths.items() if length != n]
+        if n == 0 or wrong:
+            raise DatasetError(
+                f"the plan has {n} records, and columns of other lengths: {wrong}; all must be equal, not 0"
+            )
+        _check_ids(columns["record_id"])
+        _check_places(columns["shard"], columns["row"])
+        object.__setattr__(self, "columns", MappingProxyType(columns))
+
+    def __reduce__(self) -> tuple:
+        return _rebuild, (dict(self.columns),)
+
+    @property
+    def n_records(self) -> int:
+        """Number of records."""
+        return len(self.columns["record_id"])
+
+    @property
+    def n_shards(self) -> int:
+        """Number of shards."""
+        return int(self.columns["shard"][-1]) + 1
+
+    def shard_sizes(self) -> list[int]:
+        """Number of records of each shard."""
+        return np.bincount(self.columns["shard"]).tolist()
+
+    def rows(self, shard: int) -> np.ndarray:
+        """Indices of the records of one shard, in the order of their rows."""
+        if not 0 <= shard < self.n_shards:
+            raise DatasetError(f"shard {shard} does not exist; the plan has shards 0 to {self.n_shards - 1}")
+        return np.flatnonzero(self.columns["shard"] == shard)
+
+    def record(self, index: int) -> dict[str, str | int | float]:
+        """All values of one record as Python objects."""
+        return {name: values[index].item() for name, values in self.columns.items()}
+
+
+def _rebuild(columns: dict[str, np.ndarray]) -> Plan:
+    return Plan(columns=columns)
+
+
+def _normalized(name: str, values: np.ndarray) -> np.ndarray:
+    """A read-only copy as text, int64 or float64; DatasetError for anything else."""
+    array = np.asarray(values)
+    kind = {"U": "str", "T": "str", "i": "int", "u": "int", "b": "int", "f": "float"}.get(array.dtype.kind)
+    if array.dtype.kind == "O" and all(isinstance(value, str) for value in array.flat):
+        kind, array = "str", array.astype(str)
+    wanted = kind_of(name) or kind
+    if array.ndim != 1 or kind is None or (kind != wanted and (kind, wanted) != ("int", "float")):
+        raise DatasetError(
+            f"plan column {name} has type {array.dtype} and shape {array.shape}; "
+            f"allowed is one axis of {wanted or 'text, int or float'}"
+        )
+    if wanted == "str":
+        array = array.astype(str)
+        bad = next((value for value in array.tolist() if _CONTROL.search(value)), None)
+        if bad is not None:
+            raise DatasetError(f"plan column {name} holds the text {bad!r}; control characters are not allowed")
+    array = array.astype(_DTYPES.get(wanted or "", array.dtype))  # a copy: the caller's array stays writable
+    if wanted == "float":
+        array[np.isnan(array)] = np.nan  # one NaN only: others would not come back from text
+    array.flags.writeable = False
+    return array
+
+
+def _check_ids(ids: np.ndarray) -> None:
+    values = ids.tolist()
+    limit = COLUMNS["record_id"].n_bytes
+    bad = next((value for value in values if not _RECORD_ID.fullmatch(value) or len(value) > limit), None)
+    if bad is not None:
+        raise DatasetError(f"record_id {bad!r} is not allowed; use letters, digits, '_', '.', '-', at most {limit}")
+    if len(set(values)) != len(values):
+        unique, counts = np.unique(ids, return_counts=True)
+        raise DatasetError(
+            f"record_id {str(unique[counts > 1][0])!r} occurs more than once in the plan; ids must be unique"
+        )
+
+
+def _check_places(shard: np.ndarray, row: np.ndarray) -> None:
+    new_shard = np.concatenate([[True], np.diff(shard) != 0])
+    starts = np.flatnonzero(new_shard)
+    expected_shard = np.cumsum(new_shard) - 1
+    expected_row = np.arange(len(shard)) - starts[expected_shard]
+    wrong = np.flatnonzero((shard != expected_shard) | (row != expected_row))
+    if wrong.size:
+        i = int(wrong[0])
+        raise DatasetError(
+            f"plan record {i} is at shard {shard[i]} row {row[i]}, expected shard {expected_shard[i]} "
+            f"row {expected_row[i]}; shards and rows must count up from 0"
+        )
+
+
+def record_ids(n_records: int) -> np.ndarray:
+    """The ids 'r000000', 'r000001', ... (record,)."""
+    return np.array([f"r{i:06d}" for i in range(n_records)])
+
+
+def shard_places(n_records: int, records_per_shard: int) -> tuple[np.ndarray, np.ndarray]:
+    """Shard and row of each record, (record,) each, filling one shard after the other."""
+    if records_per_shard < 1 or n_records < 1:
+        raise DatasetError(f"{n_records} records in shards of {records_per_shard}: both must be at least 1")
+    index = np.arange(n_records)
+    return index // records_per_shard, index % records_per_shard
+
+
+def plan_text(plan: Plan) -> str:
+    """The plan as CSV: floats in shortest round-trip form, integers as integers, text as it is."""
+    cells = []
+    for name, values in plan.columns.items():
+        if _CONTROL.search(name) or not name:
+            raise DatasetError(f"plan column name {name!r} is not allowed; use printable text")
+        texts = [repr(value) if values.dtype.kind == "f" else str(value) for value in values.tolist()]
+        if values.dtype.kind == "U" and kind_of(name) is None and _infer(texts) != "str":
+            raise DatasetError(
+                f"plan column {name} is text, but all its values look like numbers, such as {texts[0]!r}; "
+                "they would not come back as text: put a letter in front"
+            )
+        cells.append(texts)
+    buffer = io.StringIO()
+    writer = csv.writer(buffer, lineterminator="\n")
+    writer.writerow(plan.columns)
+    writer.writerows(zip(*cells, strict=True))
+    return buffer.getvalue()
+
+
+def write_plan(path: Path, plan: Plan) -> None:
+    """Write `plan.csv` atomically; `read_plan` gives back the same bits."""
+    write_text(path, plan_text(plan))
+
+
+def read_plan(path: Path) -> Plan:
+    """Read `plan.csv`; DatasetError names the file and what is wrong with it."""
+    text = read_text(path, limit=PLAN_BYTES_LIMIT)
+    try:
+        header, *rows = csv.reader(io.StringIO(text, newline=""), strict=True)
+    except (csv.Error, ValueError) as error:
+        raise DatasetError(f"{path} is no CSV table ({error}); restore it from a copy") from error
+    if len(set(header)) != len(header):
+        raise DatasetError(f"{path} has two columns of the same name; restore it from a copy")
+    wrong = next((i for i, cells in enumerate(rows) if len(cells) != len(header)), None)
+    if wrong is not None:
+        raise DatasetError(
+            f"{path} record {wrong} has {len(rows[wrong])} values, the header {len(header)}; "
+            "the file is cut or damaged, restore it from a copy"
+        )
+    columns = list(zip(*rows, strict=True)) or [() for _ in header]
+    try:
+        return Plan(columns={name: _parsed(name, cells) for name, cells in zip(header, columns, strict=True)})
+    except DatasetError as error:
+        raise DatasetError(f"{path}: {error}") from error
+
+
+def _infer(cells: tuple[str, ...] | list[str]) -> str:
+    if all(_INT.fullmatch(cell) for cell in cells):
+        return "int"
+    return "float" if all(_FLOAT.fullmatch(cell) for cell in cells) else "str"
+
+
+def _parsed(name: str, cells: tuple[str, ...]) -> np.ndarray:
+    kind = kind_of(name) or _infer(cells)
+    if kind == "str":
+        return np.array(cells, dtype=str)
+    pattern = _INT if kind == "int" else _FLOAT
+    bad = next((cell for cell in cells if not pattern.fullmatch(cell)), None)
+    if bad is not None:
+        raise DatasetError(f"column {name} holds {bad!r}, which is no {kind}")
+    if kind == "float":
+        return np.array([float(cell) for cell in cells])
+    try:
+        return np.array([int(cell) for cell in cells], dtype=np.int64)
+    except OverflowError as error:
+        raise DatasetError(f"column {name} holds an integer beyond 64 bits") from error

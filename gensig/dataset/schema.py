@@ -1,0 +1,165 @@
+"""The columns of a data set, version 1: names, types, units, meaning. `docs/format.md` is written from these tables."""
+
+from dataclasses import dataclass
+
+import h5py
+import numpy as np
+
+from gensig.errors import DatasetError
+
+SCHEMA_VERSION = 1
+
+ROLES = ("id", "label", "fault", "unit", "condition", "result", "noise")
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class Column:
+    """One HDF5 data set of a shard, with one row a record.
+
+    Parameters
+    ----------
+    name : str           name of the HDF5 data set
+    dtype : str          numpy type, or 'str<n>' for UTF-8 text of at most n bytes
+    unit : str           unit of the values; '' for text, '1' for pure numbers
+    role : str           one of `ROLES`: what a learner may do with it
+    description : str    the meaning, one sentence
+    axes : tuple         names of the axes after the record axis; () for one value a record
+    """
+
+    name: str
+    dtype: str
+    unit: str
+    role: str
+    description: str
+    axes: tuple[str, ...] = ()
+
+    def __post_init__(self) -> None:
+        if self.role not in ROLES:
+            raise DatasetError(f"column {self.name}: role '{self.role}' is unknown; allowed are {', '.join(ROLES)}")
+
+    @property
+    def is_text(self) -> bool:
+        """True for UTF-8 text."""
+        return self.dtype.startswith("str")
+
+    @property
+    def n_bytes(self) -> int:
+        """Bytes of one value in the file."""
+        return int(self.dtype[3:]) if self.is_text else np.dtype(self.dtype).itemsize
+
+    @property
+    def storage_dtype(self) -> np.dtype:
+        """Type of the HDF5 data set."""
+        return h5py.string_dtype("utf-8", self.n_bytes) if self.is_text else np.dtype(self.dtype).newbyteorder("<")
+
+    @property
+    def is_bulk(self) -> bool:
+        """True for time signals, which are chunked by record and never read as a column."""
+        return "sample" in self.axes
+
+
+def _table(*rows: tuple[str, str, str, str, str]) -> dict[str, Column]:
+    return {n: Column(name=n, dtype=d, unit=u, role=r, description=text) for n, d, u, r, text in rows}
+
+
+COLUMNS: dict[str, Column] = _table(
+    ("record_id", "str32", "", "id", "name of the record, unique in the data set"),
+    ("label", "int16", "1", "label", "class number, index into the attribute class_names"),
+    ("label_name", "str64", "", "label", "class name"),
+    ("faults_json", "str1024", "", "fault", "JSON list, one object a fault: kind, gear, tooth, sizes in millimetres"),
+    ("severity", "float64", "1", "fault", "0 healthy to 1: relative size of the fault, the largest when compound"),
+    ("fault_gear", "str16", "", "fault", "gear that carries the (first) fault; empty when healthy"),
+    ("fault_tooth", "int32", "1", "fault", "tooth that carries the (first) fault, counted from 0; -1 when healthy"),
+    ("start_tooth_pinion", "int32", "1", "condition", "pinion tooth in mesh at the first sample"),
+    ("start_tooth_wheel", "int32", "1", "condition", "wheel tooth in mesh at the first sample"),
+    ("start_phase", "float64", "1", "condition", "mesh phase at the first sample, as a fraction of a base pitch"),
+    ("speed_rpm", "float64", "r/min", "result", "actual mean speed of the driving shaft"),
+    ("speed_set_rpm", "float64", "r/min", "condition", "speed set-point of the driving shaft"),
+    ("torque_nm", "float64", "N m", "condition", "torque set-point of the driving shaft"),
+    (
+        "mesh_frequency_hz",
+        "float64",
+        "Hz",
+        "result",
+        "mean tooth-mesh frequency of the faulted mesh, the first when healthy",
+    ),
+    ("snr_db", "float64", "dB", "noise", "signal-to-noise ratio asked for; NaN without noise"),
+    ("gearbox_id", "str64", "", "unit", "housing, transfer path and bearings"),
+    ("specimen_id", "str64", "", "unit", "set of gears with its manufacturing errors"),
+    ("unit_id", "str64", "", "unit", "one specimen in one gearbox"),
+    ("condition_id", "str64", "", "condition", "speed and torque set-point"),
+    ("status", "str16", "", "result", "'ok' or 'failed'; a failed record keeps its parameters, its signals may be NaN"),
+    ("status_reason", "str256", "", "result", "why the record failed, cut to 256 bytes; empty when ok"),
+    ("integration_error", "float64", "1", "result", "relative error of the time integration; NaN where not measured"),
+    (
+        "contact_loss_fraction",
+        "float64",
+        "1",
+        "result",
+        "share of the time without tooth contact; NaN where not measured",
+    ),
+)
+
+SIGNALS: dict[str, Column] = {
+    column.name: column
+    for column in (
+        Column(name="acceleration", dtype="float32", unit="m/s^2", role="result", axes=("channel", "sample"),
+               description="what the sensors report, noise included"),
+        Column(name="acceleration_clean", dtype="float32", unit="m/s^2", role="result", axes=("channel", "sample"),
+               description="the same without noise (optional)"),
+        Column(name="tacho", dtype="float32", unit="1", role="result", axes=("sample",),
+               description="once-per-revolution pulse of the driving shaft (optional)"),
+        Column(name="shaft_angle", dtype="float64", unit="rad", role="result", axes=("sample",),
+               description="angle of the driving shaft (optional)"),
+        Column(name="fault_multihot", dtype="int8", unit="1", role="label", axes=("class",),
+               description="1 for every class present, in the order of the attribute class_names (optional)"),
+        Column(name="signal_power", dtype="float64", unit="(m/s^2)^2", role="result", axes=("channel",),
+               description="mean square of the signal without noise (optional)"),
+        Column(name="noise_power", dtype="float64", unit="(m/s^2)^2", role="noise", axes=("channel",),
+               description="mean square of the noise (optional)"),
+    )
+}  # fmt: skip
+
+# What a reader of version 1 may rely on; this list never grows, so that adding a column is no new version.
+REQUIRED = (
+    "acceleration", "record_id", "label", "label_name", "severity", "gearbox_id", "specimen_id", "unit_id",
+    "condition_id", "speed_rpm", "torque_nm", "status",
+)  # fmt: skip
+REQUIRED_ATTRIBUTES = ("schema_version", "sampling_rate_hz", "channel_names", "class_names")
+
+# A column left out of `ShardWriter.write` gets its value here; any other must be given.
+DEFAULTS: dict[str, str | float] = {
+    "status": "ok",
+    "status_reason": "",
+    "integration_error": float("nan"),
+    "contact_loss_fraction": float("nan"),
+}
+
+PARAMS = "params"
+
+
+def kind_of(name: str) -> str | None:
+    """The kind of values a named column holds: 'str', 'int', 'float', or None for a name the schema does not know."""
+    if name.startswith(f"{PARAMS}/"):
+        return "float"
+    column = COLUMNS.get(name)
+    if column is None:
+        return "int" if name in ("shard", "row") else None
+    if column.is_text:
+        return "str"
+    return "int" if np.dtype(column.dtype).kind == "i" else "float"
+
+
+def column_table() -> str:
+    """The Markdown table of all data sets of a shard, as it stands in `docs/format.md`."""
+    lines = ["| name | shape | type | unit | role | meaning |", "|---|---|---|---|---|---|"]
+    for column in (*SIGNALS.values(), *COLUMNS.values()):
+        shape = ", ".join(("record", *column.axes))
+        kind = f"UTF-8, {column.n_bytes} bytes" if column.is_text else column.dtype
+        name = f"`{column.name}`" + (" *" if column.name in REQUIRED else "")
+        lines.append(f"| {name} | ({shape}) | {kind} | {column.unit} | {column.role} | {column.description} |")
+    lines.append(
+        f"| `{PARAMS}/<name>` | (record) | float64 | in the name | | a drawn or swept value; NaN where it does "
+        "not apply |"
+    )
+    return "\n".join(lines) + "\n"

@@ -1,0 +1,150 @@
+"""The plan: every input of every record, drawn and frozen before anything runs."""
+
+from __future__ import annotations
+
+import copy
+import json
+import math
+from collections.abc import Mapping
+from typing import Any
+
+import numpy as np
+
+from gensig.dataset.distributions import design_points, values_at
+from gensig.dataset.plan import Plan, record_ids, shard_places
+from gensig.errors import ConfigError
+from gensig.faults.base import faulty_teeth
+from gensig.faults.registry import read_fault
+from gensig.records import MISSING, Stream, read_seed, record_system, replace_key, stream, whole_number
+from gensig.systems.registry import read_system
+from gensig.systems.spur_pair import severity
+from gensig.units import from_si
+
+SHARD_BYTES = 65_536_000  # 80 records of 4 x 51,200 float32 samples
+
+
+def make_plan(config: Mapping[str, Any]) -> Plan:
+    """Draw every input of every record.
+
+    Records come in groups of one a class that share unit and condition, in random order within the group, so that
+    neither position nor any drawn value tells the class.
+
+    Raises
+    ------
+    ConfigError    for counts, keys or distributions that cannot be used
+    """
+    plan, seed = config["plan"], read_seed(config)
+    names = list(plan["classes"])
+    n_records = whole_number("plan.n_records", plan["n_records"], at_least=len(names))
+    n_units = whole_number("plan.n_units", plan["n_units"], at_least=1)
+    n_gearboxes = min(
+        n_units, whole_number("plan.n_gearboxes", plan["n_gearboxes"] or max(1, round(math.sqrt(n_units))), at_least=1)
+    )
+    n_groups = math.ceil(n_records / len(names))
+    for key in plan["vary"]:
+        replace_key(copy.deepcopy(dict(config)), key, 0.0)
+    conditions = _draw(config, plan["vary"], n_groups, stream(seed, Stream.CONDITION), "plan")
+    faults = {
+        name: _draw_faults(config, fault, n_groups, stream(seed, Stream.FAULT, index))
+        for index, (name, fault) in enumerate(config["classes"].items())
+    }
+    rows: list[dict[str, Any]] = []
+    for group in range(n_groups):
+        unit = group % n_units
+        gearbox, specimen = unit % n_gearboxes, unit // n_gearboxes
+        for place in stream(seed, Stream.ORDER, group).permutation(len(names)):
+            if len(rows) == n_records:
+                break
+            name = names[place]
+            values = {key: drawn[group] for key, drawn in conditions.items()}
+            rows.append(
+                {
+                    "label": int(place),
+                    "label_name": name,
+                    "unit_id": f"unit-{unit:04d}",
+                    "gearbox_id": f"gearbox-{gearbox:04d}",
+                    "specimen_id": f"specimen-{specimen:04d}",
+                    "condition_id": f"condition-{group:06d}",
+                    **_row(config, seed, len(rows), faults[name][group], values),
+                }
+            )
+    return _as_plan(config, rows)
+
+
+def _row(
+    config: Mapping[str, Any], seed: int, index: int, fault: dict[str, Any], values: dict[str, float]
+) -> dict[str, Any]:
+    """Columns of one record that follow from its drawn values; building its machine checks them all."""
+    system = record_system(config, values)
+    system.pair.require_continuous_drive()
+    applied = read_fault(fault)
+    applied_list = [] if applied is None else [applied]
+    faulty_teeth(system.pair, applied_list)
+    rng = stream(seed, Stream.START, index)
+    sizes = {key: value for key, value in fault.items() if isinstance(value, int | float) and key != "tooth"}
+    return {
+        "faults_json": json.dumps([] if applied is None else [fault], separators=(",", ":")),
+        "severity": 0.0 if config["plan"]["sham"] else severity(applied_list, system.pair),
+        "fault_gear": "" if applied is None else applied.gear,
+        "fault_tooth": -1 if applied is None else applied.tooth,
+        "start_tooth_pinion": int(rng.integers(system.pair.pinion.n_teeth)),
+        "start_tooth_wheel": int(rng.integers(system.pair.wheel.n_teeth)),
+        "start_phase": float(rng.random()),
+        "speed_set_rpm": from_si("speed_rpm", system.operating.speed),
+        "torque_nm": system.operating.torque,
+        "snr_db": MISSING if system.sensing.snr is None else system.sensing.snr,
+        **{f"params/{key}": float(value) for key, value in values.items()},
+        **{f"params/fault.{key}": float(value) for key, value in sizes.items()},
+    }
+
+
+def _as_plan(config: Mapping[str, Any], rows: list[dict[str, Any]]) -> Plan:
+    """Rows to columns; a parameter that a record has not is NaN."""
+    names: dict[str, None] = {}
+    for row in rows:
+        names.update(dict.fromkeys(row))
+    shard, place = shard_places(len(rows), records_per_shard(config))
+    columns: dict[str, Any] = {"record_id": record_ids(len(rows)), "shard": shard, "row": place}
+    for name in names:
+        columns[name] = np.array([row.get(name, MISSING) for row in rows])
+    return Plan(columns=columns)
+
+
+def records_per_shard(config: Mapping[str, Any]) -> int:
+    """As configured, else about 64 MB of samples."""
+    given = config["dataset"]["records_per_shard"]
+    if given is not None:
+        return whole_number("dataset.records_per_shard", given, at_least=1)
+    return max(1, SHARD_BYTES // record_bytes(config))
+
+
+def record_bytes(config: Mapping[str, Any]) -> int:
+    """Bytes of one record's samples."""
+    system = read_system(config)
+    n_samples = round(system.operating.duration * system.sensing.sampling_rate)
+    n_copies = 2 if config["dataset"]["store_clean"] else 1
+    return max(1, 4 * n_copies * len(system.sensing.channels) * n_samples)
+
+
+def _draw(
+    config: Mapping[str, Any], vary: Mapping[str, Any], n: int, rng: np.random.Generator, where: str
+) -> dict[str, list[Any]]:
+    """Values of every varied key, (n,) each, from one space-filling design."""
+    points = design_points(config["plan"]["design"], n, len(vary), rng)
+    return {key: values_at(f"{where}: {key}", spec, points[:, k]) for k, (key, spec) in enumerate(vary.items())}
+
+
+def _draw_faults(
+    config: Mapping[str, Any], fault: Mapping[str, Any], n: int, rng: np.random.Generator
+) -> list[dict[str, Any]]:
+    """One complete fault a group, its severity distribution drawn."""
+    plain = {key: value for key, value in fault.items() if key != "vary"}
+    vary = {}
+    for key, spec in (fault.get("vary") or {}).items():
+        if key not in plain:
+            raise ConfigError(f"fault.vary: '{key}' is no key of fault={plain['kind']}")
+        any_tooth = isinstance(spec, Mapping) and spec.get("distribution") == "tooth"
+        last = config["gear"][plain["gear"]]["n_teeth"] - 1 if any_tooth else 0
+        vary[key] = {"distribution": "integers", "low": 0, "high": last} if any_tooth else spec
+    drawn = _draw(config, vary, n, rng, "fault")
+    return [{**plain, **{key: values[group] for key, values in drawn.items()}} for group in range(n)]

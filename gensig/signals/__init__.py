@@ -1,0 +1,1 @@
+"""Signal processing on plain arrays: indicators, synchronous averages, spectra. No physics, no files."""

@@ -1,0 +1,139 @@
+"""Synchronous averaging at constant speed: the angle domain, the average turn, and what is left without the mesh.
+
+Time-synchronous averaging: S. Braun (1975), Acustica 32, 69-77; P. D. McFadden (1989), "Interpolation techniques for
+time domain averaging of gear vibration", Mechanical Systems and Signal Processing 3 (1), 87-97.
+"""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Iterable
+
+import numpy as np
+from numpy.typing import ArrayLike, NDArray
+
+FloatArray = NDArray[np.floating]
+
+
+def samples_per_turn_for(sampling_rate: float, rotation_frequency: float) -> int:
+    """Smallest even number of samples a turn that loses no bandwidth.
+
+    Parameters
+    ----------
+    sampling_rate : Hz
+    rotation_frequency : Hz    turns of the shaft per second
+    """
+    return 2 * math.ceil(sampling_rate / rotation_frequency / 2)
+
+
+def resample_to_angle(
+    signal: ArrayLike, sampling_rate: float, rotation_frequency: float, samples_per_turn: int | None = None
+) -> FloatArray:
+    """Cut a signal into whole turns, sampled uniformly in shaft angle.
+
+    The shaft turns at constant speed, known by its mean; the first turn starts at the first sample, the remainder of
+    a turn at the end is dropped.
+
+    Parameters
+    ----------
+    signal : (..., sample)
+    sampling_rate : Hz
+    rotation_frequency : Hz    turns of the shaft per second
+    samples_per_turn : int     default: `samples_per_turn_for`; fewer alias what lies above half of them per turn
+
+    Returns
+    -------
+    (..., turn, sample)
+
+    Raises
+    ------
+    ValueError    if the signal holds no whole turn
+
+    Notes
+    -----
+    Cubic B-spline interpolation: M. Unser (1999), "Splines: a perfect fit for signal and image processing", IEEE
+    Signal Processing Magazine 16 (6), 22-38. Largest error for a sine: 0.1 % of its amplitude at an eighth of the
+    sampling rate, 0.4 % at a sixth, 2.5 % at a quarter.
+    """
+    from scipy.ndimage import spline_filter1d
+
+    x = np.asarray(signal, dtype=float)
+    n_samples = x.shape[-1]
+    samples_in_a_turn = sampling_rate / rotation_frequency
+    n_turns = math.floor((n_samples + 1e-6) / samples_in_a_turn)
+    if n_turns < 1:
+        raise ValueError(f"{n_samples} samples hold no whole turn of {samples_in_a_turn:.1f} samples")
+    per_turn = samples_per_turn or samples_per_turn_for(sampling_rate, rotation_frequency)
+    position = np.arange(n_turns * per_turn) * (samples_in_a_turn / per_turn)
+    index = np.minimum(position.astype(np.intp), n_samples - 1)
+    u = position - index
+    coefficients = spline_filter1d(x, order=3, axis=-1, mode="mirror")
+    padded = np.concatenate(
+        [coefficients[..., 1:2], coefficients, coefficients[..., -2:-1], coefficients[..., -3:-2]], axis=-1
+    )
+    weights = ((1 - u) ** 3 / 6, (3 * u**3 - 6 * u**2 + 4) / 6, (-3 * u**3 + 3 * u**2 + 3 * u + 1) / 6, u**3 / 6)
+    angle_signal = weights[0] * padded.take(index, axis=-1)
+    for offset in (1, 2, 3):
+        angle_signal += weights[offset] * padded.take(index + offset, axis=-1)
+    return angle_signal.reshape(*x.shape[:-1], n_turns, per_turn)
+
+
+def time_synchronous_average(
+    signal: ArrayLike, sampling_rate: float, rotation_frequency: float, samples_per_turn: int | None = None
+) -> FloatArray:
+    """Mean turn of a shaft: what repeats every turn stays, the rest falls with the square root of the turns.
+
+    Parameters and errors as `resample_to_angle`.
+
+    Returns
+    -------
+    (..., sample)    one turn; order k of the shaft is bin k of its discrete Fourier transform
+    """
+    return resample_to_angle(signal, sampling_rate, rotation_frequency, samples_per_turn).mean(axis=-2)
+
+
+def remove_orders(average: ArrayLike, orders: Iterable[int]) -> FloatArray:
+    """Average turn without the given shaft orders.
+
+    Parameters
+    ----------
+    average : (..., sample)    one turn
+    orders : whole multiples of the rotation frequency; those above half the samples of a turn are ignored
+    """
+    turn = np.asarray(average, dtype=float)
+    spectrum = np.fft.rfft(turn, axis=-1)
+    removed = [order for order in orders if 0 <= order < spectrum.shape[-1]]
+    spectrum[..., removed] = 0
+    return np.fft.irfft(spectrum, n=turn.shape[-1], axis=-1)
+
+
+def residual_signal(average: ArrayLike, n_teeth: int, *, n_shaft_orders: int = 2) -> FloatArray:
+    """Average turn without the mean, the lowest shaft orders and every mesh harmonic.
+
+    Parameters
+    ----------
+    average : (..., sample)    one turn of the gear
+    n_teeth : teeth of the gear
+    n_shaft_orders : shaft orders removed from 1 up: imbalance and misalignment
+
+    Source: residual signal of Zakrajsek, Townsend & Decker (1993), NASA TM-105950, sidebands kept.
+    """
+    return remove_orders(average, _regular_orders(average, n_teeth, n_shaft_orders, n_sidebands=0))
+
+
+def difference_signal(average: ArrayLike, n_teeth: int, *, n_shaft_orders: int = 2) -> FloatArray:
+    """Residual signal without the first sideband on either side of every mesh harmonic too.
+
+    Parameters as `residual_signal`.
+
+    Source: difference signal of Zakrajsek, Townsend & Decker (1993), NASA TM-105950, after R. M. Stewart (1977).
+    """
+    return remove_orders(average, _regular_orders(average, n_teeth, n_shaft_orders, n_sidebands=1))
+
+
+def _regular_orders(average: ArrayLike, n_teeth: int, n_shaft_orders: int, n_sidebands: int) -> list[int]:
+    """Orders of a healthy gear up to half the samples of a turn."""
+    top = np.shape(average)[-1] // 2
+    mesh = range(n_teeth, top + n_sidebands + 1, n_teeth)
+    sidebands = [order + k for order in mesh for k in range(-n_sidebands, n_sidebands + 1)]
+    return sorted({*range(n_shaft_orders + 1), *sidebands})

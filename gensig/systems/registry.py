@@ -1,0 +1,92 @@
+"""Systems by the name that configurations use, each built from one resolved configuration."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Mapping
+from typing import Any
+
+from gensig.dynamics.integrator import Solver
+from gensig.dynamics.pair import Body, Support, solid_disc
+from gensig.errors import ConfigError
+from gensig.geometry.contact import GearPair
+from gensig.geometry.gear import Gear
+from gensig.material import Material
+from gensig.mesh.options import MeshOptions
+from gensig.operating import Operating
+from gensig.sensing.chain import Sensing
+from gensig.sensing.manufacturing import Quality
+from gensig.systems.spur_pair import SpurPair
+from gensig.units import read, to_si
+
+SIDES = ("pinion", "wheel")
+COMMON_GEAR_KEYS = (
+    "normal_module_mm",
+    "pressure_angle_deg",
+    "addendum_coefficient",
+    "clearance_coefficient",
+    "cutter_tip_radius_coefficient",
+)
+BODY_KEYS = ("mass_kg", "inertia_kg_m2", "support")
+
+
+def read_spur_pair(config: Mapping[str, Any]) -> SpurPair:
+    """Build a spur pair from the boundary keys of a configuration."""
+    gear = config["gear"]
+    if gear.get("helix_angle_deg"):
+        raise ConfigError(
+            f"gear.helix_angle_deg = {gear['helix_angle_deg']:g}: system=spur_pair takes spur gears only, 0"
+        )
+    material = read(Material, config["material"], "material")
+    gears = {name: _read_gear(name, gear) for name in SIDES}
+    return SpurPair(
+        pair=GearPair(**gears, backlash=_number("gear.backlash_um", gear["backlash_um"])),
+        material=material,
+        mesh=read(MeshOptions, config["mesh"], "mesh"),
+        pinion=_read_body(gears["pinion"], gear["pinion"], material),
+        wheel=_read_body(gears["wheel"], gear["wheel"], material),
+        operating=read(Operating, config["operating"], "operating"),
+        sensing=read(Sensing, config["sensing"], "sensing"),
+        quality=read(Quality, config["quality"], "quality"),
+        solver=read(Solver, config["solver"], "solver"),
+    )
+
+
+SYSTEMS: dict[str, Callable[[Mapping[str, Any]], SpurPair]] = {"spur_pair": read_spur_pair}
+
+
+def read_system(config: Mapping[str, Any]) -> SpurPair:
+    """Build the system that ``system.kind`` names.
+
+    Raises
+    ------
+    ConfigError, GeometryError    for keys or values that make no machine
+    """
+    kind = config["system"].get("kind")
+    if kind not in SYSTEMS:
+        raise ConfigError(f"system.kind = {kind!r}; allowed: {', '.join(SYSTEMS)}")
+    return SYSTEMS[kind](config)
+
+
+def _read_gear(name: str, gear: Mapping[str, Any]) -> Gear:
+    own = {key: value for key, value in gear[name].items() if key not in BODY_KEYS}
+    return read(Gear, {**{key: gear[key] for key in COMMON_GEAR_KEYS}, **own}, f"gear.{name}", name=name)
+
+
+def _read_body(gear: Gear, values: Mapping[str, Any], material: Material) -> Body:
+    """Mass and inertia as given, or those of a solid disc on the pitch circle less the bore where null."""
+    derived = solid_disc(gear.pitch_radius, gear.bore_radius, gear.face_width, material.density_kg_per_m3)
+    given = [values["mass_kg"], values["inertia_kg_m2"]]
+    mass, inertia = (
+        fallback if value is None else _number(f"gear.{gear.name}.{key}", value)
+        for value, fallback, key in zip(given, derived, ("mass_kg", "inertia_kg_m2"), strict=True)
+    )
+    for key, value in (("mass_kg", mass), ("inertia_kg_m2", inertia)):
+        if not value > 0.0:
+            raise ConfigError(f"gear.{gear.name}.{key} = {value:g} must be positive, or null to derive it")
+    return Body(mass=mass, inertia=inertia, support=read(Support, values["support"], f"gear.{gear.name}.support"))
+
+
+def _number(key: str, value: Any) -> float:
+    if isinstance(value, bool) or not isinstance(value, int | float):
+        raise ConfigError(f"{key} = {value!r} is not a number")
+    return to_si(key, float(value))

@@ -1,0 +1,1 @@
+"""Printed and reference figures as data."""

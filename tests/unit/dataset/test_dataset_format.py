@@ -1,0 +1,53 @@
+"""docs/format.md is the contract: it says what the code does."""
+
+import re
+from pathlib import Path
+
+import h5py
+import numpy as np
+import pytest
+
+from gensig.dataset.layout import read_manifest
+from gensig.dataset.reader import open_dataset
+from gensig.dataset.schema import COLUMNS, REQUIRED, REQUIRED_ATTRIBUTES, SCHEMA_VERSION, SIGNALS, Column, column_table
+from gensig.errors import DatasetError
+
+TEXT = (Path(__file__).parents[3] / "docs" / "format.md").read_text(encoding="utf-8")
+
+
+def test_columns_are_in_step() -> None:
+    table = re.search(r"<!-- columns:.*?-->\n(.*?)<!-- end of columns -->", TEXT, re.DOTALL)
+    assert table is not None
+    assert table.group(1) == column_table()  # to renew: paste the output of column_table()
+    assert f"version {SCHEMA_VERSION}\n" in TEXT.splitlines(keepends=True)[0]
+
+
+def test_attributes_keys_and_protocols_are_named(folder: Path) -> None:
+    with open_dataset(folder) as data:
+        assert all(f"`{name}`" in TEXT for name in (*REQUIRED_ATTRIBUTES, *data.attributes, *data.protocols))
+    assert all(f"`{name}`" in TEXT for name in read_manifest(folder).__slots__)
+
+
+def test_shards_are_as_described(folder: Path) -> None:
+    with h5py.File(folder / "shards" / "shard-00000.h5") as file:
+        for name, column in COLUMNS.items():
+            assert file[name].dtype == column.storage_dtype
+        for name in REQUIRED:
+            assert file[name].shape[0] == 10
+        assert h5py.check_string_dtype(file["record_id"].dtype).encoding == "utf-8"
+
+
+@pytest.mark.parametrize("library", ["h5py", "gensig"])
+def test_python_examples_run(folder: Path, library: str, monkeypatch: pytest.MonkeyPatch) -> None:
+    examples = re.findall(r"```python\n(.*?)```", TEXT, re.DOTALL)
+    (code,) = [example for example in examples if f"import {library}\n" in example]
+    code = code.replace("DIR", str(folder)).replace("gensig.open_dataset", "open_dataset")
+    names = {"open_dataset": open_dataset}
+    exec(code, names)
+    assert np.asarray(names["signal"]).shape == ((2, 200) if library == "h5py" else (1, 200))
+
+
+def test_role_must_be_known() -> None:
+    assert {column.role for column in (*COLUMNS.values(), *SIGNALS.values())} >= {"id", "label", "fault", "unit"}
+    with pytest.raises(DatasetError, match="allowed are"):
+        Column(name="x", dtype="int8", unit="", role="secret", description="")

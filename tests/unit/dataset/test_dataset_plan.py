@@ -1,0 +1,132 @@
+"""The plan: what is written comes back bit by bit; what is malformed is refused in one line."""
+
+import pickle
+import tempfile
+from pathlib import Path
+
+import numpy as np
+import pytest
+from dataset_samples import make_plan
+from hypothesis import given, settings
+from hypothesis import strategies as st
+
+from gensig.dataset.plan import Plan, plan_text, read_plan, record_ids, shard_places, write_plan
+from gensig.errors import DatasetError
+
+
+def _plan(**columns) -> Plan:
+    n = len(next(iter(columns.values())))
+    shard, row = shard_places(n, 3)
+    return Plan(columns={"record_id": record_ids(n), "shard": shard, "row": row, **columns})
+
+
+def _same(a: Plan, b: Plan) -> None:
+    assert list(a.columns) == list(b.columns)
+    for name, values in a.columns.items():
+        assert values.dtype.kind == b.columns[name].dtype.kind
+        np.testing.assert_array_equal(values, b.columns[name])
+        if values.dtype.kind == "f":
+            np.testing.assert_array_equal(np.signbit(values), np.signbit(b.columns[name]))
+
+
+@settings(max_examples=40, deadline=None)
+@given(
+    floats=st.lists(st.floats(), min_size=1, max_size=6),
+    integer=st.integers(-(2**63), 2**63 - 1),
+    text=st.text(st.characters(blacklist_categories=("Cc", "Cs")), max_size=8),
+)
+def test_round_trip_is_exact(floats: list[float], integer: int, text: str) -> None:
+    n = len(floats)
+    plan = _plan(depth_mm=np.array(floats), count=np.full(n, integer), unit_id=np.array([text] * n))
+    with tempfile.TemporaryDirectory() as folder:
+        write_plan(Path(folder) / "plan.csv", plan)
+        _same(plan, read_plan(Path(folder) / "plan.csv"))
+
+
+def test_round_trip_check_can_fail() -> None:
+    with pytest.raises(AssertionError):
+        _same(_plan(a=np.array([0.1])), _plan(a=np.array([np.nextafter(0.1, 1)])))
+
+
+def test_values_look_as_promised() -> None:
+    text = plan_text(_plan(a=np.array([0.1, 1.0]), b=np.array([3, -4]), c=np.array(["x", 'say "y", z'])))
+    assert text == 'record_id,shard,row,a,b,c\nr000000,0,0,0.1,3,x\nr000001,0,1,1.0,-4,"say ""y"", z"\n'
+
+
+def test_text_that_would_come_back_as_numbers_is_refused() -> None:
+    assert "7" in plan_text(_plan(unit_id=np.array(["7", "8"])))  # known to the schema as text
+    with pytest.raises(DatasetError, match="look like numbers"):
+        plan_text(_plan(house=np.array(["7", "8"])))
+
+
+def test_plan_is_immutable_and_pickles() -> None:
+    values = np.array([1.0, 2.0])
+    plan = _plan(a=values)
+    values[0] = 9.0  # the caller's array stays the caller's
+    assert plan.columns["a"][0] == pytest.approx(1.0)
+    with pytest.raises(ValueError, match="read-only"):
+        plan.columns["a"][0] = 3.0
+    with pytest.raises(TypeError):
+        plan.columns["b"] = values  # type: ignore[index]
+    _same(plan, pickle.loads(pickle.dumps(plan)))
+
+
+def test_rows_of_shards() -> None:
+    plan = make_plan()
+    assert plan.n_records == 36
+    assert plan.n_shards == 4
+    assert plan.shard_sizes() == [10, 10, 10, 6]
+    assert plan.rows(3).tolist() == [30, 31, 32, 33, 34, 35]
+    with pytest.raises(DatasetError, match="shards 0 to 3"):
+        plan.rows(4)
+
+
+@pytest.mark.parametrize(
+    "columns",
+    [
+        {"record_id": np.array(["a", "a"]), "shard": np.array([0, 0]), "row": np.array([0, 1])},
+        {"record_id": np.array(["a", "b"]), "shard": np.array([0, 2]), "row": np.array([0, 0])},
+        {"record_id": np.array(["a", "b"]), "shard": np.array([1, 0]), "row": np.array([0, 0])},
+        {"record_id": np.array(["a", "b"]), "shard": np.array([0, 0]), "row": np.array([1, 0])},
+        {"record_id": np.array(["a", "../b"]), "shard": np.array([0, 0]), "row": np.array([0, 1])},
+        {"record_id": np.array(["a"]), "shard": np.array([0, 0]), "row": np.array([0, 1])},
+        {"record_id": np.array([], dtype=str), "shard": np.array([], dtype=int), "row": np.array([], dtype=int)},
+        {"record_id": np.array(["a"]), "shard": np.array([0])},
+        {"record_id": np.array(["a"]), "shard": np.array([0]), "row": np.array([0]), "x": np.array([1j])},
+        {"record_id": np.array(["a"]), "shard": np.array([0]), "row": np.array([0]), "x": np.array(["a\nb"])},
+    ],
+)
+def test_impossible_plan_is_refused(columns: dict) -> None:
+    with pytest.raises(DatasetError):
+        Plan(columns=columns)
+
+
+@pytest.mark.parametrize(
+    ("old", "new"),
+    [
+        ("r000001,0,1", "r000001,0"),
+        ("r000001,0,1", "r000001,0,x"),
+        ("r000001,0,1", "r000000,0,1"),
+        ("r000001,0,1", "r000001,0,99999999999999999999"),
+        ("record_id,shard,row", "record_id,shard,shard"),
+        ("record_id,shard", "name,shard"),
+        ("r000001", '"r000001'),
+    ],
+)
+def test_malformed_file_is_refused_in_one_line(tmp_path: Path, old: str, new: str) -> None:
+    path = tmp_path / "plan.csv"
+    text = plan_text(_plan(a=np.array([0.5, 1.5])))
+    path.write_text(text)
+    read_plan(path)
+    path.write_text(text.replace(old, new))
+    with pytest.raises(DatasetError, match=r"plan\.csv") as caught:
+        read_plan(path)
+    assert "\n" not in str(caught.value)
+
+
+@pytest.mark.parametrize("content", [b"", b"\xff\xfe\x00", b"a\x00b\n"])
+def test_file_that_is_no_table_is_refused(tmp_path: Path, content: bytes) -> None:
+    path = tmp_path / "plan.csv"
+    path.write_bytes(content)
+    with pytest.raises(DatasetError, match=r"plan\.csv"):
+        read_plan(path)

@@ -1,0 +1,137 @@
+"""Reading: what was written, in plan order, from any process, and never from an unfinished set by mistake."""
+
+import multiprocessing
+import pickle
+from pathlib import Path
+
+import numpy as np
+import pytest
+from dataset_samples import CLASSES, build, row_of
+
+import gensig.dataset.reader as reader_module
+from gensig.dataset.layout import shard_path
+from gensig.dataset.plan import Plan
+from gensig.dataset.reader import Dataset, open_dataset
+from gensig.errors import DatasetError
+
+
+def test_facts(folder: Path) -> None:
+    with open_dataset(str(folder)) as data:
+        assert (data.n_records, len(data), data.n_samples) == (36, 36, 200)
+        assert data.sampling_rate == pytest.approx(1000.0)
+        assert data.channel_names == ["pinion_y", "wheel_ü"]
+        assert data.class_names == CLASSES
+        assert data.attributes["n_teeth_wheel"] == 84
+        assert data.protocols == ["by_unit", "cross_specimen", "random_window_leaky"]
+        assert {"label", "params/crack_depth_mm", "noise_power"} <= set(data.column_names)
+        assert "acceleration" not in data.column_names
+        assert data.usable.all()
+
+
+def test_columns_and_signals_come_in_plan_order(folder: Path, plan: Plan) -> None:
+    with open_dataset(folder) as data:
+        for name in ("record_id", "label", "label_name", "params/crack_depth_mm"):
+            np.testing.assert_array_equal(data.column(name), plan.columns[name])
+        assert data.column("noise_power").shape == (36, 2)
+        for index in (0, 9, 10, 35):
+            expected = row_of(plan, index)[0]["acceleration"]
+            np.testing.assert_array_equal(data.signals(index), expected)
+            np.testing.assert_array_equal(data.signals(index, 20, 70, ["wheel_ü"]), expected[1:, 20:70])
+            np.testing.assert_array_equal(data.signals(index, channels=[1, 0]), expected[::-1])
+        assert data.signals(3).dtype == np.float32
+
+
+def test_few_files_stay_open(folder: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setattr(reader_module, "MAX_OPEN_SHARDS", 2)
+    with open_dataset(folder) as data:
+        for index in (0, 10, 20, 30, 0):
+            data.signals(index)
+        assert len(data._files) == 2
+
+
+def test_split(folder: Path, plan: Plan) -> None:
+    with open_dataset(folder) as data:
+        split = data.split("by_unit")
+        assert list(split) == ["train", "validation", "test"]
+        assert sorted(i for part in split.values() for i, _, _ in part) == list(range(36))
+        units = [{data.column("unit_id")[i] for i, _, _ in part} for part in split.values()]
+        assert sum(map(len, units)) == len(set.union(*units)) == 6
+        assert all(part[0][1:] == (0.0, 1.0) for part in split.values())
+        assert sum(map(len, data.split("random_window_leaky").values())) == 8 * 36
+
+
+def test_mistakes_are_one_line(folder: Path) -> None:
+    with open_dataset(folder) as data:
+        for call in (
+            lambda: data.column("acceleration"),
+            lambda: data.split("../plan"),
+            lambda: data.signals(36),
+            lambda: data.signals(-1),
+            lambda: data.signals(0, 5, 5),
+            lambda: data.signals(0, 0, 201),
+            lambda: data.signals(0, channels=["z"]),
+            lambda: data.signals(0, channels=[2]),
+            lambda: data.signals(0, name="acceleration_clean"),
+            lambda: data.signals(0, name="label"),
+        ):
+            with pytest.raises(DatasetError) as caught:
+                call()
+            assert "\n" not in str(caught.value)
+
+
+def test_incomplete_set_is_refused_unless_asked_for(tmp_path: Path, plan: Plan) -> None:
+    folder = build(tmp_path / "a", plan, shards=range(1, 3), close=False, failed=12)
+    with pytest.raises(DatasetError, match="2 of 4 shards are done"):
+        open_dataset(folder)
+    with open_dataset(folder, allow_incomplete=True) as data:
+        assert data.usable.tolist() == [10 <= i < 30 and i != 12 for i in range(36)]
+        assert data.column("record_id")[0] == ""
+        assert np.isnan(data.column("torque_nm")[:10]).all()
+        assert data.column("label")[35] == -1
+        np.testing.assert_array_equal(data.signals(10), row_of(plan, 10)[0]["acceleration"])
+        with pytest.raises(DatasetError, match=r"shard-00000\.h5, which is not made yet"):
+            data.signals(0)
+    with pytest.raises(DatasetError, match="no finished shard"):
+        open_dataset(build(tmp_path / "b", plan, shards=range(0), close=False), allow_incomplete=True)
+
+
+def _first_sample(data: Dataset, index: int) -> float:
+    return float(data.signals(index)[0, 0])
+
+
+@pytest.mark.parametrize("method", ["fork", "spawn"])
+def test_several_processes_read_at_once(folder: Path, plan: Plan, method: str) -> None:
+    expected = [float(row_of(plan, i)[0]["acceleration"][0, 0]) for i in (0, 12, 24, 35)]
+    with open_dataset(folder) as data:
+        data.signals(0)
+        with multiprocessing.get_context(method).Pool(2) as pool:
+            assert pool.starmap(_first_sample, [(data, i) for i in (0, 12, 24, 35)]) == expected
+        assert _first_sample(data, 0) == expected[0]
+
+
+def test_pickle_drops_open_files(folder: Path) -> None:
+    with open_dataset(folder) as data:
+        data.signals(0)
+        data.column("label")
+        copy = pickle.loads(pickle.dumps(data))
+        assert copy._files == {}
+        np.testing.assert_array_equal(copy.signals(35), data.signals(35))
+        copy.close()
+
+
+def test_reading_changes_nothing_and_works_read_only(folder: Path) -> None:
+    before = {path: path.stat().st_mtime_ns for path in folder.rglob("*")}
+    for path in folder.rglob("*"):
+        path.chmod(0o555 if path.is_dir() else 0o444)
+    with open_dataset(folder) as data:
+        data.signals(5)
+        data.column("severity")
+    for path in folder.rglob("*"):
+        path.chmod(0o755 if path.is_dir() else 0o644)
+    assert {path: path.stat().st_mtime_ns for path in folder.rglob("*")} == before
+
+
+def test_damaged_shard_is_one_line(folder: Path) -> None:
+    shard_path(folder, 1).write_bytes(b"no hdf5")
+    with open_dataset(folder) as data, pytest.raises(DatasetError, match=r"shard-00001\.h5"):
+        data.signals(10)

@@ -1,0 +1,95 @@
+"""Splits: clean ones share no group, the leaky one leaks on purpose, and none lacks a class."""
+
+from pathlib import Path
+
+import numpy as np
+import pytest
+from dataset_samples import make_plan
+
+from gensig.dataset.plan import Plan
+from gensig.dataset.splits import SUBSETS, SplitTable, make_splits, read_split
+from gensig.errors import DatasetError
+
+
+def _sides(table: SplitTable, plan: Plan, column: str) -> list[set]:
+    """Values of a plan column in train, validation and test."""
+    value = dict(zip(plan.columns["record_id"].tolist(), plan.columns[column].tolist(), strict=True))
+    return [{value[r] for r in table.record_id[table.subset == subset].tolist()} for subset in SUBSETS]
+
+
+def _disjoint(sides: list[set]) -> bool:
+    return sum(map(len, sides)) == len(set.union(*sides))
+
+
+@pytest.mark.parametrize(("protocol", "column"), [("by_unit", "unit_id"), ("cross_specimen", "specimen_id")])
+def test_clean_protocols_share_no_group(protocol: str, column: str) -> None:
+    plan = make_plan(n_records=300, n_units=10)
+    table = make_splits(plan, 1)[protocol]
+    assert _disjoint(_sides(table, plan, column))
+    assert all(side == {0, 1, 2} for side in _sides(table, plan, "label"))
+    assert [len(side) for side in _sides(table, plan, column)] == [6, 2, 2]
+    assert table.record_id.tolist() == plan.columns["record_id"].tolist()
+
+
+def test_leaky_protocol_has_every_record_on_several_sides() -> None:
+    plan = make_plan()
+    table = make_splits(plan, 1)["random_window_leaky"]
+    assert not _disjoint(_sides(table, plan, "record_id"))
+    assert all(side == {0, 1, 2} for side in _sides(table, plan, "label"))
+    assert len(table.record_id) == 8 * plan.n_records
+    first = table.record_id == "r000000"
+    np.testing.assert_array_equal(table.start_fraction[first], np.arange(8) / 8)
+    np.testing.assert_array_equal(table.stop_fraction[first], np.arange(1, 9) / 8)
+    shares = [float(np.mean(table.subset == subset)) for subset in SUBSETS]
+    np.testing.assert_allclose(shares, [0.6, 0.2, 0.2], rtol=0, atol=0.06)
+    assert len({tuple(table.subset[table.record_id == r]) for r in plan.columns["record_id"]}) > 10  # scattered
+
+
+def test_protocol_that_lacks_a_class_or_groups_is_left_out() -> None:
+    assert set(make_splits(make_plan(n_units=3), 1)) == {"random_window_leaky", "by_unit"}
+    assert set(make_splits(make_plan(n_units=2), 1)) == {"random_window_leaky"}
+    plan = make_plan(n_units=6)
+    one_unit_only = np.where(plan.columns["unit_id"] == "u0", 2, 0)
+    poor = Plan(columns={**plan.columns, "label": one_unit_only})
+    assert set(make_splits(poor, 1)) == {"random_window_leaky"}
+    bare = Plan(columns={name: plan.columns[name] for name in ("record_id", "shard", "row", "label")})
+    assert set(make_splits(bare, 1)) == {"random_window_leaky"}
+
+
+def test_same_seed_same_split_other_seed_another() -> None:
+    plan = make_plan(n_records=300, n_units=10)
+    texts = [{name: table.to_csv() for name, table in make_splits(plan, seed).items()} for seed in (1, 1, 2)]
+    assert texts[0] == texts[1]
+    assert all(texts[0][name] != texts[2][name] for name in texts[0])
+
+
+def test_csv_round_trip_and_header(tmp_path: Path) -> None:
+    for name, table in make_splits(make_plan(), 5).items():
+        path = tmp_path / f"{name}.csv"
+        path.write_text(table.to_csv())
+        back = read_split(path)
+        for field in ("record_id", "start_fraction", "stop_fraction", "subset"):
+            np.testing.assert_array_equal(getattr(back, field), getattr(table, field))
+    lines = (tmp_path / "by_unit.csv").read_text().splitlines()
+    assert lines[0] == "record_id,start_fraction,stop_fraction,subset"
+    assert lines[1].startswith("r000000,0,1,")
+
+
+@pytest.mark.parametrize(
+    "text",
+    [
+        "",
+        "record_id,subset\nr0,train\n",
+        "record_id,start_fraction,stop_fraction,subset\n",
+        "record_id,start_fraction,stop_fraction,subset\nr0,0,1,exam\n",
+        "record_id,start_fraction,stop_fraction,subset\nr0,0.5,0.5,train\n",
+        "record_id,start_fraction,stop_fraction,subset\nr0,0,nan,train\n",
+        "record_id,start_fraction,stop_fraction,subset\nr0,0,1\n",
+        "record_id,start_fraction,stop_fraction,subset\nr0,0,1,train\nr0,0,1\n",
+    ],
+)
+def test_malformed_split_is_refused(tmp_path: Path, text: str) -> None:
+    path = tmp_path / "by_unit.csv"
+    path.write_text(text)
+    with pytest.raises(DatasetError, match=r"by_unit\.csv"):
+        read_split(path)
