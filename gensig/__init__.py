@@ -1,3 +1,59 @@
-"""gensig: labelled gear-fault vibration data sets from physics."""
+"""gensig: labelled gear-fault vibration data sets from physics.
 
-__version__ = "0.1.0"
+>>> import gensig
+>>> data = gensig.open_dataset("runs/quickstart")            # doctest: +SKIP
+>>> system = gensig.load_system("gear=xiamen_23_84", "operating.torque_nm=40")
+>>> float(system.pair.transverse_contact_ratio)              # doctest: +ELLIPSIS
+1.7117...
+
+Importing the package is light: physics, HDF5 and Hydra are imported by the functions that need them.
+"""
+
+from __future__ import annotations
+
+from pathlib import Path
+from typing import TYPE_CHECKING
+
+from gensig.version import __version__
+
+if TYPE_CHECKING:
+    from gensig.dataset.reader import Dataset
+    from gensig.systems.spur_pair import SpurPair
+
+__all__ = ["__version__", "generate", "load_system", "open_dataset"]
+
+
+def open_dataset(path: str | Path, *, allow_incomplete: bool = False) -> Dataset:
+    """Open the folder of a data set; see ``gensig.dataset.reader``."""
+    from gensig.dataset import reader
+
+    return reader.open_dataset(path, allow_incomplete=allow_incomplete)
+
+
+def load_system(*overrides: str, config_dir: str | Path | None = None) -> SpurPair:
+    """The machine that overrides describe, as the commands would build it."""
+    from gensig.config import read_request
+    from gensig.systems.registry import read_system
+
+    return read_system(read_request(overrides, config_dir=config_dir).config)
+
+
+def generate(*overrides: str, out: str | Path, config_dir: str | Path | None = None) -> Dataset:
+    """Make a data set and open it.
+
+    Raises
+    ------
+    gensig.errors.GensigError    for anything that cannot be used, and where a shard could not be made
+    """
+    from gensig.config import read_request
+    from gensig.errors import SimulationError
+    from gensig.execution.local import n_workers
+    from gensig.generation import begin_folder, run_folder
+
+    request = read_request(overrides, config_dir=config_dir)
+    begin_folder(request.config, request.overrides, Path(out))
+    workers = n_workers(request.config["executor"]["n_workers"])
+    _, problems = run_folder(Path(out), workers=workers, on_shard=lambda _progress: None)
+    if problems:
+        raise SimulationError(f"{out} is incomplete: {problems[0]}")
+    return open_dataset(out)

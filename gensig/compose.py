@@ -70,6 +70,17 @@ def sweep(overrides: Sequence[str]) -> list[list[str]]:
     return jobs
 
 
+def job_folders(jobs: Sequence[Sequence[str]]) -> list[str]:
+    """Folder names of the jobs of a sweep: number and the values that differ between jobs."""
+    varied = [{job[index] for job in jobs} for index in range(len(jobs[0]))]
+    names = []
+    for number, job in enumerate(jobs):
+        text = ",".join(word for word, values in zip(job, varied, strict=True) if len(values) > 1)
+        safe = re.sub(r"[^A-Za-z0-9_.,=+-]+", "_", text)[:120]
+        names.append(f"{number}-{safe}" if safe else str(number))
+    return names
+
+
 def override_keys(overrides: Sequence[str]) -> dict[str, str]:
     """Keys and groups that were typed, each with its value as text; refuses a sweep."""
     keys: dict[str, str] = {}
@@ -116,14 +127,12 @@ def _explain(error: Exception, config_name: str, overrides: Sequence[str]) -> st
         if found := re.search(pattern, text):
             key = found.group(1)
             return f"unknown key '{key}'{_nearest(key, _known_keys(config_name))}"
-    if found := re.search(r"Could not find '([^']+)'.*?Available options in '([^']+)':(.*)", text):
-        wanted, group, names = found.groups()
-        return f"no option '{wanted}'; {group} offers: {', '.join(sorted(set(names.split()) - {'Config', 'search'}))}"
-    if found := re.search(r"In '[^']+': Could not find '([^']+)'", text):
-        wanted = found.group(1)
-        group = wanted.rpartition("/")[0]
+    if found := re.search(r"Could not find '([^']+)'", text):
+        group, _, wanted = found.group(1).rpartition("/")
         names = options(group) if group else []
-        return f"no option '{wanted}'" + (f"; {group} offers: {', '.join(names)}" if names else "")
+        return f"no option '{wanted}' of {group or 'the configuration'}" + (
+            f"; there is {', '.join(names)}" if names else ""
+        )
     if "mismatched input" in text or "extraneous input" in text or "no viable alternative" in text:
         return f"cannot read the override: {text}"
     if found := re.search(r"Could not override '([^']+)'\. No match in the defaults list", text):

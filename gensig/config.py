@@ -55,10 +55,11 @@ def read_request(overrides: Sequence[str], *, config_dir: str | Path | None = No
     def class_fault(name: str | None) -> dict[str, Any]:
         words = [word for word in others if name is None or not word.startswith("fault=")]
         words += [] if name is None else [f"fault={name}"]
-        plain = compose(CONFIG_NAME, words, config_dir=config_dir)["fault"]
-        mine = {key: word for key, word in fault_words.items() if key.split(".")[1] in plain}
+        fault = base["fault"] if name is None else compose(CONFIG_NAME, words, config_dir=config_dir)["fault"]
+        mine = {key: word for key, word in fault_words.items() if key.split(".")[1] in fault}
         unused.difference_update(mine)
-        fault = compose(CONFIG_NAME, [*words, *mine.values()], config_dir=config_dir)["fault"]
+        if mine:
+            fault = compose(CONFIG_NAME, [*words, *mine.values()], config_dir=config_dir)["fault"]
         vary = fault.get("vary") or {}
         return {**fault, "vary": {key: spec for key, spec in vary.items() if f"fault.{key}" not in mine}}
 

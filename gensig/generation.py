@@ -9,7 +9,6 @@ from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
 
-from gensig import __version__
 from gensig.dataset.layout import read_config, shard_path
 from gensig.dataset.manifest import (
     create_folder,
@@ -29,6 +28,7 @@ from gensig.sensing.decimation import usable_band
 from gensig.systems.registry import read_system
 from gensig.systems.spur_pair import SpurPair
 from gensig.units import from_si
+from gensig.version import __version__
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -41,17 +41,14 @@ class Progress:
     reason: str
 
 
-def generate(
-    config: dict[str, Any], overrides: Sequence[str], out: Path, *, on_shard: Callable[[Progress], None]
-) -> tuple[int, list[str]]:
-    """Make a data set in a new folder.
+def begin_folder(config: dict[str, Any], overrides: Sequence[str], out: Path) -> int:
+    """Plan a data set and make its folder, ready for ``run_folder``; nothing is touched if anything is wrong.
 
     Returns
     -------
-    number of failed records, and one line for each shard that could not be made; the folder is complete only if
-    there is none
+    number of shards
     """
-    workers = n_workers(config["executor"]["n_workers"])
+    n_workers(config["executor"]["n_workers"])
     plan = make_plan(config)
     recorded = {**config, "out": None}
     create_folder(
@@ -63,11 +60,17 @@ def generate(
         seed=read_seed(config),
         generator_version=__version__,
     )
-    return run_folder(out, workers=workers, on_shard=on_shard)
+    return plan.n_shards
 
 
 def run_folder(out: Path, *, workers: int, on_shard: Callable[[Progress], None]) -> tuple[int, list[str]]:
-    """Make the shards that a folder still lacks, then close it; see ``generate``."""
+    """Make the shards that a folder still lacks, then close it.
+
+    Returns
+    -------
+    number of failed records, and one line for each shard that could not be made; the folder is complete only if
+    there is none
+    """
     manifest, config = read_manifest(out), read_config(out)
     if manifest.identity != identity_hash(config, __version__):
         raise DatasetError(
@@ -106,6 +109,17 @@ def write_shard(out: Path, shard_index: int) -> WrittenShard:
     """Simulate and write one shard of a folder; its bits depend on nothing but the folder's plan and configuration."""
     config, plan = read_config(out), read_plan(out / "plan.csv")
     indices = plan.rows(shard_index)
+    params = [name.removeprefix("params/") for name in plan.columns if name.startswith("params/")]
+    writer = open_shard(shard_path(out, shard_index), config, len(indices), params)
+    with writer:
+        for row, index in enumerate(indices):
+            record = simulate_record(config, plan.record(int(index)))
+            writer.write(row, record.signals, record.values)
+    return WrittenShard(sha256=writer.sha256, n_bytes=writer.n_bytes, n_failed=writer.n_failed)
+
+
+def open_shard(path: Path, config: Mapping[str, Any], n_records: int, params: Sequence[str]) -> ShardWriter:
+    """Writer for records of one configuration."""
     system = read_system(config)
     n_channels = len(system.sensing.channels)
     n_samples = round(system.operating.duration * system.sensing.sampling_rate)
@@ -117,19 +131,14 @@ def write_shard(out: Path, shard_index: int) -> WrittenShard:
     }
     if config["dataset"]["store_clean"]:
         shapes["acceleration_clean"] = (n_channels, n_samples)
-    writer = ShardWriter(
-        shard_path(out, shard_index),
-        n_records=len(indices),
+    return ShardWriter(
+        path,
+        n_records=n_records,
         signals=shapes,
-        params=[name.removeprefix("params/") for name in plan.columns if name.startswith("params/")],
+        params=params,
         attributes=root_attributes(config, system),
         compression=config["dataset"]["compression"],
     )
-    with writer:
-        for row, index in enumerate(indices):
-            record = simulate_record(config, plan.record(int(index)))
-            writer.write(row, record.signals, record.values)
-    return WrittenShard(sha256=writer.sha256, n_bytes=writer.n_bytes, n_failed=writer.n_failed)
 
 
 def root_attributes(config: Mapping[str, Any], system: SpurPair) -> dict[str, Any]:

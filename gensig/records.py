@@ -1,4 +1,4 @@
-"""One record: from a row of the plan to arrays and values, depending on nothing but the configuration and the row."""
+"""One record: from a row of the plan to arrays and values, depending on the configuration and the row alone."""
 
 from __future__ import annotations
 
@@ -12,7 +12,6 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from gensig import __version__
 from gensig.dataset.manifest import identity_hash
 from gensig.errors import ConfigError, SimulationError
 from gensig.faults.base import Fault
@@ -22,6 +21,7 @@ from gensig.sensing.manufacturing import Gearbox, Specimen, draw_gearbox, draw_s
 from gensig.systems.registry import read_system
 from gensig.systems.spur_pair import SpurPair, Start
 from gensig.units import from_si
+from gensig.version import __version__
 
 Array = NDArray[np.float64]
 
@@ -106,7 +106,7 @@ def simulate_record(config: Mapping[str, Any], row: Mapping[str, Any]) -> Record
         clean, noise_power = np.full((n_channels, n_samples), MISSING), np.full(n_channels, MISSING)
         result = {"status": "failed", "status_reason": str(error), "speed_rpm": MISSING, "mesh_frequency_hz": MISSING}
     noisy = add_noise(clean, noise_power, stream(seed, Stream.NOISE, index))
-    signals = {
+    signals: dict[str, NDArray[Any]] = {
         "acceleration": noisy.astype(np.float32),
         "fault_multihot": multihot,
         "signal_power": power(clean),

@@ -36,7 +36,15 @@ from gensig.dataset.schema import SCHEMA_VERSION
 from gensig.dataset.splits import make_splits
 from gensig.errors import DatasetError
 
-__all__ = ["create_folder", "finalize", "identity_hash", "read_manifest", "record_failed_shard", "record_shard"]
+__all__ = [
+    "create_folder",
+    "finalize",
+    "identity_hash",
+    "read_manifest",
+    "record_failed_shard",
+    "record_shard",
+    "refuse_used",
+]
 
 # These change where and how a data set is made, not one bit of it.
 NOT_IDENTITY = ("out", "executor", "verbosity")
@@ -107,7 +115,7 @@ def create_folder(
     )
     made: list[Path] = []
     try:
-        _refuse_used(out)
+        refuse_used(out)
         _make_folders(out, made)
         for name, text in texts.items():
             made.append(out / name)
@@ -122,7 +130,8 @@ def create_folder(
         raise
 
 
-def _refuse_used(out: Path) -> None:
+def refuse_used(out: Path) -> None:
+    """Raise DatasetError where a folder exists and holds something."""
     if out.is_dir():
         if any(out.iterdir()):
             raise DatasetError(f"{out} exists and is not empty; choose another out=DIR or empty it first")

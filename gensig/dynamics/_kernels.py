@@ -6,12 +6,19 @@ The symbols are those of ``docs/theory/spur_dynamics.md``.
 
 from __future__ import annotations
 
+import functools
 from typing import Any, NamedTuple
 
 import numpy as np
 from numba import njit
 
 from gensig.mesh.pair_table import FIRST_PITCH, N_PAIRS
+
+# Without Numba's reference counting (arrays are borrowed, none is made here) a step costs a third less; inlined,
+# because the numbers of a mesh would otherwise be copied at every call.
+_OPTIONS: dict[str, Any] = {"cache": True, "error_model": "numpy", "_nrt": False}
+_compiled: Any = functools.partial(njit, nogil=True, **_OPTIONS)()
+_inlined: Any = functools.partial(njit, inline="always", **_OPTIONS)()
 
 
 class MeshNumbers(NamedTuple):
@@ -75,7 +82,7 @@ class SystemArrays(NamedTuple):
     force: Any
 
 
-@njit(cache=True, error_model="numpy", inline="always", _nrt=False)
+@_inlined
 def _friction_sign(m, position):
     """Direction of sliding, smooth through the pitch point, -1 before it and 1 after it."""
     x = (position - m.pitch_point) / m.friction_half_width
@@ -86,7 +93,7 @@ def _friction_sign(m, position):
     return x * (1.5 - 0.5 * x * x)
 
 
-@njit(cache=True, error_model="numpy", inline="always", _nrt=False)
+@_inlined
 def mesh_law(
     m, table, pinion_row, wheel_row, pinion_error, wheel_error, sound_wheel, roll, approach, rate, roll_rate, work
 ):
@@ -108,7 +115,7 @@ def mesh_law(
     return -back[0], 0.0, 0.0, 0.0, -back[4], back[5], back[6]
 
 
-@njit(cache=True, error_model="numpy", inline="always", _nrt=False)
+@_inlined
 def _gather(m, table, pinion_row, wheel_row, pinion_error, wheel_error, roll, approach, work):
     """Pairs that could touch: bite, 1 / own compliance, own, gap slope, compliance slope, position; and how many."""
     newest = int(np.floor(roll / m.pitch)) + 1
@@ -137,7 +144,7 @@ def _gather(m, table, pinion_row, wheel_row, pinion_error, wheel_error, roll, ap
     return n_active
 
 
-@njit(cache=True, error_model="numpy", inline="always", _nrt=False)
+@_inlined
 def _gather_coast(m, table, pinion_row, wheel_row, sound_wheel, mirrored, approach, work):
     """The same for the back flanks: teeth count backwards along the mirrored roll, are sound and have no errors."""
     newest = int(np.floor(mirrored / m.pitch)) + 1
@@ -164,7 +171,7 @@ def _gather_coast(m, table, pinion_row, wheel_row, sound_wheel, mirrored, approa
     return n_active
 
 
-@njit(cache=True, error_model="numpy", inline="always", _nrt=False)
+@_inlined
 def _interpolate(table, row_p, row_w, cell, f, column):
     """Linear between nodes, sum of both gears' sides."""
     a = table[row_p, cell, column] + table[row_w, cell, column]
@@ -172,7 +179,7 @@ def _interpolate(table, row_p, row_w, cell, f, column):
     return a + f * (b - a)
 
 
-@njit(cache=True, error_model="numpy", inline="always", _nrt=False)
+@_inlined
 def _total_load(shared, n_active, work):
     """Load of all pairs; those that the shared deflection lifts off get a bite of 0.
 
@@ -194,7 +201,7 @@ def _total_load(shared, n_active, work):
             return total
 
 
-@njit(cache=True, error_model="numpy", inline="always", _nrt=False)
+@_inlined
 def _flank_law(m, n_active, approach_rate, roll_rate, work):
     """One-sided contact of the gathered pairs."""
     total = _total_load(m.shared, n_active, work)
@@ -220,7 +227,7 @@ def _flank_law(m, n_active, approach_rate, roll_rate, work):
     return normal, friction, moment_p, moment_w, along, stored, lost
 
 
-@njit(cache=True, error_model="numpy", inline="always", _nrt=False)
+@_inlined
 def _paper_law(m, table, pinion_row, wheel_row, roll, approach, rate, work):
     """F = k(t) delta + c_m delta': two-sided, no gap, pairs in and out over one integration step."""
     newest = int(np.floor(roll / m.pitch)) + 1
@@ -252,7 +259,7 @@ def _paper_law(m, table, pinion_row, wheel_row, roll, approach, rate, work):
     return normal, friction, moment_p, moment_w, 0.0, 0.5 * together * approach**2, m.damping * rate**2
 
 
-@njit(cache=True, error_model="numpy", inline="always", _nrt=False)
+@_inlined
 def _acceleration(
     inverse_mass, k_row, k_column, k_value, c_row, c_column, c_value, force,
     m, table, pinion_row, wheel_row, pinion_error, wheel_error, sound_wheel, time, q, v, a, work,
@@ -293,7 +300,7 @@ def _acceleration(
     return normal
 
 
-@njit(cache=True, error_model="numpy", nogil=True, _nrt=False)
+@_compiled
 def integrate(system, mesh, q, v, step, first_step, n_steps, channels, out, scratch, work):
     """Advance q and v in place by ``n_steps`` of classical RK4.
 
@@ -301,7 +308,6 @@ def integrate(system, mesh, q, v, step, first_step, n_steps, channels, out, scra
     no rows nothing is stored. Returns the number of steps without contact, and the step at which a value stopped
     being finite (-1 if none).
     """
-    # unpacked once: taking arrays out of a tuple counts references, which would cost more than the law
     inverse_mass, k_row, k_column, k_value, c_row, c_column, c_value, force = system
     m, table, pinion_row, wheel_row, pinion_error, wheel_error, sound_wheel = mesh
     n_dof = len(q)

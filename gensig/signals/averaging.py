@@ -71,7 +71,15 @@ def resample_to_angle(
     padded = np.concatenate(
         [coefficients[..., 1:2], coefficients, coefficients[..., -2:-1], coefficients[..., -3:-2]], axis=-1
     )
-    weights = ((1 - u) ** 3 / 6, (3 * u**3 - 6 * u**2 + 4) / 6, (-3 * u**3 + 3 * u**2 + 3 * u + 1) / 6, u**3 / 6)
+    squared = u * u
+    cubed = squared * u
+    rest = 1 - u
+    weights = (
+        rest * rest * rest / 6,
+        (3 * cubed - 6 * squared + 4) / 6,
+        (3 * (u + squared - cubed) + 1) / 6,
+        cubed / 6,
+    )
     angle_signal = weights[0] * padded.take(index, axis=-1)
     for offset in (1, 2, 3):
         angle_signal += weights[offset] * padded.take(index + offset, axis=-1)

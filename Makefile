@@ -1,0 +1,36 @@
+# make demo: everything from nothing to a report.   make test: everything from nothing to a green test run.
+# PIP_ARGS passes options to pip, for instance PIP_ARGS="--index-url https://..." for another build of torch.
+PYTHON ?= python3
+VENV ?= .venv
+PIP_ARGS ?=
+DEMO ?= demo
+BIN := $(VENV)/bin
+
+.PHONY: demo test check clean
+
+demo: $(VENV)/.installed
+	@test ! -e $(DEMO) || { echo "$(DEMO) exists: remove it, or choose another folder with DEMO=..."; exit 2; }
+	$(BIN)/gensig generate experiment=quickstart out=$(DEMO)/data
+	$(BIN)/gensig verify $(DEMO)/data
+	$(BIN)/diagnose train data=$(DEMO)/data out=$(DEMO)/report
+	@echo "Look at $(DEMO)/report/report.md (figures beside it); the data set is $(DEMO)/data, described in its README.md"
+
+test: $(VENV)/.installed-test
+	$(BIN)/python -m pytest
+
+check: $(VENV)/.installed-test
+	$(BIN)/ruff check . && $(BIN)/ruff format --check . && $(BIN)/mypy && $(BIN)/lint-imports
+
+$(VENV)/.installed: pyproject.toml constraints.txt | $(VENV)/bin/python
+	$(BIN)/python -m pip install --quiet $(PIP_ARGS) --constraint constraints.txt --editable .
+	@touch $@
+
+$(VENV)/.installed-test: pyproject.toml constraints.txt | $(VENV)/bin/python
+	$(BIN)/python -m pip install --quiet $(PIP_ARGS) --constraint constraints.txt --editable ".[test]"
+	@touch $@ $(VENV)/.installed
+
+$(VENV)/bin/python:
+	$(PYTHON) -m venv $(VENV)
+
+clean:
+	rm -rf $(VENV) build *.egg-info

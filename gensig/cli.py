@@ -1,0 +1,191 @@
+"""The command ``gensig``: verbs, help, and one line for a mistake. Only the verbs that need physics import it."""
+
+from __future__ import annotations
+
+import argparse
+import difflib
+import importlib
+import sys
+from collections.abc import Callable, Sequence
+from dataclasses import dataclass
+from typing import NoReturn
+
+from gensig.errors import ConfigError, GensigError
+from gensig.version import __version__
+
+OVERRIDES = "OVERRIDES are group=option and key=value, as in Hydra: fault=crack operating.speed_rpm=1200 seed=3."
+
+
+@dataclass(frozen=True)
+class Verb:
+    """One verb: what it does, an example, its own arguments, and ``module:function`` that runs it."""
+
+    summary: str
+    example: str
+    runs: str
+    arguments: Callable[[argparse.ArgumentParser], None]
+
+
+class _Parser(argparse.ArgumentParser):
+    """Parser whose complaints are the one line of ``main``."""
+
+    def error(self, message: str) -> NoReturn:
+        raise ConfigError(f"{message}; see {self.prog} --help")
+
+
+def _overrides(parser: argparse.ArgumentParser) -> None:
+    parser.add_argument("overrides", nargs="*", metavar="OVERRIDES", help=OVERRIDES)
+    parser.add_argument("--config-dir", metavar="DIR", help="folder with groups and options of your own")
+
+
+def _generate(parser: argparse.ArgumentParser) -> None:
+    _overrides(parser)
+    parser.add_argument("-m", "--multirun", action="store_true", help="one data set for each combination of values a,b")
+    parser.add_argument("--quiet", action="store_true", help="print nothing but mistakes")
+
+
+def _stiffness(parser: argparse.ArgumentParser) -> None:
+    _overrides(parser)
+    parser.add_argument("--json", metavar="FILE", help="write the curves")
+    parser.add_argument("--plot", metavar="FILE", help="write a figure (PNG, SVG or PDF)")
+
+
+def _simulate(parser: argparse.ArgumentParser) -> None:
+    _overrides(parser)
+    parser.add_argument("--output", metavar="FILE", help="write the record: .h5 (a shard of one record) or .csv")
+    parser.add_argument("--plot", metavar="FILE", help="write a figure: signal, spectrum, envelope spectrum")
+
+
+def _resume(parser: argparse.ArgumentParser) -> None:
+    parser.add_argument("folder", metavar="DIR", help="folder of a data set")
+    parser.add_argument("--workers", type=int, metavar="N", help="worker processes (default: one a core)")
+    parser.add_argument("--quiet", action="store_true", help="print nothing but mistakes")
+
+
+def _inspect(parser: argparse.ArgumentParser) -> None:
+    parser.add_argument("path", metavar="PATH", help="folder of a data set, or an HDF5 file")
+
+
+def _verify(parser: argparse.ArgumentParser) -> None:
+    parser.add_argument("folder", metavar="DIR", help="folder of a data set")
+    parser.add_argument("--quick", action="store_true", help="sizes and manifest only")
+
+
+def _validate(parser: argparse.ArgumentParser) -> None:
+    parser.add_argument("--markdown", metavar="FILE", help="write the whole comparison as a Markdown page")
+
+
+VERBS: dict[str, Verb] = {
+    "generate": Verb(
+        "make a labelled data set",
+        "gensig generate experiment=quickstart out=runs/quickstart\n"
+        "  gensig generate -m fault=healthy,crack plan.n_records=20 out=runs/two",
+        "gensig.commands.datasets:generate",
+        _generate,
+    ),
+    "plan": Verb(
+        "dry run: records, bytes, predicted time",
+        "gensig plan experiment=quickstart plan.n_records=2000",
+        "gensig.commands.datasets:plan",
+        _overrides,
+    ),
+    "resume": Verb(
+        "finish an interrupted data set", "gensig resume runs/quickstart", "gensig.commands.datasets:resume", _resume
+    ),
+    "verify": Verb(
+        "is a data set whole and unaltered?",
+        "gensig verify runs/quickstart",
+        "gensig.commands.datasets:verify",
+        _verify,
+    ),
+    "inspect": Verb(
+        "what is in a data set or file",
+        "gensig inspect runs/quickstart/shards/shard-00000.h5",
+        "gensig.commands.datasets:inspect",
+        _inspect,
+    ),
+    "simulate": Verb(
+        "one record: signal, spectrum, figure",
+        "gensig simulate fault=missing_tooth operating.speed_rpm=1500 --plot missing.png --output missing.csv",
+        "gensig.commands.physics:simulate",
+        _simulate,
+    ),
+    "stiffness": Verb(
+        "mesh stiffness of sound and faulty teeth",
+        "gensig stiffness fault=crack fault.crack_depth_mm=1.5 --json crack.json --plot crack.png",
+        "gensig.commands.physics:stiffness",
+        _stiffness,
+    ),
+    "validate": Verb(
+        "every printed figure of the source papers against ours",
+        "gensig validate --markdown docs/validation.md",
+        "gensig.commands.validate:validate",
+        _validate,
+    ),
+}
+
+
+def main(argv: Sequence[str] | None = None) -> int:
+    """Run the command; exit status 0, 1 for partial or damaged results, 2 for a mistake, 130 when interrupted."""
+    words = list(sys.argv[1:] if argv is None else argv)
+    try:
+        return _run(words)
+    except GensigError as error:
+        return _complain(str(error))
+    except OSError as error:
+        where = f"{error.filename}: " if error.filename else ""
+        return _complain(f"{where}{error.strerror or error}")
+    except KeyboardInterrupt:
+        _complain("interrupted; a data set begun is incomplete, and gensig resume DIR finishes it")
+        return 130
+
+
+def _complain(message: str) -> int:
+    print(f"gensig: {' '.join(message.split())}", file=sys.stderr)
+    return 2
+
+
+def _run(words: list[str]) -> int:
+    if not words or words[0] in ("-h", "--help"):
+        print(_help(), file=sys.stdout if words else sys.stderr)
+        return 0 if words else 2
+    if words[0] in ("-V", "--version"):
+        print(f"gensig {__version__}")
+        return 0
+    name = words[0]
+    if name not in VERBS:
+        close = difflib.get_close_matches(name, VERBS, n=1)
+        hint = f"did you mean '{close[0]}'?" if close else f"there is {', '.join(VERBS)}"
+        raise ConfigError(f"no command '{name}'; {hint}")
+    verb = VERBS[name]
+    parser = _Parser(
+        prog=f"gensig {name}",
+        description=f"{verb.summary[0].upper()}{verb.summary[1:]}.",
+        epilog=f"example:\n  {verb.example}",
+        formatter_class=argparse.RawDescriptionHelpFormatter,
+    )
+    verb.arguments(parser)
+    try:
+        arguments = parser.parse_intermixed_args(words[1:])
+    except SystemExit as leaving:
+        return int(leaving.code or 0)
+    from gensig.commands.console import one_line_warnings
+
+    module, function = verb.runs.split(":")
+    with one_line_warnings("gensig"):
+        return int(getattr(importlib.import_module(module), function)(arguments))
+
+
+def _help() -> str:
+    verbs = "\n".join(f"  {name:<10} {verb.summary}" for name, verb in VERBS.items())
+    return (
+        "usage: gensig COMMAND [ARGUMENTS]\n\n"
+        "Labelled gear-fault vibration data sets from physics.\n\n"
+        f"commands:\n{verbs}\n\n"
+        f"{OVERRIDES}\n"
+        "gensig COMMAND --help explains each, with an example."
+    )
+
+
+if __name__ == "__main__":
+    sys.exit(main())

@@ -1,0 +1,144 @@
+"""Verbs on one machine: stiffness, simulate."""
+
+from __future__ import annotations
+
+import json
+import sys
+from argparse import Namespace
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from gensig.commands.console import replaced_file
+from gensig.config import read_request
+from gensig.errors import ConfigError
+from gensig.faults.registry import read_fault
+from gensig.systems.registry import read_system
+from gensig.systems.spur_pair import SpurPair, StiffnessCurves
+
+Array = NDArray[np.float64]
+
+
+def stiffness(arguments: Namespace) -> int:
+    """Mesh stiffness of a gear pair: curves to JSON, a figure, or a summary."""
+    request = read_request(arguments.overrides, config_dir=arguments.config_dir)
+    system = read_system(request.config)
+    fault = read_fault({key: value for key, value in request.config["fault"].items() if key != "vary"})
+    faults = [] if fault is None else [fault]
+    curves = system.stiffness_curves(faults)
+    if system.pair.transverse_contact_ratio < 1.0:
+        print(
+            f"gensig: WARNING: the transverse contact ratio {system.pair.transverse_contact_ratio:.4f} is below 1: the "
+            f"drive is interrupted at every tooth; these curves are quasi-static",
+            file=sys.stderr,
+        )
+    content = stiffness_content(system, curves)
+    if arguments.json:
+        with replaced_file(arguments.json) as path:
+            path.write_text(json.dumps(content, indent=1) + "\n", encoding="utf-8")
+    if arguments.plot:
+        from gensig.commands.figures import plot_stiffness
+
+        with replaced_file(arguments.plot) as path:
+            plot_stiffness(system, curves, faults, path)
+    _print_stiffness(content, curves)
+    return 0
+
+
+def stiffness_content(system: SpurPair, curves: StiffnessCurves) -> dict[str, Any]:
+    """The keys of ``gensig stiffness --json``."""
+    content: dict[str, Any] = {
+        "transverse_contact_ratio": system.pair.transverse_contact_ratio,
+        "base_pitch_mm": system.pair.base_pitch * 1e3,
+        "contact_position": curves.contact_position.tolist(),
+        "single_pair_stiffness_n_per_m": curves.single_pair_stiffness.tolist(),
+        "roll_angle_deg": np.degrees(curves.roll_angle).tolist(),
+        "mesh_stiffness_n_per_m": curves.mesh_stiffness.tolist(),
+        "mesh_stiffness_mean_n_per_m": float(curves.mesh_stiffness.mean()),
+        "mesh_stiffness_kind": "sum of pair stiffnesses (secant)"
+        if system.mesh.law == "paper"
+        else "tangent dF/d(approach) at static equilibrium",
+        "compliance_m_per_n": {
+            gear: {name: values.tolist() for name, values in terms.items()} for gear, terms in curves.compliance.items()
+        },
+        "shared_body_compliance_m_per_n": system.mesh_table().shared_compliance,
+    }
+    if curves.faulty_pair_stiffness is not None:
+        content["faulty_pair_stiffness_n_per_m"] = curves.faulty_pair_stiffness.tolist()
+    return content
+
+
+def _print_stiffness(content: dict[str, Any], curves: StiffnessCurves) -> None:
+    print(f"transverse contact ratio   {content['transverse_contact_ratio']:.5f}")
+    print(f"base pitch                 {content['base_pitch_mm']:.5f} mm")
+    print(f"mesh stiffness, mean       {content['mesh_stiffness_mean_n_per_m']:.4e} N/m")
+    print(f"mesh stiffness, range      {curves.mesh_stiffness.min():.4e} .. {curves.mesh_stiffness.max():.4e} N/m")
+    print(f"single pair, highest       {curves.single_pair_stiffness.max():.4e} N/m")
+    if curves.faulty_pair_stiffness is not None:
+        ratio = curves.faulty_pair_stiffness / curves.single_pair_stiffness
+        print(f"faulty pair loses          {100 * (1 - ratio.max()):.2f} .. {100 * (1 - ratio.min()):.2f} %")
+
+
+def simulate(arguments: Namespace) -> int:
+    """One record, as ``generate`` would make it, with every value as configured rather than drawn."""
+    from gensig.planning import make_plan
+    from gensig.records import simulate_record
+
+    request = read_request(arguments.overrides, config_dir=arguments.config_dir)
+    config = request.config
+    name = config["fault"]["kind"]
+    config["plan"] = {**config["plan"], "classes": [name], "n_records": 1, "n_units": 1, "n_gearboxes": 1, "vary": {}}
+    config["classes"] = {name: {**config["fault"], "vary": {}}}
+    row = make_plan(config).record(0)
+    record = simulate_record(config, row)
+    if record.values.get("status") == "failed":
+        print(f"gensig: {record.values['status_reason']}", file=sys.stderr)
+        return 1
+    system = read_system(config)
+    if arguments.output:
+        _write_record(config, system, record, arguments.output)
+    if arguments.plot:
+        from gensig.commands.figures import plot_record
+
+        with replaced_file(arguments.plot) as path:
+            plot_record(system, record.signals["acceleration"], record.values, path)
+    _print_record(system, record.signals["acceleration"], record.values)
+    return 0
+
+
+def _write_record(config: dict[str, Any], system: SpurPair, record: Any, output: str) -> None:
+    """One record as a shard of one row, or as a table with time and channels."""
+    path = Path(output)
+    if path.suffix in (".h5", ".hdf5"):
+        from gensig.generation import open_shard
+
+        params = [name.removeprefix("params/") for name in record.values if name.startswith("params/")]
+        with replaced_file(path) as temporary, open_shard(temporary, config, 1, params) as writer:
+            writer.write(0, record.signals, record.values)
+    elif path.suffix == ".csv":
+        acceleration = record.signals["acceleration"]
+        time = np.arange(acceleration.shape[1]) / system.sensing.sampling_rate
+        header = ",".join(["time_s", *(f"{name}_{_unit_suffix(name)}" for name in system.sensing.channels)])
+        with replaced_file(path) as temporary:
+            np.savetxt(temporary, np.column_stack([time, *acceleration]), "%.9g", ",", header=header, comments="")
+    else:
+        raise ConfigError(f"--output {output}: the name must end in .h5, .hdf5 or .csv")
+
+
+def _unit_suffix(channel: str) -> str:
+    return "rad_per_s2" if channel.endswith("rotation") else "m_per_s2"
+
+
+def _print_record(system: SpurPair, acceleration: NDArray[np.float32], values: dict[str, Any]) -> None:
+    from gensig.signals.indicators import crest_factor, kurtosis, rms
+
+    print(f"class {values['label_name']}, severity {values['severity']:.3f}")
+    print(f"speed {values['speed_rpm']:.3f} r/min, mesh frequency {values['mesh_frequency_hz']:.2f} Hz")
+    print(f"{'channel':<16}{'RMS m/s2':>12}{'kurtosis':>12}{'crest':>12}")
+    table = zip(
+        system.sensing.channels, rms(acceleration), kurtosis(acceleration), crest_factor(acceleration), strict=True
+    )
+    for name, level, fourth, crest in table:
+        print(f"{name:<16}{level:>12.4g}{fourth:>12.3f}{crest:>12.3f}")
