@@ -15,6 +15,7 @@ from hydra import compose as hydra_compose
 from hydra import initialize_config_module
 from hydra.core.global_hydra import GlobalHydra
 from hydra.core.override_parser.overrides_parser import OverridesParser
+from hydra.core.override_parser.types import QuotedString
 from hydra.errors import HydraException
 from omegaconf import OmegaConf
 from omegaconf.errors import OmegaConfBaseException
@@ -89,6 +90,26 @@ def override_keys(overrides: Sequence[str]) -> dict[str, str]:
             raise ConfigError(f"{override.input_line}: several values need -m (one data set for each)")
         keys[str(override.key_or_group)] = override.get_value_element_as_str()
     return keys
+
+
+def typed_mapping(overrides: Sequence[str], key: str) -> dict[str, Any]:
+    """What was typed as ``key={name: value, ...}``; such a mapping may have names that no option has yet."""
+    result: dict[str, Any] = {}
+    for override in _parse([word for word in overrides if word.startswith(f"{key}=")]):
+        value = override.value()
+        if not isinstance(value, dict):
+            raise ConfigError(f"{key} must be a mapping, for instance '{key}={{name: value}}'")
+        result.update({str(name): _plain(item) for name, item in value.items()})
+    return result
+
+
+def _plain(value: Any) -> Any:
+    """Hydra's quoted strings and nested values as plain Python."""
+    if isinstance(value, dict):
+        return {str(name): _plain(item) for name, item in value.items()}
+    if isinstance(value, list):
+        return [_plain(item) for item in value]
+    return str(value) if isinstance(value, QuotedString) else value
 
 
 def options(group: str) -> list[str]:

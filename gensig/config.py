@@ -9,11 +9,12 @@ from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
 
-from gensig.compose import compose, options, override_keys
+from gensig.compose import compose, options, override_keys, typed_mapping
 from gensig.errors import ConfigError
 from gensig.systems.registry import SIDES
 
 CONFIG_NAME = "generate"
+VARY_KEYS = ("plan.vary", "fault.vary")
 
 
 class DerivedValueWarning(UserWarning):
@@ -41,7 +42,10 @@ def read_request(overrides: Sequence[str], *, config_dir: str | Path | None = No
     ------
     ConfigError    with one line, for anything that cannot be used
     """
+    as_typed = tuple(overrides)
     typed = override_keys(overrides)
+    plan_vary, fault_vary = (typed_mapping(overrides, key) for key in VARY_KEYS)
+    overrides = [word for word in overrides if not word.startswith(tuple(f"{key}=" for key in VARY_KEYS))]
     fault_words = {
         word.lstrip("+").partition("=")[0]: word for word in overrides if word.lstrip("+").startswith("fault.")
     }
@@ -56,23 +60,24 @@ def read_request(overrides: Sequence[str], *, config_dir: str | Path | None = No
         words = [word for word in others if name is None or not word.startswith("fault=")]
         words += [] if name is None else [f"fault={name}"]
         fault = base["fault"] if name is None else compose(CONFIG_NAME, words, config_dir=config_dir)["fault"]
-        mine = {key: word for key, word in fault_words.items() if key.split(".")[1] in fault}
+        mine = {key: word for key, word in fault_words.items() if key.split(".")[1] in fault and key != "fault.vary"}
         unused.difference_update(mine)
         if mine:
             fault = compose(CONFIG_NAME, [*words, *mine.values()], config_dir=config_dir)["fault"]
-        vary = fault.get("vary") or {}
+        unused.difference_update(f"fault.{key}" for key in fault_vary if key in fault)
+        vary = {**(fault.get("vary") or {}), **{key: spec for key, spec in fault_vary.items() if key in fault}}
         return {**fault, "vary": {key: spec for key, spec in vary.items() if f"fault.{key}" not in mine}}
 
-    unused = set(fault_words)
+    unused = {*fault_words, *(f"fault.{key}" for key in fault_vary)}
     selected = class_fault(None)
     classes = {name: class_fault(name) for name in names}
     if unused:
         raise ConfigError(_no_such_fault_key(sorted(unused)[0], selected))
     plan["classes"] = names
-    plan["vary"] = {key: value for key, value in (plan["vary"] or {}).items() if key not in typed}
+    plan["vary"] = {key: value for key, value in {**(plan["vary"] or {}), **plan_vary}.items() if key not in typed}
     config = {**base, "fault": selected, "classes": classes}
     _reset_derived(config, set(typed) | set(plan["vary"]))
-    return Request(config=config, overrides=tuple(overrides))
+    return Request(config=config, overrides=as_typed)
 
 
 def _no_such_fault_key(key: str, selected: Mapping[str, Any]) -> str:

@@ -131,7 +131,7 @@ def _draw(
 ) -> dict[str, list[Any]]:
     """Values of every varied key, (n,) each, from one space-filling design."""
     points = design_points(config["plan"]["design"], n, len(vary), rng)
-    return {key: values_at(f"{where}: {key}", spec, points[:, k]) for k, (key, spec) in enumerate(vary.items())}
+    return {key: values_at(f"{where}.vary.{key}", spec, points[:, k]) for k, (key, spec) in enumerate(vary.items())}
 
 
 def _draw_faults(

@@ -157,6 +157,11 @@ def _simulate_clean(
 _TWINS: dict[tuple[str, str], Array] = {}
 
 
+def forget_twins() -> None:
+    """Drop what is kept of healthy twins, so that a timing counts them."""
+    _TWINS.clear()
+
+
 def _twin_power(config: Mapping[str, Any], system: SpurPair, row: Mapping[str, Any]) -> Array:
     """Power by channel of the healthy twin of a unit at a condition, from a start of its own; the last one is kept."""
     key = (identity_hash(dict(config), __version__), str(row["condition_id"]))

@@ -83,17 +83,19 @@ def plan(arguments: Namespace) -> int:
     """Dry run: how many records, how many bytes, how long."""
     from gensig.execution.local import n_workers
     from gensig.planning import make_plan, record_bytes
-    from gensig.records import simulate_record
+    from gensig.records import forget_twins, simulate_record
 
     request = read_request(arguments.overrides, config_dir=arguments.config_dir)
     config = request.config
     table = make_plan(config)
-    simulate_record(config, table.record(0))  # compiles, or loads what was compiled
+    conditions = [str(name) for name in table.columns["condition_id"]]
+    probe = [index for index, name in enumerate(conditions) if name == conditions[0]][:8]
+    simulate_record(config, table.record(probe[-1]))  # compiles, or loads what was compiled
+    forget_twins()
     begin = time.monotonic()
-    n_probe = min(3, table.n_records)
-    for index in range(n_probe):
+    for index in probe:
         simulate_record(config, table.record(index))
-    seconds = (time.monotonic() - begin) / n_probe
+    seconds = (time.monotonic() - begin) / len(probe)
     workers = min(n_workers(config["executor"]["n_workers"]), table.n_shards)
     n_bytes = table.n_records * record_bytes(config)
     counts: dict[str, int] = {}

@@ -26,29 +26,29 @@ def check_distribution(key: str, spec: Any) -> None:
     """Raise ConfigError unless ``spec`` is a complete distribution for ``key``."""
     if not isinstance(spec, Mapping) or spec.get("distribution") not in KEYS:
         raise ConfigError(
-            f"vary.{key}: give a distribution, one of {', '.join(KEYS)}, for instance "
+            f"{key}: give a distribution, one of {', '.join(KEYS)}, for instance "
             f"{{distribution: uniform, low: 1, high: 2}}"
         )
     needed = KEYS[spec["distribution"]]
     extra = sorted(set(spec) - {"distribution", *needed})
     missing = [name for name in needed if name not in spec]
     if extra or missing:
-        raise ConfigError(f"vary.{key}: {spec['distribution']} needs exactly {', '.join(needed)}")
+        raise ConfigError(f"{key}: {spec['distribution']} needs exactly {', '.join(needed)}")
     if spec["distribution"] == "choice":
         if not isinstance(spec["values"], list) or not spec["values"]:
-            raise ConfigError(f"vary.{key}: values must be a list with at least one entry")
+            raise ConfigError(f"{key}: values must be a list with at least one entry")
         if not all(isinstance(value, int | float) and not isinstance(value, bool) for value in spec["values"]):
-            raise ConfigError(f"vary.{key}: values must be numbers")
+            raise ConfigError(f"{key}: values must be numbers")
         return
     for name in needed:
         if isinstance(spec[name], bool) or not isinstance(spec[name], int | float) or not math.isfinite(spec[name]):
-            raise ConfigError(f"vary.{key}: {name} = {spec[name]!r} is not a finite number")
+            raise ConfigError(f"{key}: {name} = {spec[name]!r} is not a finite number")
     if spec["low"] > spec["high"] or (spec["distribution"] == "log_uniform" and spec["low"] <= 0.0):
         raise ConfigError(
-            f"vary.{key}: low = {spec['low']:g} and high = {spec['high']:g} are no range for {spec['distribution']}"
+            f"{key}: low = {spec['low']:g} and high = {spec['high']:g} are no range for {spec['distribution']}"
         )
     if spec["distribution"] == "normal" and spec["std"] <= 0.0:
-        raise ConfigError(f"vary.{key}: std = {spec['std']:g} must be positive")
+        raise ConfigError(f"{key}: std = {spec['std']:g} must be positive")
 
 
 def values_at(key: str, spec: Mapping[str, Any], unit: Array) -> list[Any]:

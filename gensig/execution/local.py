@@ -68,8 +68,13 @@ def run_shards(
                             pending.append(index)
                         else:
                             yield index, ShardFailure(index, f"its worker process died {TRIES} times")
-        finally:
-            pool.shutdown(wait=True, cancel_futures=True)
+        except BaseException:
+            # interrupted: what is half done is a temporary file that nobody will mistake for a shard
+            pool.shutdown(wait=False, cancel_futures=True)
+            for process in multiprocessing.active_children():
+                process.terminate()
+            raise
+        pool.shutdown()
 
 
 def _pool(workers: int) -> ProcessPoolExecutor:

@@ -22,7 +22,7 @@ from gensig.mesh.fillet_foundation import fillet_foundation_compliance
 from gensig.mesh.hertz import linear_contact_compliance
 from gensig.mesh.load_distribution import pair_states, static_mesh
 from gensig.mesh.options import MeshOptions
-from gensig.mesh.pair_table import PairTable, pair_compliance, pair_table
+from gensig.mesh.pair_table import PairTable, pair_table
 from gensig.operating import Operating
 from gensig.sensing.chain import Sensing
 from gensig.sensing.decimation import decimator
@@ -130,35 +130,26 @@ class SpurPair:
         pair = self.pair
         table = self.mesh_table(faults)
         position = np.linspace(0.0, pair.path_of_contact, n_positions)
-        sound = pair_compliance(table, position)
-        faulted = self._faulted_tooth(faults)
-        gear = pair.wheel if faulted is not None and faulted[0] == "wheel" else pair.pinion
+        sound, terms = self._terms(position, ()), self._terms(position, faults)
+        gone = any(not tooth.present for tooth in faulty_teeth(pair, faults).values())
+        gear = pair.wheel if faults and faults[0].gear == "wheel" else pair.pinion
         roll = pair.base_pitch * (np.arange(gear.n_teeth * points_per_tooth) + 0.5) / points_per_tooth
         static = static_mesh(table, pair_states(table, roll), self.operating.torque / pair.pinion.base_radius)
         return StiffnessCurves(
             contact_position=position / pair.base_pitch,
-            single_pair_stiffness=1.0 / sound,
-            faulty_pair_stiffness=None if faulted is None else self._faulty_stiffness(table, position, faulted),
-            compliance=self._terms(position, faults),
+            single_pair_stiffness=_stiffness(sound),
+            faulty_pair_stiffness=(0.0 if gone else 1.0) * _stiffness(terms) if faults else None,
+            compliance=terms,
             roll_angle=roll / gear.base_radius,
             mesh_stiffness=static.stiffness,
             load_share=static.load / np.maximum(static.load.sum(axis=1, keepdims=True), 1e-30),
         )
 
-    @staticmethod
-    def _faulted_tooth(faults: Sequence[Fault]) -> tuple[str, int] | None:
-        return (faults[0].gear, faults[0].tooth) if faults else None
-
-    def _faulty_stiffness(self, table: PairTable, position: Array, faulted: tuple[str, int]) -> Array:
-        side = table.pinion if faulted[0] == "pinion" else table.wheel
-        kind = int(side.kind[faulted[1]])
-        if not side.present[kind]:
-            return np.zeros_like(position)
-        kinds = {"pinion_kind": kind} if faulted[0] == "pinion" else {"wheel_kind": kind}
-        return 1.0 / pair_compliance(table, position, **kinds)
-
     def _terms(self, position: Array, faults: Sequence[Fault]) -> dict[str, dict[str, Array]]:
-        """Compliance terms in m/N of the gears' most telling tooth: the faulted one, else a sound one."""
+        """Compliance terms in m/N of each gear's faulty tooth, else of a sound one; they add up to the pair's.
+
+        Half of the contact term of sound flanks belongs to either gear, what a fault adds to it to the faulty one.
+        """
         odd = faulty_teeth(self.pair, faults)
         terms = {}
         for gear, curvature in (
@@ -168,6 +159,7 @@ class SpurPair:
             tooth: Tooth = next((tooth for (name, _), tooth in odd.items() if name == gear.name), healthy_tooth(gear))
             parts = tooth_compliance(tooth, curvature, self.material)
             width = np.interp(curvature, tooth.profile.curvature_radius, tooth.contact_width)
+            sound = linear_contact_compliance(np.array(gear.face_width), self.material)
             terms[gear.name] = {
                 "bending": parts.bending,
                 "shear": parts.shear,
@@ -178,7 +170,7 @@ class SpurPair:
                     self.material,
                     allow_extrapolation=self.mesh.allow_extrapolation,
                 ),
-                "contact": 0.5 * linear_contact_compliance(width, self.material),
+                "contact": linear_contact_compliance(width, self.material) - 0.5 * sound,
             }
         return terms
 
@@ -190,6 +182,11 @@ def severity(faults: Sequence[Fault], pair: GearPair) -> float:
     if value > 1.0:
         raise FaultError(f"the fault's severity is {value:.3g}, above 1: it is larger than its tooth")
     return value
+
+
+def _stiffness(terms: dict[str, dict[str, Array]]) -> Array:
+    """Stiffness of a single pair from its compliance terms, (phase,) N/m."""
+    return 1.0 / np.sum([values for gear in terms.values() for values in gear.values()], axis=0)
 
 
 @lru_cache(maxsize=32)
