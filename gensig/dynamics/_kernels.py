@@ -122,12 +122,14 @@ def _gather(m, table, pinion_row, wheel_row, pinion_error, wheel_error, roll, ap
     tooth_p = (newest + m.start_pinion) % len(pinion_row)
     tooth_w = (newest + m.start_wheel) % len(wheel_row)
     position = roll - newest * m.pitch
+    last_cell = table.shape[1] - 2
+    x = (position - FIRST_PITCH * m.pitch) * m.nodes_per_meter
+    nodes_per_pitch = m.pitch * m.nodes_per_meter
     n_active = 0
     for _ in range(N_PAIRS):
         row_p, row_w = pinion_row[tooth_p], wheel_row[tooth_w]
         if row_p >= 0 and row_w >= 0:
-            x = (position - FIRST_PITCH * m.pitch) * m.nodes_per_meter
-            cell = min(max(int(x), 0), table.shape[1] - 2)
+            cell = min(max(int(x), 0), last_cell)
             gap = _interpolate(table, row_p, row_w, cell, x - cell, 2) + pinion_error[tooth_p] + wheel_error[tooth_w]
             if approach > gap:
                 own = _interpolate(table, row_p, row_w, cell, x - cell, 0) - m.shared
@@ -139,6 +141,7 @@ def _gather(m, table, pinion_row, wheel_row, pinion_error, wheel_error, roll, ap
                 work[5, n_active] = position
                 n_active += 1
         position += m.pitch
+        x += nodes_per_pitch
         tooth_p = tooth_p - 1 if tooth_p > 0 else len(pinion_row) - 1
         tooth_w = tooth_w - 1 if tooth_w > 0 else len(wheel_row) - 1
     return n_active

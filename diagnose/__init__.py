@@ -1,0 +1,1 @@
+"""Small, honest fault classification on gensig data sets."""

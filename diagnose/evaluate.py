@@ -1,0 +1,124 @@
+"""A trained network on a data set, its own or another one, if the two fit."""
+
+from __future__ import annotations
+
+from pathlib import Path
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
+
+from diagnose.model_io import ModelDescription, data_fingerprint, schema_version
+from diagnose.windows import Segments, Task, all_segments, load_windows, subset_segments, task_of
+from gensig.errors import ConfigError, DatasetError
+
+if TYPE_CHECKING:
+    from torch import nn
+
+    from gensig.dataset.reader import Dataset
+
+
+def evaluate_model(
+    model: nn.Module,
+    description: ModelDescription,
+    dataset: Dataset,
+    *,
+    protocol: str | None = None,
+    subset: str | None = None,
+) -> dict[str, Any]:
+    """Score a network by record.
+
+    On the data set it was trained on it is judged on the test part of its protocol; on another one, on every record,
+    unless `protocol` and `subset` say otherwise.
+
+    Parameters
+    ----------
+    model, description : of `diagnose.model_io.load_model`
+    dataset : open data set
+    protocol, subset : part of a split of that data set
+
+    Returns
+    -------
+    plain dictionary: scores with intervals over units, confusion, recall, and what was judged
+
+    Raises
+    ------
+    DatasetError    if schema version, sampling rate, channels or classes do not fit the network
+    ConfigError    for a protocol or subset that does not exist
+    """
+    from diagnose.metrics import over_records
+    from diagnose.study import score_predictions
+    from diagnose.train import predict_windows
+
+    task = _matching_task(description, dataset)
+    segments, part = _segments(task, description, protocol, subset)
+    windows = load_windows(task, segments)
+    record, log_probability = over_records(predict_windows(model, windows), windows.record)
+    scores = score_predictions(task, [(record, log_probability.argmax(axis=1))], description.n_bootstrap)
+    return {
+        "data": str(dataset.folder),
+        "part": part,
+        "n_records": int(record.size),
+        "n_units": int(np.unique(np.asarray(dataset.column("unit_id"))[record]).size),
+        "class_names": list(description.class_names),
+        "model": str(description.model.get("name", "network")),
+        "trained_on_protocol": description.protocol,
+        "seed": description.seed,
+        **scores,
+    }
+
+
+def _matching_task(description: ModelDescription, dataset: Dataset) -> Task:
+    """Task as the network was trained for, on this data set; refuses what does not fit."""
+    where = f"{dataset.folder} does not fit the model"
+    if schema_version(dataset) != description.data_schema_version:
+        raise DatasetError(
+            f"{where}: data schema {schema_version(dataset)}, trained on schema {description.data_schema_version}"
+        )
+    if not np.isclose(dataset.sampling_rate, description.sampling_rate_hz, rtol=1e-9):
+        raise DatasetError(
+            f"{where}: sampled at {dataset.sampling_rate:g} Hz, trained at {description.sampling_rate_hz:g} Hz"
+        )
+    if missing := [name for name in description.channel_names if name not in dataset.channel_names]:
+        raise DatasetError(
+            f"{where}: it has no channel {', '.join(missing)} (it has {', '.join(dataset.channel_names)})"
+        )
+    known, offered = description.class_names, tuple(dataset.class_names)
+    own = data_fingerprint(dataset) == description.data_fingerprint
+    if set(known) - set(offered) or (set(offered) - set(known) and not own):
+        raise DatasetError(f"{where}: its classes are {', '.join(offered)}, the model knows {', '.join(known)}")
+    return task_of(
+        dataset,
+        window_samples=description.window_samples,
+        stride_samples=description.stride_samples,
+        normalise=description.normalise,
+        classes=known,
+        channels=description.channel_names,
+    )
+
+
+def _segments(
+    task: Task, description: ModelDescription, protocol: str | None, subset: str | None
+) -> tuple[Segments, str]:
+    """What to judge, and in words."""
+    own = data_fingerprint(task.dataset) == description.data_fingerprint
+    if protocol is None and subset is not None and not own:
+        raise ConfigError(f"subset={subset} needs protocol=..., one of {', '.join(task.dataset.protocols)}")
+    if protocol is None and own:
+        protocol = description.protocol
+    if protocol is None:
+        return all_segments(task), "all records"
+    subset = subset or "test"
+    note = " (the data set it was trained on)" if own else ""
+    return subset_segments(task, protocol, subset), f"{subset} part of {protocol}{note}"
+
+
+def write_evaluation(folder: Path, result: dict[str, Any]) -> None:
+    """Write ``metrics.json`` and ``confusion.png``."""
+    import json
+
+    from diagnose.figures import confusion_figure
+
+    text = json.dumps(result, indent=2, allow_nan=False)
+    (folder / "metrics.json").write_text(text + "\n", encoding="utf-8")
+    title = f"{result['model']}, {result['part']}"
+    confusion_figure(folder / "confusion.png", result["confusion"], result["class_names"], title)

@@ -1,0 +1,68 @@
+"""Figures of a study as PNG, readable without telling red from green."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+
+# Okabe & Ito (2008), "Color universal design", without the yellow.
+COLORS = ("#0072B2", "#D55E00", "#009E73", "#CC79A7", "#56B4E9", "#E69F00", "#000000")
+MARKERS = ("o", "s", "^", "D", "v", "P", "X")
+
+
+def confusion_figure(path: Path, confusion: Sequence[Sequence[int]], class_names: Sequence[str], title: str) -> None:
+    """Share of each true class given each label, with counts of records (summed over seeds)."""
+    figure, axes = _subplots(1, size=(1.2 * len(class_names) + 2.4, 1.0 * len(class_names) + 1.9))
+    counts = np.asarray(confusion)
+    total = counts.sum(axis=1, keepdims=True)
+    share = np.divide(counts, total, out=np.zeros(counts.shape), where=total > 0)
+    image = axes[0].imshow(share, cmap="cividis", vmin=0, vmax=1)
+    for (row, column), value in np.ndenumerate(share):
+        text = f"{value:.2f}\n({counts[row, column]})"
+        color = "black" if value > 0.5 else "white"
+        axes[0].text(column, row, text, ha="center", va="center", color=color, fontsize=9)
+    ticks = range(len(class_names))
+    axes[0].set_xticks(ticks, class_names, rotation=20, ha="right")
+    axes[0].set_yticks(ticks, class_names)
+    axes[0].set(xlabel="predicted", ylabel="true", title=title)
+    figure.colorbar(image, ax=axes[0], label="share of the true class", fraction=0.046)
+    _save(figure, path)
+
+
+def severity_figure(path: Path, protocols: Mapping[str, Sequence[Mapping[str, Any]]]) -> None:
+    """Share of faulty records recognised against severity, one panel a protocol; rows of `study.severity_rows`."""
+    figure, axes = _subplots(len(protocols), size=(4.2 * len(protocols) + 0.6, 3.6))
+    classes = list(dict.fromkeys(row["class"] for rows in protocols.values() for row in rows))
+    for panel, (protocol, rows) in zip(axes, protocols.items(), strict=True):
+        for index, name in enumerate(classes):
+            mine = [row for row in rows if row["class"] == name]
+            middle = [(row["severity_low"] + row["severity_high"]) / 2 for row in mine]
+            panel.plot(
+                middle,
+                [row["recall"] for row in mine],
+                color=COLORS[index % len(COLORS)],
+                marker=MARKERS[index % len(MARKERS)],
+                label=name,
+            )
+        panel.set(xlabel="severity (0 healthy, 1 most severe)", ylim=(-0.03, 1.03), title=protocol)
+        panel.grid(alpha=0.3)
+    axes[0].set_ylabel("share of records recognised")
+    axes[0].legend(loc="best", fontsize=8)
+    _save(figure, path)
+
+
+def _subplots(n_panels: int, *, size: tuple[float, float]) -> tuple[Any, list[Any]]:
+    """Figure and axes without touching the state of pyplot, so that no display is needed."""
+    from matplotlib.backends.backend_agg import FigureCanvasAgg
+    from matplotlib.figure import Figure
+
+    figure = Figure(figsize=size, layout="constrained")
+    FigureCanvasAgg(figure)
+    return figure, list(np.atleast_1d(figure.subplots(1, n_panels)))
+
+
+def _save(figure: Any, path: Path) -> None:
+    figure.savefig(path, dpi=120, metadata={"Software": None})

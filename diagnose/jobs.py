@@ -1,0 +1,175 @@
+"""The independent pieces of a study, run on every core: same results whatever their number and order.
+
+Each piece runs with one thread, in a spawned process or, when there is one core, in this one.
+"""
+
+from __future__ import annotations
+
+import multiprocessing
+from collections.abc import Callable, Iterator, Sequence
+from concurrent.futures import ProcessPoolExecutor, as_completed
+from concurrent.futures.process import BrokenProcessPool
+from contextlib import contextmanager
+from dataclasses import dataclass
+from typing import Any
+
+import numpy as np
+import torch
+from numpy.typing import NDArray
+
+from diagnose.baselines import indicator_model, rms_threshold
+from diagnose.features import Cache, feature_table
+from diagnose.metrics import over_records
+from diagnose.settings import TrainSettings
+from diagnose.train import predict_windows, train_network, with_shuffled_labels
+from diagnose.windows import SUBSETS, Task, WindowSet, load_windows, subset_segments
+from gensig.errors import GensigError
+
+BASELINES = ("indicators", "indicators_without_level", "rms_threshold")
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class Job:
+    """One training (with or without shuffled labels), or with seed None the baselines of all the protocols."""
+
+    protocols: tuple[str, ...]
+    seed: int | None
+    shuffled: bool = False
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class Prediction:
+    """Test records of a protocol with their predicted labels, and what was fitted or trained."""
+
+    protocol: str
+    method: str
+    seed: int
+    record: NDArray[np.integer]
+    predicted: NDArray[np.integer]
+    detail: str
+    weights: dict[str, NDArray[Any]] | None = None
+    best_epoch: int = 0
+    validation_loss: tuple[float, ...] = ()
+
+
+def run_jobs(
+    task: Task,
+    settings: TrainSettings,
+    jobs: Sequence[Job],
+    *,
+    n_workers: int,
+    on_done: Callable[[list[Prediction]], None],
+) -> list[Prediction]:
+    """Run all jobs and collect their predictions in the order of the jobs.
+
+    Raises
+    ------
+    GensigError    as raised by a job, or if a worker was killed
+    """
+    if n_workers == 1 or len(jobs) == 1:
+        results = []
+        with _one_thread():
+            for job in jobs:
+                results.append(run_job(task, settings, job))
+                on_done(results[-1])
+        _loaded.clear()
+        return [prediction for result in results for prediction in result]
+    context = multiprocessing.get_context("spawn")
+    executor = ProcessPoolExecutor(min(n_workers, len(jobs)), context, _start_worker, (task, settings))
+    try:
+        futures = [executor.submit(_run_in_worker, job) for job in jobs]
+        for future in as_completed(futures):
+            on_done(future.result())
+        return [prediction for future in futures for prediction in future.result()]
+    except BrokenProcessPool:
+        raise GensigError(
+            "a worker process was killed (out of memory?); set n_threads=1 or use fewer records"
+        ) from None
+    finally:
+        executor.shutdown(wait=True, cancel_futures=True)
+
+
+def run_job(task: Task, settings: TrainSettings, job: Job) -> list[Prediction]:
+    """Predictions on the test part of each of the job's protocols."""
+    if job.seed is None:
+        cache: Cache = {}
+        return [prediction for name in job.protocols for prediction in _run_baselines(task, name, cache)]
+    return [_run_training(task, settings, name, job.seed, job.shuffled) for name in job.protocols]
+
+
+def _run_training(task: Task, settings: TrainSettings, protocol: str, seed: int, shuffled: bool) -> Prediction:
+    n_classes = len(task.class_names)
+    train, validation, test = (_windows(task, protocol)[subset] for subset in SUBSETS)
+    if shuffled:
+        rng = np.random.default_rng([seed, 2])
+        train = with_shuffled_labels(train, n_classes, rng)
+        validation = with_shuffled_labels(validation, n_classes, rng)
+    training = train_network(
+        train, validation, model_config=settings.model, n_classes=n_classes, settings=settings, seed=seed
+    )
+    record, log_probability = over_records(predict_windows(training.model, test), test.record)
+    return Prediction(
+        protocol=protocol,
+        method="label_shuffle" if shuffled else str(settings.model.get("name", "network")),
+        seed=seed,
+        record=record,
+        predicted=log_probability.argmax(axis=1),
+        detail=f"best epoch {training.best_epoch} of {len(training.validation_loss)}",
+        weights=None if shuffled else {key: value.numpy() for key, value in training.model.state_dict().items()},
+        best_epoch=training.best_epoch,
+        validation_loss=training.validation_loss,
+    )
+
+
+def _run_baselines(task: Task, protocol: str, cache: Cache) -> list[Prediction]:
+    n_classes = len(task.class_names)
+    train, validation, test = (
+        feature_table(task, subset_segments(task, protocol, subset), cache=cache) for subset in SUBSETS
+    )
+    fitted = {
+        "indicators": indicator_model(train, validation, test, n_classes=n_classes, with_level=True),
+        "indicators_without_level": indicator_model(train, validation, test, n_classes=n_classes, with_level=False),
+        "rms_threshold": rms_threshold(train, test, n_classes=n_classes),
+    }
+    return [
+        Prediction(protocol=protocol, method=method, seed=0, record=record, predicted=predicted, detail=detail)
+        for method, (detail, record, predicted) in fitted.items()
+    ]
+
+
+# Windows of the protocol a process works on; jobs come protocol by protocol.
+_loaded: dict[str, dict[str, WindowSet]] = {}
+_work: dict[str, Any] = {}
+
+
+def _windows(task: Task, protocol: str) -> dict[str, WindowSet]:
+    if protocol not in _loaded:
+        _loaded.clear()
+        _loaded[protocol] = {name: load_windows(task, subset_segments(task, protocol, name)) for name in SUBSETS}
+    return _loaded[protocol]
+
+
+def _start_worker(task: Task, settings: TrainSettings) -> None:
+    from threadpoolctl import threadpool_limits
+
+    torch.set_num_threads(1)
+    threadpool_limits(1)
+    _work.update(task=task, settings=settings)
+
+
+def _run_in_worker(job: Job) -> list[Prediction]:
+    return run_job(_work["task"], _work["settings"], job)
+
+
+@contextmanager
+def _one_thread() -> Iterator[None]:
+    """One thread for torch and the BLAS, as before afterwards."""
+    from threadpoolctl import threadpool_limits
+
+    before = torch.get_num_threads()
+    torch.set_num_threads(1)
+    try:
+        with threadpool_limits(1):
+            yield
+    finally:
+        torch.set_num_threads(before)

@@ -1,0 +1,126 @@
+"""Scores over records with intervals over units: windows of one machine are no independent witnesses."""
+
+from __future__ import annotations
+
+import warnings
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+
+IntArray = NDArray[np.integer]
+FloatArray = NDArray[np.floating]
+CountArray = NDArray[np.integer]
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class Score:
+    """Mean over seeds, its 95 % interval over units, and each seed's own value."""
+
+    mean: float
+    low: float
+    high: float
+    per_seed: tuple[float, ...]
+
+
+def over_records(log_probability: FloatArray, record: IntArray) -> tuple[IntArray, FloatArray]:
+    """Prediction of a record: the mean of the log-probabilities of its windows.
+
+    Parameters
+    ----------
+    log_probability : (window, class)
+    record : (window,)
+
+    Returns
+    -------
+    record : (record,) sorted, each once
+    log_probability : (record, class)
+    """
+    records, position = np.unique(record, return_inverse=True)
+    total = np.zeros((records.size, log_probability.shape[1]))
+    np.add.at(total, position, log_probability)
+    return records, total / np.bincount(position)[:, None]
+
+
+def confusion_by_unit(label: IntArray, predicted: IntArray, unit: NDArray, n_classes: int) -> NDArray[np.int64]:
+    """Counts (unit, true class, predicted class) from three (record,) arrays, units in sorted order."""
+    names, position = np.unique(unit, return_inverse=True)
+    counts = np.zeros((names.size, n_classes, n_classes), dtype=np.int64)
+    np.add.at(counts, (position, label, predicted), 1)
+    return counts
+
+
+def recall(confusion: CountArray) -> FloatArray:
+    """(..., class) share of each true class found, from counts (..., true, predicted); NaN for an absent class."""
+    totals = confusion.sum(axis=-1)
+    hits = np.diagonal(confusion, axis1=-2, axis2=-1).astype(float)
+    return np.divide(hits, totals, out=np.full(totals.shape, np.nan), where=totals > 0)
+
+
+def balanced_accuracy(confusion: CountArray) -> FloatArray:
+    """(...) mean recall over the classes present, from counts (..., true, predicted)."""
+    return _nanmean(recall(confusion))
+
+
+def macro_f1(confusion: CountArray) -> FloatArray:
+    """(...) mean over the classes present of the harmonic mean of precision and recall."""
+    true_total, predicted_total = confusion.sum(axis=-1), confusion.sum(axis=-2)
+    hits = np.diagonal(confusion, axis1=-2, axis2=-1).astype(float)
+    total = true_total + predicted_total
+    f1 = np.divide(2 * hits, total, out=np.full(total.shape, np.nan), where=true_total > 0)
+    return _nanmean(f1)
+
+
+SCORES = {"balanced_accuracy": balanced_accuracy, "macro_f1": macro_f1}
+
+
+def score_with_interval(
+    name: str, confusion: NDArray[np.int64], *, n_bootstrap: int, rng: np.random.Generator, shuffled: bool = False
+) -> Score:
+    """Score with a 95 % interval by bootstrap over units.
+
+    Parameters
+    ----------
+    name : key of `SCORES`
+    confusion : (seed, unit, true class, predicted class) counts of records
+    n_bootstrap : resamples, each drawing as many units as there are, with all their records, and as many seeds
+    rng : source of the resamples
+    shuffled : whether the labels of the training were shuffled; the interval then covers the luck of the shuffle too
+
+    Source: percentile interval of Efron & Tibshirani (1993), "An introduction to the bootstrap", section 13.3. With few
+    units it is too narrow: it is no wider than what the units at hand show.
+    """
+    score = SCORES[name]
+    per_seed = score(confusion.sum(axis=1))
+    n_seeds, n_units = confusion.shape[:2]
+    times_drawn = rng.multinomial(n_units, np.full(n_units, 1 / n_units), size=n_bootstrap)
+    resampled = score(np.einsum("bu,sutp->bstp", times_drawn, confusion))
+    if shuffled:
+        resampled = resampled + _renaming_luck(name, confusion.sum(axis=1), n_bootstrap, rng)
+    seeds_drawn = rng.integers(n_seeds, size=(n_bootstrap, n_seeds))
+    means = np.take_along_axis(resampled, seeds_drawn, axis=1).mean(axis=1)
+    low, high = np.clip(np.nanquantile(means, [0.025, 0.975]), 0, 1)
+    return Score(
+        mean=float(np.mean(per_seed)), low=float(low), high=float(high), per_seed=tuple(float(v) for v in per_seed)
+    )
+
+
+def _renaming_luck(
+    name: str, confusion: NDArray[np.int64], n_draws: int, rng: np.random.Generator
+) -> NDArray[np.floating]:
+    """How far a score strays, (draw, seed), when the predicted classes (last axis) are renamed at random.
+
+    A network that finds the groups but was told nothing of their names scores by luck: all of a class right or wrong.
+    Without a leak every naming is as likely, so that the namings not seen show the spread of the one that was.
+    """
+    n_seeds, n_classes = confusion.shape[:2]
+    names = rng.permuted(np.tile(np.arange(n_classes), (n_draws, n_seeds, 1)), axis=2)
+    renamed = np.take_along_axis(confusion[None], names[:, :, None, :], axis=3)
+    scores = SCORES[name](renamed)
+    return scores - scores.mean(axis=0)
+
+
+def _nanmean(values: FloatArray) -> FloatArray:
+    with warnings.catch_warnings():
+        warnings.simplefilter("ignore", category=RuntimeWarning)
+        return np.nanmean(values, axis=-1)

@@ -1,0 +1,139 @@
+"""Trained networks on disk: ``model.safetensors`` for the weights, ``model.json`` for what they mean. Never pickle."""
+
+from __future__ import annotations
+
+import hashlib
+import json
+from collections.abc import Mapping
+from dataclasses import asdict, dataclass
+from pathlib import Path
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
+
+from diagnose.settings import TrainSettings
+from diagnose.windows import Task
+from gensig.errors import DatasetError
+
+if TYPE_CHECKING:
+    from torch import nn
+
+    from diagnose.jobs import Prediction
+    from gensig.dataset.reader import Dataset
+
+MODEL_SCHEMA_VERSION = 1
+WEIGHTS, DESCRIPTION = "model.safetensors", "model.json"
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class ModelDescription:
+    """What a network was trained on and what it expects; the content of ``model.json``."""
+
+    model_schema_version: int
+    model: dict[str, Any]
+    class_names: tuple[str, ...]
+    channel_names: tuple[str, ...]
+    sampling_rate_hz: float
+    window_samples: int
+    stride_samples: int
+    normalise: str
+    data_schema_version: int | None
+    data_fingerprint: str
+    protocol: str
+    seed: int
+    best_epoch: int
+    n_bootstrap: int
+
+
+def model_description(task: Task, settings: TrainSettings, prediction: Prediction) -> ModelDescription:
+    """Description of the network behind a prediction."""
+    return ModelDescription(
+        model_schema_version=MODEL_SCHEMA_VERSION,
+        model=dict(settings.model),
+        class_names=task.class_names,
+        channel_names=task.channel_names,
+        sampling_rate_hz=float(task.dataset.sampling_rate),
+        window_samples=task.window_samples,
+        stride_samples=task.stride_samples,
+        normalise=task.normalise,
+        data_schema_version=schema_version(task.dataset),
+        data_fingerprint=data_fingerprint(task.dataset),
+        protocol=prediction.protocol,
+        seed=prediction.seed,
+        best_epoch=prediction.best_epoch,
+        n_bootstrap=settings.n_bootstrap,
+    )
+
+
+def save_model(folder: Path, weights: Mapping[str, np.ndarray], description: ModelDescription) -> None:
+    """Write both files into a new folder."""
+    from safetensors.numpy import save_file
+
+    folder.mkdir(parents=True)
+    save_file({key: np.ascontiguousarray(value) for key, value in weights.items()}, folder / WEIGHTS)
+    (folder / DESCRIPTION).write_text(json.dumps(asdict(description), indent=2) + "\n", encoding="utf-8")
+
+
+def load_model(folder: str | Path) -> tuple[nn.Module, ModelDescription]:
+    """Network in evaluation mode, and its description.
+
+    Raises
+    ------
+    DatasetError    for a folder without the two files, another schema, or weights that do not belong to the network
+    """
+    from safetensors import SafetensorError
+    from safetensors.torch import load_file
+
+    from diagnose.models import build_model
+
+    folder = Path(folder)
+    description = _read_description(folder)
+    model = build_model(
+        description.model, n_channels=len(description.channel_names), n_classes=len(description.class_names)
+    )
+    try:
+        model.load_state_dict(load_file(folder / WEIGHTS))
+    except FileNotFoundError:
+        raise DatasetError(f"{folder} holds no {WEIGHTS}") from None
+    except (SafetensorError, OSError) as error:
+        raise DatasetError(f"{folder / WEIGHTS} is not a safetensors file: {_one_line(error)}") from None
+    except RuntimeError as error:
+        raise DatasetError(f"{folder / WEIGHTS} does not fit {DESCRIPTION}: {_one_line(error)}") from None
+    return model.eval(), description
+
+
+def schema_version(dataset: Dataset) -> int | None:
+    """Version of the data set's format, None where it does not say."""
+    version = dataset.attributes.get("schema_version")
+    return None if version is None else int(version)
+
+
+def data_fingerprint(dataset: Dataset) -> str:
+    """Hash over identity, label, unit and measured speed of every record: the same data set, the same text."""
+    digest = hashlib.sha256()
+    for name in ("record_id", "unit_id", "label"):
+        digest.update("\n".join(str(value) for value in dataset.column(name)).encode())
+    digest.update(np.asarray(dataset.column("speed_rpm"), dtype="<f8").tobytes())
+    return digest.hexdigest()
+
+
+def _read_description(folder: Path) -> ModelDescription:
+    path = folder / DESCRIPTION
+    try:
+        content = json.loads(path.read_text(encoding="utf-8"))
+        version = content["model_schema_version"]
+        if version != MODEL_SCHEMA_VERSION:
+            raise DatasetError(f"{path}: model schema {version!r}, this program reads {MODEL_SCHEMA_VERSION}")
+        for name in ("class_names", "channel_names"):
+            content[name] = tuple(str(value) for value in content[name])
+        return ModelDescription(**content)
+    except FileNotFoundError:
+        inside = sorted(child.name for child in (folder / "models").glob("*") if (child / DESCRIPTION).is_file())
+        hint = f"; choose one of its models, for instance {folder / 'models' / inside[0]}" if inside else ""
+        raise DatasetError(f"{folder} holds no {DESCRIPTION}{hint}") from None
+    except (OSError, ValueError, KeyError, TypeError) as error:
+        raise DatasetError(f"{path} does not describe a model: {_one_line(error)}") from None
+
+
+def _one_line(error: Exception) -> str:
+    return " ".join(str(error).split())[:160]

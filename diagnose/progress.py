@@ -1,0 +1,52 @@
+"""How far a study is: a bar on a terminal, plain lines elsewhere."""
+
+from __future__ import annotations
+
+import sys
+import time
+from collections.abc import Callable, Iterator
+from contextlib import contextmanager
+
+
+@contextmanager
+def progress(n_steps: int) -> Iterator[Callable[[str], None]]:
+    """Give a function to call with one line for each finished step."""
+    started = time.perf_counter()
+    if sys.stderr.isatty():
+        with _bar(n_steps) as advance:
+            yield advance
+        return
+    done = 0
+
+    def write(line: str) -> None:
+        nonlocal done
+        done += 1
+        elapsed = time.perf_counter() - started
+        print(f"[{done}/{n_steps}] {elapsed:.0f} s  {line}", file=sys.stderr, flush=True)
+
+    yield write
+
+
+@contextmanager
+def _bar(n_steps: int) -> Iterator[Callable[[str], None]]:
+    from rich.console import Console
+    from rich.progress import (
+        BarColumn,
+        MofNCompleteColumn,
+        Progress,
+        TextColumn,
+        TimeElapsedColumn,
+        TimeRemainingColumn,
+    )
+
+    columns = (
+        BarColumn(),
+        MofNCompleteColumn(),
+        TimeElapsedColumn(),
+        TextColumn("left"),
+        TimeRemainingColumn(),
+        TextColumn("{task.description}", markup=False),
+    )
+    with Progress(*columns, console=Console(stderr=True)) as bar:
+        task = bar.add_task("training", total=n_steps)
+        yield lambda line: bar.update(task, advance=1, description=line)

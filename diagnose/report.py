@@ -1,0 +1,171 @@
+"""The result of a study for readers: ``metrics.json``, figures and one Markdown page."""
+
+from __future__ import annotations
+
+import json
+from collections.abc import Mapping, Sequence
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+
+from diagnose.figures import confusion_figure, severity_figure
+
+FEW_UNITS = 10
+CONFUSED = 0.1
+
+
+def write_report(folder: Path, metrics: Mapping[str, Any]) -> Path:
+    """Write ``metrics.json``, ``confusion_<protocol>.png``, ``severity.png`` and ``report.md``; return the page."""
+    (folder / "metrics.json").write_text(json.dumps(metrics, indent=2, allow_nan=False) + "\n", encoding="utf-8")
+    model = metrics["model"]
+    for protocol, result in metrics["protocols"].items():
+        title = f"{model}, {protocol}" + (" (LEAKY)" if result["leaky"] else "")
+        path = folder / f"confusion_{protocol}.png"
+        confusion_figure(path, result["methods"][model]["confusion"], metrics["class_names"], title)
+    rows = {name: result["by_severity"] for name, result in metrics["protocols"].items() if not result["leaky"]}
+    rows = {name: part for name, part in rows.items() if part}
+    if rows:
+        severity_figure(folder / "severity.png", rows)
+    page = folder / "report.md"
+    page.write_text("\n".join(_page(metrics, list(rows))) + "\n", encoding="utf-8")
+    return page
+
+
+def result_table(metrics: Mapping[str, Any]) -> list[str]:
+    """Markdown table of protocol x method: balanced accuracy with its 95 % interval, leaky protocols last."""
+    columns = {
+        metrics["model"]: metrics["model"].upper(),
+        "indicators": "indicators",
+        "indicators_without_level": "indicators without RMS",
+        "rms_threshold": "RMS threshold",
+        "label_shuffle": "label shuffle",
+        "chance": "chance",
+    }
+    results = metrics["protocols"]
+    shown = [key for key in columns if any(key in result["methods"] for result in results.values())]
+    lines = [
+        "| protocol | " + " | ".join(columns[key] for key in shown) + " |",
+        "|---" * (len(shown) + 1) + "|",
+    ]
+    for name, result in sorted(results.items(), key=lambda item: item[1]["leaky"]):
+        label = f"*{name}* (LEAKY: not a result)" if result["leaky"] else f"**{name}**"
+        lines.append("| " + " | ".join([label, *(_cell(result["methods"].get(key)) for key in shown)]) + " |")
+    return lines
+
+
+def _cell(method: Mapping[str, Any] | None) -> str:
+    if method is None:
+        return "-"
+    value = method["balanced_accuracy"]
+    if isinstance(value, float):
+        return f"{value:.2f}"
+    return f"{value['mean']:.2f} [{value['low']:.2f}, {value['high']:.2f}]"
+
+
+def _page(metrics: Mapping[str, Any], with_severity: Sequence[str]) -> list[str]:
+    results = metrics["protocols"]
+    settings = metrics["settings"]
+    window_ms = 1e3 * settings["window_samples"] / metrics["sampling_rate_hz"]
+    level = "level removed (RMS-normalised)" if settings["normalise"] == "rms" else "level kept"
+    lines = [
+        "# Which faults can be told apart",
+        "",
+        f"Data: `{_safe(metrics['data'])}`, {metrics['n_records']} records, classes {_list(metrics['class_names'])}; "
+        f"channels {_list(metrics['channel_names'])} at {metrics['sampling_rate_hz']:g} Hz. "
+        f"Network: {metrics['model']} on windows of {window_ms:.0f} ms, {level}, {len(settings['seeds'])} seed(s).",
+        "",
+        *[f"- {_headline(name, result, metrics['model'])}" for name, result in results.items() if not result["leaky"]],
+        "",
+        "Balanced accuracy over test records, mean over seeds [95 % interval over units]:",
+        "",
+        *result_table(metrics),
+        "",
+        "## What the numbers mean",
+        "",
+        "- **Balanced accuracy**: mean over the classes of the share of records recognised. A record's label is the "
+        "class with the largest mean log-probability over its windows.",
+        "- **by_unit**: tested on machines (unit = one set of gears in one gearbox) never seen in training. "
+        "**cross_specimen**: on sets of gears never seen.",
+        "- **LEAKY**: windows of one record on both sides of the split, as in many papers. It shows how much a "
+        "careless split flatters; it is no measure of diagnosis.",
+        "- **indicators**: logistic regression or gradient boosting (chosen on validation units) on RMS, kurtosis, "
+        "crest factor, FM4 and sideband ratio of every channel over the whole stretch of signal; it knows the speed "
+        "and the tooth counts. **RMS threshold**: thresholds on the level alone.",
+        "- **label shuffle**: the same training on shuffled labels. Chance must lie in its interval, which covers the "
+        "units and the luck of the shuffle; if it lies below, something leaks.",
+        "",
+        "## Which classes are confused",
+        "",
+    ]
+    for name, result in results.items():
+        if not result["leaky"]:
+            lines += _confusions(name, result["methods"][metrics["model"]]["confusion"], metrics["class_names"])
+    lines += ["", *[f"![confusion, {name}](confusion_{name}.png)" for name in results]]
+    if with_severity:
+        lines += ["", "## How severe a fault must be", "", "![recognised by severity](severity.png)"]
+    lines += ["", "## Caveats", "", *_caveats(metrics), ""]
+    lines.append("Everything in numbers, with macro-F1, recall and settings: `metrics.json`. Networks: `models/`.")
+    return lines
+
+
+def _headline(name: str, result: Mapping[str, Any], model: str) -> str:
+    """One sentence: the score against chance and against the best baseline."""
+    methods = result["methods"]
+    score, chance = methods[model]["balanced_accuracy"], methods["chance"]["balanced_accuracy"]
+    verdict = "above chance" if score["low"] > chance else "not distinguishable from chance"
+    text = f"**{name}**: {model} {score['mean']:.2f}, {verdict} ({chance:.2f})"
+    others = {key: methods[key] for key in ("indicators", "rms_threshold") if key in methods}
+    if others:
+        best = max(others, key=lambda key: others[key]["balanced_accuracy"]["mean"])
+        value = others[best]["balanced_accuracy"]["mean"]
+        comparison = "better than" if score["mean"] > value else "no better than"
+        text += f"; {comparison} the {best.replace('_', ' ')} baseline ({value:.2f})"
+    if "label_shuffle" in methods:
+        shuffled = methods["label_shuffle"]["balanced_accuracy"]
+        text += "; label shuffle " + (
+            "at chance" if shuffled["low"] <= chance else f"ABOVE chance ({shuffled['mean']:.2f}): look for a leak"
+        )
+    return text + "."
+
+
+def _confusions(name: str, confusion: Sequence[Sequence[int]], class_names: Sequence[str]) -> list[str]:
+    """The largest off-diagonal shares of a protocol, at most three."""
+    found = []
+    for true, row in enumerate(confusion):
+        total = max(int(np.sum(row)), 1)
+        for predicted, count in enumerate(row):
+            if true != predicted and count / total >= CONFUSED:
+                found.append((count / total, class_names[true], class_names[predicted]))
+    if not found:
+        return [f"- **{name}**: no class is taken for another in {CONFUSED:.0%} of its records or more."]
+    pairs = [f"{_safe(a)} taken for {_safe(b)} ({share:.0%})" for share, a, b in sorted(found, reverse=True)[:3]]
+    return [f"- **{name}**: " + "; ".join(pairs) + "."]
+
+
+def _caveats(metrics: Mapping[str, Any]) -> list[str]:
+    lines = ["- Simulated vibration. A score here says nothing yet about measured machines."]
+    for name, result in metrics["protocols"].items():
+        n_units = result["n_units"]["test"]
+        if n_units < FEW_UNITS and not result["leaky"]:
+            lines.append(
+                f"- {name}: only {n_units} test unit(s). The interval shows the spread of these units and is too "
+                f"narrow for new ones; at least {FEW_UNITS} are advisable."
+            )
+    if metrics["settings"]["normalise"] == "rms":
+        lines.append(
+            "- The network sees windows without their level, the indicators with it unless stated; "
+            "`normalise=none` gives the level to the network too."
+        )
+    if metrics["n_records_unusable"]:
+        lines.append(f"- {metrics['n_records_unusable']} record(s) failed in simulation and are left out.")
+    return lines
+
+
+def _list(names: Sequence[str]) -> str:
+    return ", ".join(_safe(name) for name in names)
+
+
+def _safe(text: str) -> str:
+    """Text from a file without what Markdown or HTML would act on."""
+    return "".join(character if character.isalnum() or character in " _-./:," else "?" for character in text)

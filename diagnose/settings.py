@@ -1,0 +1,100 @@
+"""Settings of a training run, checked once; the values live in ``configs/train.yaml``."""
+
+from __future__ import annotations
+
+import dataclasses
+from collections.abc import Mapping
+from dataclasses import dataclass
+from typing import Any
+
+from gensig.errors import ConfigError
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class TrainSettings:
+    """What ``diagnose train`` is told; each key is explained in ``configs/train.yaml``."""
+
+    data: str
+    out: str
+    model: Mapping[str, Any]
+    protocols: tuple[str, ...] | None
+    classes: tuple[str, ...] | None
+    channels: tuple[str, ...] | None
+    seeds: tuple[int, ...]
+    window_samples: int
+    stride_samples: int
+    normalise: str
+    epochs: int
+    patience: int
+    batch_size: int
+    learning_rate: float
+    weight_decay: float
+    epoch_fraction: float
+    shuffle_control: bool
+    n_seeds_control: int
+    baselines: bool
+    n_bootstrap: int
+    n_threads: int | None
+
+    def __post_init__(self) -> None:
+        for name in (
+            "window_samples",
+            "stride_samples",
+            "epochs",
+            "patience",
+            "n_seeds_control",
+            "n_bootstrap",
+        ):
+            _check_whole(name, getattr(self, name), least=1)
+        _check_whole("batch_size", self.batch_size, least=2)
+        if self.n_threads is not None:
+            _check_whole("n_threads", self.n_threads, least=1)
+        for name in ("learning_rate", "weight_decay", "epoch_fraction"):
+            _check_number(name, getattr(self, name))
+        for name in ("protocols", "classes", "channels", "seeds"):
+            values = getattr(self, name)
+            if values is not None and (not values or len(set(values)) < len(values)):
+                raise ConfigError(f"{name} must be a list of different values, at least one")
+        for seed in self.seeds:
+            _check_whole("seeds", seed, least=0)
+        for name in ("shuffle_control", "baselines"):
+            if not isinstance(getattr(self, name), bool):
+                raise ConfigError(f"{name} must be true or false, not {getattr(self, name)!r}")
+
+
+def settings_from(config: Mapping[str, Any]) -> TrainSettings:
+    """Settings of a composed configuration.
+
+    Raises
+    ------
+    ConfigError    for a key too many or a value out of range
+    """
+    known = {field.name for field in dataclasses.fields(TrainSettings)}
+    if unknown := sorted(set(config) - known):
+        raise ConfigError(f"diagnose train knows no key '{unknown[0]}'")
+    values = dict(config)
+    for name in ("protocols", "classes", "channels", "seeds"):
+        values[name] = _as_tuple(name, values[name])
+    if values["seeds"] is None:
+        raise ConfigError("seeds must be a list of different values, at least one")
+    values["data"], values["out"] = str(values["data"]), str(values["out"])
+    return TrainSettings(**values)
+
+
+def _as_tuple(name: str, value: Any) -> tuple[Any, ...] | None:
+    """None stays, one value becomes a list of one."""
+    if value is None:
+        return None
+    if isinstance(value, Mapping):
+        raise ConfigError(f"{name} must be a list, for instance {name}=[a,b]")
+    return tuple(value) if isinstance(value, list) else (value,)
+
+
+def _check_whole(name: str, value: Any, *, least: int) -> None:
+    if isinstance(value, bool) or not isinstance(value, int) or value < least:
+        raise ConfigError(f"{name} must be a whole number of at least {least}, not {value!r}")
+
+
+def _check_number(name: str, value: Any) -> None:
+    if isinstance(value, bool) or not isinstance(value, int | float) or not 0 <= value <= 1:
+        raise ConfigError(f"{name} must be a number from 0 to 1, not {value!r}")

@@ -1,0 +1,243 @@
+"""A whole study: every protocol, seed, control and baseline, and the numbers that come of them."""
+
+from __future__ import annotations
+
+import os
+import platform
+import sys
+import time
+from collections.abc import Callable, Sequence
+from dataclasses import asdict
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+import gensig
+from diagnose.jobs import BASELINES, Job, Prediction, run_jobs
+from diagnose.metrics import SCORES, confusion_by_unit, recall, score_with_interval
+from diagnose.model_io import data_fingerprint, model_description, save_model
+from diagnose.models import build_model
+from diagnose.settings import TrainSettings
+from diagnose.windows import SUBSETS, Task, plan_windows, subset_segments, task_of
+from gensig.errors import ConfigError
+
+METRICS_SCHEMA_VERSION = 1
+BOOTSTRAP_SEED = 20240607
+MAX_SEVERITY_BINS = 5
+
+
+def is_leaky(protocol: str) -> bool:
+    """Whether a protocol has the same record on both sides; such a score is no measure of diagnosis."""
+    return "leaky" in protocol
+
+
+def plan_study(task: Task, settings: TrainSettings) -> tuple[tuple[str, ...], list[Job]]:
+    """Protocols, leaky ones last, and their jobs, after checking that every subset can be used.
+
+    Raises
+    ------
+    ConfigError    for a protocol that does not exist, an empty subset or a window that does not fit
+    """
+    wanted = settings.protocols if settings.protocols is not None else tuple(task.dataset.protocols)
+    if not wanted:
+        raise ConfigError(f"{task.dataset.folder} has no splits: too few units or records to hold any out")
+    protocols = tuple(sorted(wanted, key=lambda name: (is_leaky(name), wanted.index(name))))
+    labels = task.labels()
+    for protocol in protocols:
+        for subset in SUBSETS:
+            segments = subset_segments(task, protocol, subset)
+            plan_windows(segments, task.window_samples, task.stride_samples)
+            present = np.unique(labels[segments.record])
+            if subset != "validation" and present.size < 2:
+                name = task.class_names[int(present[0])]
+                raise ConfigError(f"protocol {protocol}: one class only in its {subset} part ({name})")
+    build_model(settings.model, n_channels=len(task.channel_names), n_classes=len(task.class_names))
+    jobs = [Job(protocols=protocols, seed=None)] if settings.baselines else []
+    for protocol in protocols:
+        jobs += [Job(protocols=(protocol,), seed=seed) for seed in settings.seeds]
+        if settings.shuffle_control:
+            first = min(settings.seeds)
+            jobs += [Job(protocols=(protocol,), seed=first + k, shuffled=True) for k in range(settings.n_seeds_control)]
+    return protocols, jobs
+
+
+def task_from(dataset: Any, settings: TrainSettings) -> Task:
+    """Task that the settings describe on an open data set."""
+    return task_of(
+        dataset,
+        window_samples=settings.window_samples,
+        stride_samples=settings.stride_samples,
+        normalise=settings.normalise,
+        classes=settings.classes,
+        channels=settings.channels,
+    )
+
+
+def run_study(
+    task: Task,
+    settings: TrainSettings,
+    folder: Path,
+    *,
+    protocols: Sequence[str],
+    jobs: Sequence[Job],
+    on_done: Callable[[str], None] = lambda line: None,
+) -> dict[str, Any]:
+    """Run the jobs, write the models below `folder` and return what goes into ``metrics.json``.
+
+    Parameters
+    ----------
+    task, settings : what to learn and how
+    folder : exists; receives ``models/<protocol>-seed<k>``
+    protocols, jobs : of `plan_study`
+    on_done : told one line for each finished piece
+    """
+    started = time.perf_counter()
+
+    def report(predictions: list[Prediction]) -> None:
+        last = predictions[-1]
+        baselines = last.method in BASELINES
+        name = "baselines" if baselines else f"{last.protocol}, {last.method}, seed {last.seed}: {last.detail}"
+        on_done(name)
+
+    n_workers = settings.n_threads or _n_cores()
+    predictions = run_jobs(task, settings, jobs, n_workers=n_workers, on_done=report)
+    for prediction in predictions:
+        if prediction.weights is not None:
+            target = folder / "models" / f"{prediction.protocol}-seed{prediction.seed}"
+            save_model(target, prediction.weights, model_description(task, settings, prediction))
+    results = {protocol: _protocol_result(task, settings, protocol, predictions) for protocol in protocols}
+    return {
+        "metrics_schema_version": METRICS_SCHEMA_VERSION,
+        "data": str(task.dataset.folder),
+        "data_fingerprint": data_fingerprint(task.dataset),
+        "n_records": int(task.dataset.n_records),
+        "n_records_unusable": int(np.sum(~np.asarray(task.dataset.usable, dtype=bool))),
+        "sampling_rate_hz": float(task.dataset.sampling_rate),
+        "class_names": list(task.class_names),
+        "channel_names": list(task.channel_names),
+        "model": str(settings.model.get("name", "network")),
+        "settings": {**asdict(settings), "model": dict(settings.model)},
+        "protocols": results,
+        "duration_s": round(time.perf_counter() - started, 1),
+        "environment": _environment(),
+    }
+
+
+def score_predictions(
+    task: Task,
+    runs: Sequence[tuple[NDArray[np.integer], NDArray[np.integer]]],
+    n_bootstrap: int,
+    *,
+    shuffled: bool = False,
+) -> dict[str, Any]:
+    """Scores with intervals over units, confusion counts (true, predicted) and recall of one method.
+
+    Parameters
+    ----------
+    task : gives labels and units
+    runs : for each seed, records (record,) and predicted labels (record,); the same records in each
+    n_bootstrap : resamples of the units
+    shuffled : see `diagnose.metrics.score_with_interval`
+    """
+    labels, unit = task.labels(), np.asarray(task.dataset.column("unit_id"))
+    n_classes = len(task.class_names)
+    confusion = np.stack(
+        [confusion_by_unit(labels[record], predicted, unit[record], n_classes) for record, predicted in runs]
+    )
+    rng = np.random.default_rng(BOOTSTRAP_SEED)
+    total = confusion.sum(axis=(0, 1))
+    scores = {
+        name: asdict(score_with_interval(name, confusion, n_bootstrap=n_bootstrap, rng=rng, shuffled=shuffled))
+        for name in SCORES
+    }
+    shares = {
+        name: float(share) for name, share in zip(task.class_names, recall(total), strict=True) if np.isfinite(share)
+    }
+    return {**scores, "confusion": total.tolist(), "recall": shares}
+
+
+def severity_rows(
+    task: Task, runs: Sequence[tuple[NDArray[np.integer], NDArray[np.integer]]]
+) -> list[dict[str, float | int | str]]:
+    """Share of faulty test records given their own class, by class and severity, mean over the seeds.
+
+    Empty where severities do not vary. More than `MAX_SEVERITY_BINS` values of a class become that many equal groups.
+    """
+    labels = task.labels()
+    severity = np.asarray(task.dataset.column("severity"), dtype=float)
+    record = runs[0][0]
+    hits = np.mean([predicted == labels[record] for record, predicted in runs], axis=0)
+    rows: list[dict[str, float | int | str]] = []
+    for index, name in enumerate(task.class_names):
+        mask = (labels[record] == index) & (severity[record] > 0)
+        values = np.unique(severity[record][mask])
+        if values.size > MAX_SEVERITY_BINS:
+            order = np.argsort(severity[record][mask], kind="stable")
+            groups = [np.flatnonzero(mask)[part] for part in np.array_split(order, MAX_SEVERITY_BINS)]
+        else:
+            groups = [np.flatnonzero(mask & (severity[record] == value)) for value in values]
+        for group in groups if values.size > 1 else []:
+            inside = severity[record][group]
+            rows.append(
+                {
+                    "class": name,
+                    "severity_low": float(inside.min()),
+                    "severity_high": float(inside.max()),
+                    "n_records": int(group.size),
+                    "recall": float(hits[group].mean()),
+                }
+            )
+    return rows
+
+
+def _protocol_result(
+    task: Task, settings: TrainSettings, protocol: str, predictions: Sequence[Prediction]
+) -> dict[str, Any]:
+    labels, unit = task.labels(), np.asarray(task.dataset.column("unit_id"))
+    mine = [prediction for prediction in predictions if prediction.protocol == protocol]
+    methods: dict[str, Any] = {}
+    for method in dict.fromkeys(prediction.method for prediction in mine):
+        runs = [prediction for prediction in mine if prediction.method == method]
+        pairs = [(run.record, run.predicted) for run in runs]
+        scores = score_predictions(task, pairs, settings.n_bootstrap, shuffled=method == "label_shuffle")
+        methods[method] = {**scores, "seeds": [run.seed for run in runs], "detail": [run.detail for run in runs]}
+    network = [run for run in mine if run.method == str(settings.model.get("name", "network"))]
+    test = np.unique(network[0].record)
+    counts = np.bincount(labels[test], minlength=len(task.class_names))
+    methods["chance"] = {
+        "balanced_accuracy": 1.0 / int((counts > 0).sum()),
+        "majority_accuracy": float(counts.max() / counts.sum()),
+    }
+    parts = {subset: np.unique(subset_segments(task, protocol, subset).record) for subset in SUBSETS}
+    return {
+        "leaky": is_leaky(protocol),
+        "n_records": {subset: int(record.size) for subset, record in parts.items()},
+        "n_units": {subset: int(np.unique(unit[record]).size) for subset, record in parts.items()},
+        "methods": methods,
+        "by_severity": severity_rows(task, [(run.record, run.predicted) for run in network]),
+        "validation_loss": [list(run.validation_loss) for run in network],
+        "best_epoch": [run.best_epoch for run in network],
+    }
+
+
+def _n_cores() -> int:
+    """Cores this process may use."""
+    if sys.platform == "linux":
+        return len(os.sched_getaffinity(0))
+    return os.cpu_count() or 1
+
+
+def _environment() -> dict[str, str]:
+    import sklearn
+    import torch
+
+    return {
+        "gensig": gensig.__version__,
+        "python": platform.python_version(),
+        "numpy": np.__version__,
+        "torch": str(torch.__version__),
+        "scikit_learn": str(sklearn.__version__),
+        "finished": time.strftime("%Y-%m-%dT%H:%M:%SZ", time.gmtime()),
+    }

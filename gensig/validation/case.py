@@ -1,0 +1,150 @@
+"""The machine that a row speaks of, composed from its overrides and kept for the rows that follow."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, replace
+from functools import lru_cache
+from typing import Any
+
+import numpy as np
+import yaml
+from numpy.typing import NDArray
+
+from gensig.compose import compose
+from gensig.dynamics.pair import PairDynamics
+from gensig.errors import ConfigError
+from gensig.faults.base import Fault
+from gensig.faults.registry import read_fault
+from gensig.geometry.contact import GearPair
+from gensig.geometry.gear import Gear
+from gensig.mesh.pair_table import PairTable
+from gensig.systems.registry import read_system
+from gensig.systems.spur_pair import SpurPair
+
+Array = NDArray[np.float64]
+
+POINTS = ("A", "AB", "B", "BD", "C", "D", "DE", "E")
+RECORD_TURNS = 15  # 0.5 s at 1800 r/min
+
+
+@dataclass(frozen=True, eq=False)
+class Case:
+    """One machine with its faults; the same overrides always give the same object."""
+
+    overrides: tuple[str, ...]
+    system: SpurPair
+    faults: tuple[Fault, ...]
+
+    @property
+    def pair(self) -> GearPair:
+        """The gears in mesh."""
+        return self.system.pair
+
+    @property
+    def table(self) -> PairTable:
+        """Compliance and gap tables, with the faults."""
+        return self.system.mesh_table(self.faults)
+
+    @property
+    def faulty_kinds(self) -> dict[str, int]:
+        """Table rows of the first faulty tooth, as ``pair_compliance`` takes them; empty when sound."""
+        if not self.faults:
+            return {}
+        fault = self.faults[0]
+        side = self.table.pinion if fault.gear == "pinion" else self.table.wheel
+        return {f"{fault.gear}_kind": int(side.kind[fault.tooth])}
+
+    def gear(self, name: str) -> Gear:
+        """The pinion or the wheel."""
+        return self.pair.pinion if name == "pinion" else self.pair.wheel
+
+    def position(self, point: str) -> float:
+        """Distance of a named point from A along the line of action, m; C is the pitch point."""
+        pitch, path = self.pair.base_pitch, self.pair.path_of_contact
+        named = {"A": 0.0, "B": path - pitch, "C": self.pair.pitch_point, "D": pitch, "E": path}
+        if point in named:
+            return named[point]
+        return 0.5 * (named[point[0]] + named[point[1]])
+
+    def curvature(self, gear: str, point: str) -> Array:
+        """Curvature radius of a gear's flank at a named point, (1,) m."""
+        position = np.array([self.position(point)])
+        return np.asarray(
+            self.pair.pinion_curvature(position) if gear == "pinion" else self.pair.wheel_curvature(position)
+        )
+
+
+@lru_cache(maxsize=256)
+def read_case(overrides: tuple[str, ...]) -> Case:
+    """Compose the machine and the selected fault; overrides that begin with ``fault`` are the fault's."""
+    machine = tuple(word for word in overrides if not word.startswith("fault"))
+    fault = _read_faults(tuple(word for word in overrides if word.startswith("fault")))
+    return Case(overrides=overrides, system=_read_machine(machine), faults=fault)
+
+
+# composed apart and once for each option, as composing takes longer than all that a row computes
+@lru_cache(maxsize=64)
+def _read_machine(overrides: tuple[str, ...]) -> SpurPair:
+    return read_system(compose("generate", overrides))
+
+
+@lru_cache(maxsize=8)
+def _fault_option(name: str) -> dict[str, Any]:
+    option: dict[str, Any] = compose("generate", [f"fault={name}"])["fault"]
+    return {key: value for key, value in option.items() if key != "vary"}
+
+
+@lru_cache(maxsize=64)
+def _read_faults(overrides: tuple[str, ...]) -> tuple[Fault, ...]:
+    words = dict(word.split("=", 1) for word in overrides)
+    option = _fault_option(words.pop("fault", "healthy"))
+    typed = {key.removeprefix("fault."): yaml.safe_load(value) for key, value in words.items()}
+    fault = read_fault({**option, **typed})
+    return () if fault is None else (fault,)
+
+
+def with_fault(case: Case, *words: str) -> Case:
+    """The same machine with another fault, sound when no words are given."""
+    kept = tuple(word for word in case.overrides if not word.startswith("fault"))
+    return read_case((*kept, *words))
+
+
+def with_words(case: Case, *words: str) -> Case:
+    """The same machine and fault with further overrides."""
+    return read_case((*case.overrides, *words))
+
+
+def pair_dynamics(case: Case) -> PairDynamics:
+    """The equations of motion with perfect teeth."""
+    system = case.system
+    return PairDynamics(
+        table=case.table,
+        pinion=system.pinion,
+        wheel=system.wheel,
+        operating=system.operating,
+        pinion_error=np.zeros(system.pair.pinion.n_teeth),
+        wheel_error=np.zeros(system.pair.wheel.n_teeth),
+        start_tooth_pinion=0,
+        start_tooth_wheel=0,
+        start_phase=0.0,
+    )
+
+
+@lru_cache(maxsize=64)
+def record(case: Case) -> Array:
+    """Acceleration of the pinion's bearing along the line of action over 15 turns of the pinion, (sample,) m/s2.
+
+    Perfect teeth, no noise, steady state; the first sample is tooth 0 at A. Raises ConfigError where 15 turns are no
+    whole number of samples.
+    """
+    system = case.system
+    turn = 2.0 * np.pi / system.operating.speed
+    n_samples = RECORD_TURNS * turn * system.sensing.sampling_rate
+    if abs(n_samples - round(n_samples)) > 1e-6:
+        raise ConfigError(f"{RECORD_TURNS} turns are {n_samples:.6g} samples, not a whole number: choose another speed")
+    machine = replace(
+        system,
+        operating=replace(system.operating, duration=RECORD_TURNS * turn),
+        sensing=replace(system.sensing, channels=("pinion_y",)),
+    )
+    return machine.simulate(case.faults).acceleration[0]

@@ -1,0 +1,74 @@
+"""Geometry of the teeth and of the line of action, by the names that the rows use."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+
+import numpy as np
+
+from gensig.geometry.contact import corner_gap
+from gensig.geometry.gear import Gear
+from gensig.geometry.tooth_profile import involute_point, root_curve_point, tooth_profile
+from gensig.validation.case import Case, pair_dynamics
+
+Check = Callable[[Case, str], float]
+
+
+def _of_gear(value: Callable[[Gear], float]) -> Check:
+    """A quantity of one gear; the row's ``at`` names it."""
+
+    def check(case: Case, at: str) -> float:
+        return value(case.gear(at))
+
+    return check
+
+
+def _junction(gear: Gear, axis: int) -> float:
+    return float(involute_point(gear, np.array([gear.junction_curvature_radius]))[axis][0])
+
+
+def _corner_gap(case: Case, at: str) -> float:
+    """Gap at a distance in mm beyond an end of the path: negative before A, positive after E."""
+    distance = float(at) * 1e-3
+    position = distance if distance < 0.0 else case.pair.path_of_contact + distance
+    return float(corner_gap(case.pair, np.array([position]))[0])
+
+
+def _smaller_corner_gap(case: Case, at: str) -> float:
+    """Peak of the smaller gap of a missing tooth's neighbours, or where it lies after E."""
+    pair = case.pair
+    after = np.linspace(0.0, 2.0 * pair.base_pitch - pair.path_of_contact, 20001)
+    leaving = corner_gap(pair, pair.path_of_contact + after)
+    entering = corner_gap(pair, pair.path_of_contact + after - 2.0 * pair.base_pitch)
+    smaller = np.minimum(leaving, entering)
+    peak = int(np.argmax(smaller))
+    return float(smaller[peak] if at == "gap" else after[peak])
+
+
+GEOMETRY: dict[str, Check] = {
+    "pitch_radius": _of_gear(lambda gear: gear.pitch_radius),
+    "base_radius": _of_gear(lambda gear: gear.base_radius),
+    "tip_radius": _of_gear(lambda gear: gear.tip_radius),
+    "root_radius": _of_gear(lambda gear: gear.root_radius),
+    "half_tooth_angle_base": _of_gear(lambda gear: gear.half_tooth_angle_base),
+    "root_half_angle": _of_gear(lambda gear: gear.root_half_angle),
+    "rounding_center_depth": _of_gear(lambda gear: gear.rounding_center_depth),
+    "rounding_center_offset": _of_gear(lambda gear: gear.rounding_center_offset),
+    "junction_curvature_radius": _of_gear(lambda gear: gear.junction_curvature_radius),
+    "root_chord_abscissa": _of_gear(lambda gear: float(tooth_profile(gear).abscissa[0])),
+    "junction_radius": _of_gear(lambda gear: float(np.hypot(gear.base_radius, gear.junction_curvature_radius))),
+    "junction_abscissa": _of_gear(lambda gear: _junction(gear, 0)),
+    "junction_half_thickness": _of_gear(lambda gear: _junction(gear, 1)),
+    "gamma_mid_abscissa": _of_gear(lambda gear: root_curve_point(gear, "gamma_mid")[0]),
+    "gamma_mid_half_thickness": _of_gear(lambda gear: root_curve_point(gear, "gamma_mid")[1]),
+    "arc_mid_abscissa": _of_gear(lambda gear: root_curve_point(gear, "arc_mid")[0]),
+    "arc_mid_half_thickness": _of_gear(lambda gear: root_curve_point(gear, "arc_mid")[1]),
+    "tangent_length": lambda case, at: case.pair.tangent_length,
+    "base_pitch": lambda case, at: case.pair.base_pitch,
+    "transverse_contact_ratio": lambda case, at: case.pair.transverse_contact_ratio,
+    "pinion_curvature": lambda case, at: float(case.curvature("pinion", at)[0]),
+    "corner_gap": _corner_gap,
+    "smaller_corner_gap": _smaller_corner_gap,
+    "mesh_frequency": lambda case, at: pair_dynamics(case).mesh_frequency,
+    "wheel_speed": lambda case, at: case.system.operating.speed / case.pair.ratio,
+}

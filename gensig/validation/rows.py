@@ -1,0 +1,151 @@
+"""Printed figures as data: one CSV per source, one row per figure or claim.
+
+The columns: ``id``; ``quantity`` and ``at``, what is computed and where (``gensig.validation.checks.QUANTITIES``);
+``overrides``, the configuration it belongs to; ``printed``, ``unit`` and ``tolerance``; ``kind``; ``expected``, a
+verdict other than the good one that is known and explained; ``source`` (section, equation or table); ``reason``.
+
+A value is reproduced when it deviates from the printed one by at most ``tolerance`` times the printed one, or by half
+a unit of the last printed digit where that is more. A claim prints its criterion, such as ``> 1.5``. A row that
+prints nothing shows a number beside those that are printed.
+"""
+
+from __future__ import annotations
+
+import csv
+from dataclasses import dataclass
+from functools import lru_cache
+from importlib import resources
+
+from gensig.errors import ConfigError
+
+SOURCES = ("spur_reference", "spur_paper")
+REPRODUCED, DIFFERS = "reproduced", "differs"
+HOLDS, FAILS = "claim holds", "claim does not hold"
+NOT_PRINTED = "not printed"
+VERDICTS = (REPRODUCED, DIFFERS, HOLDS, FAILS, NOT_PRINTED)
+
+# unit as printed: factor to SI
+UNITS = {
+    "": 1.0,
+    "%": 1e-2,
+    "mm": 1e-3,
+    "um": 1e-6,
+    "rad": 1.0,
+    "deg": 0.017453292519943295,
+    "1e8 N/m": 1e8,
+    "1e-12 m/N": 1e-12,
+    "kg": 1.0,
+    "kg m2": 1.0,
+    "Hz": 1.0,
+    "r/min": 0.10471975511965977,
+    "m/s2": 1.0,
+}
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class Row:
+    """One row of a source's CSV, see the module's description; ``origin`` is the CSV's name."""
+
+    origin: str
+    id: str
+    quantity: str
+    at: str
+    overrides: tuple[str, ...]
+    printed: str
+    unit: str
+    tolerance: float | None
+    kind: str
+    expected: str
+    source: str
+    reason: str
+
+    def __post_init__(self) -> None:
+        if self.kind not in ("value", "claim"):
+            raise ConfigError(f"{self.origin}.csv, {self.id}: kind = {self.kind!r}; allowed: value, claim")
+        if self.unit not in UNITS:
+            raise ConfigError(f"{self.origin}.csv, {self.id}: unit = {self.unit!r}; allowed: {', '.join(UNITS)}")
+        if self.expected not in VERDICTS:
+            raise ConfigError(f"{self.origin}.csv, {self.id}: expected = {self.expected!r}; allowed: {VERDICTS}")
+        if (self.tolerance is not None) != (self.kind == "value" and bool(self.printed)):
+            raise ConfigError(f"{self.origin}.csv, {self.id}: a printed value, and nothing else, has a tolerance")
+        if self.kind == "claim" and self.printed and self.printed.split()[0] not in (">", "<"):
+            raise ConfigError(f"{self.origin}.csv, {self.id}: a claim prints '> number' or '< number'")
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class Result:
+    """What became of one row; ``computed`` is in the row's unit, ``deviation`` relative to the printed value."""
+
+    row: Row
+    computed: float
+    deviation: float | None
+    verdict: str
+
+    @property
+    def as_expected(self) -> bool:
+        """Whether the verdict is the good one, or the one that the row declares and explains."""
+        return self.verdict == self.row.expected
+
+
+@lru_cache(maxsize=8)
+def read_rows(source: str) -> tuple[Row, ...]:
+    """All rows of one source, in the order of its file.
+
+    Raises
+    ------
+    ConfigError    for a source there is not, or a row that makes no sense
+    """
+    if source not in SOURCES:
+        raise ConfigError(f"no validation source '{source}'; allowed: {', '.join(SOURCES)}")
+    text = resources.files("gensig.validation").joinpath(f"{source}.csv").read_text(encoding="utf-8")
+    return tuple(_row(source, values) for values in csv.DictReader(text.splitlines()))
+
+
+def printed_value(source: str, row_id: str) -> float:
+    """The printed number of one row, in SI units."""
+    for row in read_rows(source):
+        if row.id == row_id:
+            return float(row.printed) * UNITS[row.unit]
+    raise ConfigError(f"{source}.csv has no row '{row_id}'")
+
+
+def judge(row: Row, value: float) -> Result:
+    """Compare a computed value, in SI units, with what the row prints."""
+    computed = value / UNITS[row.unit]
+    deviation: float | None = None
+    if not row.printed:
+        verdict = NOT_PRINTED
+    elif row.kind == "claim":
+        sign, bound = row.printed.split()
+        verdict = HOLDS if (computed > float(bound) if sign == ">" else computed < float(bound)) else FAILS
+    else:
+        printed = float(row.printed)
+        allowed = max((row.tolerance or 0.0) * abs(printed), half_last_digit(row.printed))
+        deviation = (computed - printed) / abs(printed)
+        verdict = REPRODUCED if abs(computed - printed) <= allowed * (1.0 + 1e-9) else DIFFERS
+    return Result(row=row, computed=computed, deviation=deviation, verdict=verdict)
+
+
+def half_last_digit(printed: str) -> float:
+    """Half a unit of the last digit of a printed number: what rounding alone explains."""
+    mantissa, _, exponent = printed.lower().partition("e")
+    decimals = len(mantissa.partition(".")[2])
+    return 0.5 * 10.0 ** (int(exponent or 0) - decimals)
+
+
+def _row(source: str, values: dict[str, str]) -> Row:
+    good = NOT_PRINTED if not values["printed"] else REPRODUCED if values["kind"] == "value" else HOLDS
+    return Row(
+        origin=source,
+        id=values["id"],
+        quantity=values["quantity"],
+        at=values["at"],
+        overrides=tuple(values["overrides"].split()),
+        printed=values["printed"],
+        unit=values["unit"],
+        tolerance=float(values["tolerance"]) if values["tolerance"] else None,
+        kind=values["kind"],
+        expected=values["expected"] or good,
+        source=values["source"],
+        reason=values["reason"],
+    )

@@ -1,0 +1,103 @@
+"""Every printed figure and claim of the sources, by the rows that ``gensig validate`` reads."""
+
+import re
+from dataclasses import replace
+
+import pytest
+
+from gensig.errors import ConfigError
+from gensig.validation.checks import QUANTITIES, evaluate, run_validation
+from gensig.validation.rows import (
+    DIFFERS,
+    FAILS,
+    HOLDS,
+    NOT_PRINTED,
+    REPRODUCED,
+    SOURCES,
+    half_last_digit,
+    judge,
+    printed_value,
+    read_rows,
+)
+
+ROWS = [row for source in SOURCES for row in read_rows(source)]
+
+
+def row_of(row_id):
+    return next(row for row in ROWS if row.id == row_id)
+
+
+@pytest.mark.parametrize("row", ROWS, ids=lambda row: f"{row.origin}-{row.id}")
+def test_row_has_its_expected_verdict(row):
+    result = evaluate(row)
+    assert result.as_expected, (
+        f"{row.source}: printed {row.printed} {row.unit}, computed {result.computed:.6g}: {result.verdict}, "
+        f"expected {row.expected}"
+    )
+
+
+def test_rows_are_unique_and_shortfalls_are_explained():
+    ids = [(row.origin, row.id) for row in ROWS]
+    assert len(set(ids)) == len(ids)
+    unexplained = [row.id for row in ROWS if row.expected in (DIFFERS, FAILS) and not row.reason]
+    assert not unexplained
+    assert not [row.id for row in ROWS if row.printed and not row.source]
+
+
+def test_every_quantity_is_used():
+    assert set(QUANTITIES) == {row.quantity for row in ROWS}
+
+
+@pytest.mark.parametrize(
+    ("row_id", "word"),
+    [
+        ("table_2_2.pair_stiffness.C", "material.youngs_modulus_gpa=205"),
+        ("table_2_2.pinion_foundation.C", "gear.cutter_tip_radius_coefficient=0.3"),  # changes theta_f
+        ("table_2_2.wheel_bending.A", "gear.cutter_tip_radius_coefficient=0.2"),
+        ("table_2_3.9_15_crack_1mm_gamma.C", "fault.crack_start=arc_mid"),
+        ("table_2_3.9_15_pit.C", "fault.pit_width_mm=9"),
+        ("fe_coupled.double_zone.3_of_7", "mesh.pair_coupling=sum"),
+        ("corner_gap.missing_tooth.peak", "gear.addendum_coefficient=0.98"),
+        ("record_healthy_lin.RMS", "mesh.law=one_sided"),
+    ],
+)
+def test_a_wrong_input_differs(row_id, word):
+    row = row_of(row_id)
+    assert evaluate(row).verdict == REPRODUCED
+    key = word.partition("=")[0]
+    others = tuple(old for old in row.overrides if not old.startswith(f"{key}="))
+    assert evaluate(replace(row, overrides=(*others, word))).verdict == DIFFERS
+
+
+def test_a_claim_can_fail():
+    row = row_of("missing.large_impact.one_sided")
+    assert evaluate(row).verdict == HOLDS
+    healthy = tuple(word for word in row.overrides if not word.startswith("fault"))
+    result = evaluate(replace(row, overrides=healthy))
+    assert result.verdict == FAILS
+    assert not result.as_expected
+
+
+def test_tolerance_is_relative_but_never_finer_than_the_printed_digits():
+    row = replace(row_of("table_2_2.pinion_axial.A"), printed="0.08", unit="", tolerance=0.001)
+    assert judge(row, 0.0849).verdict == REPRODUCED
+    assert judge(row, 0.0851).verdict == DIFFERS
+    row = replace(row, printed="200.00")
+    assert judge(row, 200.19).verdict == REPRODUCED
+    assert judge(row, 200.21).verdict == DIFFERS
+    assert judge(replace(row, printed="", tolerance=None), 1.0).verdict == NOT_PRINTED
+    assert half_last_digit("3.509e-3") == pytest.approx(5e-7)
+    assert half_last_digit("690") == pytest.approx(0.5)
+
+
+def test_mistakes_are_answered():
+    row = row_of("table_2_2.pair_stiffness.C")
+    with pytest.raises(ConfigError, match="no quantity 'single_pair'"):
+        evaluate(replace(row, quantity="single_pair"))
+    with pytest.raises(ConfigError, match="no validation source 'spur'"):
+        run_validation(["spur"])
+    with pytest.raises(ConfigError, match="has no row 'table_9'"):
+        printed_value("spur_reference", "table_9")
+    for wrong in ({"unit": "furlong"}, {"kind": "rumour"}, {"tolerance": None}, {"expected": "fine"}):
+        with pytest.raises(ConfigError, match=re.escape(row.id)):
+            replace(row, **wrong)

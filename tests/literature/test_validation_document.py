@@ -1,0 +1,65 @@
+"""``docs/validation.md`` is what the code computes now."""
+
+import math
+import re
+from pathlib import Path
+
+import pytest
+
+from gensig.validation.checks import run_validation
+from gensig.validation.document import markdown, shortfalls
+from gensig.validation.rows import SOURCES, VERDICTS
+
+PAGE = Path(__file__).parents[2] / "docs" / "validation.md"
+NUMBER = re.compile(r"[-+]?\d+(?:\.\d+)?(?:e[-+]?\d+)?( %)?")
+
+
+@pytest.fixture(scope="module")
+def results():
+    return run_validation()
+
+
+def out_of_step(written: str, computed: str) -> list[str]:
+    """Lines whose words differ, or whose numbers differ by more than 0.1 % (deviations by more than 0.03 points)."""
+    old, new = written.splitlines(), computed.splitlines()
+    wrong = [f"{len(old)} lines written, {len(new)} computed"] if len(old) != len(new) else []
+    for before, after in zip(old, new, strict=False):
+        numbers = [list(NUMBER.finditer(line)) for line in (before, after)]
+        same_words = NUMBER.sub("#", before) == NUMBER.sub("#", after)
+        if not same_words or not all(map(_close, *numbers)):
+            wrong.append(f"- {before}\n+ {after}")
+    return wrong
+
+
+def _close(old: re.Match[str], new: re.Match[str]) -> bool:
+    a, b = (float(match[0].removesuffix(" %")) for match in (old, new))
+    return math.isclose(a, b, rel_tol=2e-3 if old[1] else 1e-3, abs_tol=0.03 if old[1] else 1e-9)
+
+
+def test_page_is_in_step(results):
+    wrong = out_of_step(PAGE.read_text(encoding="utf-8"), markdown(results))
+    assert not wrong, "run: gensig validate --markdown docs/validation.md\n" + "\n".join(wrong[:5])
+
+
+def test_a_changed_page_is_noticed(results):
+    page = markdown(results)
+    assert "| 1.5692 1.8847" in page
+    assert len(out_of_step(page.replace("| 1.5692 1.8847", "| 1.5792 1.8847", 1), page)) == 1
+    assert len(out_of_step(page.replace("claim does not hold", "claim holds", 1), page)) == 1
+    assert out_of_step(page + "\nmore", page)
+
+
+def test_page_is_deterministic_and_counts_every_row(results):
+    page = markdown(results)
+    assert page == markdown(run_validation())
+    for source in SOURCES:
+        counts = [int(cell) for cell in re.search(rf"\| {source} \|(.*)\|", page)[1].split("|")]
+        assert counts[0] == sum(counts[1:]) == sum(result.row.origin == source for result in results)
+        assert len(counts) == 1 + len(VERDICTS)
+    assert not [line for line in page.splitlines() if line.startswith("| ") and line.count("|") not in (8, 10)]
+
+
+def test_shortfalls_are_listed_and_none_is_unexpected(results):
+    lines = shortfalls(results)
+    assert any(line.startswith("pit.softens_less_than_crack.arc_mid: printed < 1, computed 1.4252") for line in lines)
+    assert not [line for line in lines if line.startswith("UNEXPECTED")]

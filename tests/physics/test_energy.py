@@ -1,0 +1,166 @@
+"""Power in = stored + dissipated, along trajectories of the compiled integrator sampled at every internal step."""
+
+from typing import NamedTuple
+
+import numpy as np
+import pytest
+from numpy.testing import assert_allclose
+
+from gensig.dynamics import _kernels
+from gensig.faults.missing_tooth import MissingTooth
+
+SAMPLING_RATE = 51200.0
+OVERSAMPLING = 32
+DURATION = 0.008
+# the missing tooth would enter at roll 2, about 2.5 ms from the start: its whole passage lies in the record
+FAULTS = {"healthy": (), "missing_pinion": (MissingTooth(gear="pinion", tooth=2),),
+          "missing_wheel": (MissingTooth(gear="wheel", tooth=2),)}  # fmt: skip
+
+
+class Balance(NamedTuple):
+    energy: np.ndarray  # J, kinetic with true speeds, springs, mesh
+    supplied: np.ndarray  # W, drive and load
+    supports: np.ndarray  # W lost
+    mesh_damping: np.ndarray  # W lost
+    friction: np.ndarray  # W, negative when lost
+    stored: np.ndarray  # J, mesh only
+    step: float
+
+    @property
+    def residual(self):
+        """Change of energy less work, J."""
+        power = self.supplied - self.supports - self.mesh_damping + self.friction
+        work = np.concatenate([[0.0], np.cumsum(0.5 * (power[1:] + power[:-1])) * self.step])
+        return self.energy - self.energy[0] - work
+
+
+def trajectory(dynamics, oversampling=OVERSAMPLING):
+    """q and v at every internal step, (step, dof), from static equilibrium."""
+    step = 1 / (SAMPLING_RATE * oversampling)
+    system, mesh = dynamics.system().arrays(), dynamics.arrays(step)
+    q, v = dynamics.static_start(0.0), np.zeros(6)
+    scratch, work, nothing, channel = np.empty((5, 6)), np.empty((6, 4)), np.empty((0, 1)), np.array([0])
+    states = [(q.copy(), v.copy())]
+    for n in range(round(DURATION / step)):
+        _kernels.integrate(system, mesh, q, v, step, n, 1, channel, nothing, scratch, work)
+        states.append((q.copy(), v.copy()))
+    return (*(np.array(part) for part in zip(*states, strict=True)), mesh, step)
+
+
+def balance(dynamics):
+    q, v, mesh, step = trajectory(dynamics)
+    system, m, work = dynamics.system(), mesh.numbers, np.empty((6, 4))
+    direction = dynamics.approach_direction()
+    time = np.arange(len(q)) * step
+    rolls = m.start_roll + m.pinion_radius * (m.speed * time + q[:, 2]), m.pinion_radius * (m.speed + v[:, 2])
+    law = np.array(
+        [
+            _kernels.mesh_law(*mesh, *values, work)
+            for values in zip(rolls[0], q @ direction, v @ direction, rolls[1], strict=True)
+        ]
+    )
+    _, friction, moment_p, moment_w, _, stored, lost = law.T
+    speeds = v + np.array([0, 0, m.speed, 0, 0, m.speed / dynamics.table.pair.ratio])
+    k, c = np.diag(system.stiffness), np.diag(system.damping)
+    springs = [0, 1, 3, 4]
+    drive = system.force[2] - k[2] * q[:, 2] - c[2] * v[:, 2]
+    return Balance(
+        energy=0.5 * (speeds**2 @ system.mass + q[:, springs] ** 2 @ k[springs]) + stored,
+        supplied=drive * speeds[:, 2] + system.force[5] * speeds[:, 5],
+        supports=v[:, springs] ** 2 @ c[springs],
+        mesh_damping=lost,
+        friction=friction * (v[:, 0] - v[:, 3]) + moment_p * speeds[:, 2] + moment_w * speeds[:, 5],
+        stored=stored,
+        step=step,
+    )
+
+
+@pytest.fixture(scope="module", params=FAULTS)
+def case(request, machine, dynamics_of):
+    return {
+        law: balance(dynamics_of(machine({"mesh.roll_torque": law}), FAULTS[request.param]))
+        for law in ("consistent", "classical")
+    }
+
+
+def relative_residual(found):
+    """Largest imbalance over the largest energy stored in the mesh."""
+    return np.abs(found.residual).max() / found.stored.max()
+
+
+def test_power_in_is_stored_and_dissipated(case):
+    assert relative_residual(case["consistent"]) < 2e-3
+
+
+def test_the_classical_equations_do_not_balance(case):
+    assert relative_residual(case["classical"]) > 0.1
+
+
+def test_what_is_left_comes_from_the_tables_slopes(machine, dynamics_of, case):
+    fine = balance(dynamics_of(machine({"mesh.points_per_pitch": 4096})))
+    assert relative_residual(fine) < 2e-4
+
+
+def test_the_balance_sees_a_missing_term(case):
+    found = case["consistent"]
+    assert relative_residual(found._replace(mesh_damping=np.zeros_like(found.mesh_damping))) > 0.02
+
+
+def test_mesh_damping_never_feeds_energy(case):
+    for found in case.values():
+        assert found.mesh_damping.min() >= 0
+        assert found.mesh_damping.max() > 0
+
+
+def test_friction_dissipates(case):
+    """Its sign follows the position; only the bearings' own motion across can turn it, near the pitch point."""
+    for found in case.values():
+        assert found.friction.mean() < -10
+        assert found.friction.max() < 0.05 * -found.friction.mean()
+
+
+@pytest.mark.parametrize("seed", [1, 2])
+def test_friction_of_rigid_gears_dissipates_at_every_position(xiamen, dynamics_of, seed):
+    mesh = dynamics_of(xiamen).arrays(1e-6)
+    speed, ratio = xiamen.operating.speed, xiamen.pair.ratio
+    rng, work = np.random.default_rng(seed), np.empty((6, 4))
+    for roll in rng.uniform(0, 50, 500) * xiamen.pair.base_pitch:
+        rate = xiamen.pair.pinion.base_radius * speed
+        law = _kernels.mesh_law(*mesh, roll, rng.uniform(0, 20e-6), rng.normal(0, 1e-3), rate, work)
+        assert law[2] * speed + law[3] * speed / ratio <= 1e-9
+        assert law[6] >= 0
+        assert law[0] >= 0
+
+
+def test_action_equals_reaction(xiamen, dynamics_of):
+    """The mesh puts opposite forces on the two gears, and friction on x as its normal force on y."""
+    dynamics = dynamics_of(xiamen)
+    step, direction = 1e-7, dynamics.approach_direction()
+    system, mesh = dynamics.system(), dynamics.arrays(step)
+    rng = np.random.default_rng(3)
+    for _ in range(50):
+        q = rng.normal(0, 1e-6, 6)
+        q[5] -= (rng.uniform(1e-6, 2e-5) - q @ direction) / xiamen.pair.wheel.base_radius
+        v = rng.normal(0, 1e-3, 6)
+        out, state = np.empty((1, 6)), (q.copy(), v.copy())
+        _kernels.integrate(system.arrays(), mesh, *state, step, 0, 1, np.arange(6), out, np.empty((5, 6)), np.empty((6, 4)))
+        force = system.mass * out[0] - system.force + system.stiffness @ q + system.damping @ v
+        assert force[1] > 0
+        assert_allclose(force[1], -force[4], rtol=1e-9, atol=1e-6)
+        assert_allclose(force[0], -force[3], rtol=1e-9, atol=1e-6)
+        assert abs(force[0]) <= 0.05 * force[1] * (1 + 1e-9)
+        # the mesh force drives the wheel and brakes the pinion, up to friction and the roll torque
+        assert_allclose(force[5], force[1] * xiamen.pair.wheel.base_radius, rtol=0.03, atol=0)
+        assert_allclose(force[2], -force[1] * xiamen.pair.pinion.base_radius, rtol=0.1, atol=0)
+
+
+def test_a_larger_approach_meets_a_larger_force_back(xiamen, dynamics_of):
+    """Restoring: each gear is pushed so that the approach falls."""
+    dynamics = dynamics_of(xiamen)
+    mesh = dynamics.arrays(1e-6)
+    for roll in np.linspace(0.01, 0.99, 9) * xiamen.pair.base_pitch:
+        found = [_kernels.mesh_law(*mesh, roll, a, 0.0, 4.0, np.empty((6, 4)))[0] for a in np.linspace(-20e-6, 20e-6, 41)]
+        assert np.all(np.diff(found) >= 0)
+        assert found[0] == pytest.approx(0.0, abs=0.0)
+        coast = _kernels.mesh_law(*mesh, roll, -xiamen.pair.backlash - 5e-6, 0.0, 4.0, np.empty((6, 4)))[0]
+        assert coast < -100

@@ -1,0 +1,25 @@
+import math
+
+import pytest
+from hypothesis import given
+from hypothesis import strategies as st
+from numpy.testing import assert_allclose
+
+from gensig.errors import GeometryError
+from gensig.geometry.involute import inverse_involute, involute
+
+
+def test_known_value():
+    # inv(20 deg), any table of gear geometry
+    assert_allclose(involute(math.radians(20)), 0.014904, rtol=0, atol=5e-7)
+
+
+@given(st.floats(math.radians(5), math.radians(60)))
+def test_inverse_gives_the_angle_back(angle):
+    assert_allclose(inverse_involute(involute(angle)), angle, rtol=1e-9, atol=0)
+
+
+@pytest.mark.parametrize("value", [-0.01, 100.0])
+def test_values_without_an_angle_are_refused(value):
+    with pytest.raises(GeometryError, match="profile shifts"):
+        inverse_involute(value)

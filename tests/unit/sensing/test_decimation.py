@@ -1,0 +1,68 @@
+"""The low-pass before decimation: flat, free of folded content, without delay."""
+
+import numpy as np
+import pytest
+from numpy.testing import assert_allclose
+
+from gensig.sensing.decimation import decimator, usable_band
+
+RATE = 51200.0
+N_SAMPLES = 2048
+
+
+@pytest.fixture(params=[4, 8, 16])
+def oversampling(request):
+    return request.param
+
+
+def decimated(frequency, oversampling, phase=0.4):
+    """A sine at the internal rate through the decimator, and the same sine sampled at the output rate."""
+    low_pass = decimator(oversampling)
+    internal = np.arange(-low_pass.margin * oversampling, (N_SAMPLES + low_pass.margin) * oversampling)
+    signal = np.sin(2 * np.pi * frequency * internal / (RATE * oversampling) + phase)
+    return low_pass.apply(signal[:, None])[0], np.sin(2 * np.pi * frequency * np.arange(N_SAMPLES) / RATE + phase)
+
+
+@pytest.mark.parametrize("frequency", [0.0, 31.0, 690.0, 9000.0, 15_000.0, 20_000.0])
+def test_pass_band_is_flat_and_keeps_the_phase(frequency, oversampling):
+    found, expected = decimated(frequency, oversampling)
+    tolerance = 10 ** (0.01 / 20) - 1
+    assert_allclose(found, expected, rtol=0, atol=tolerance)
+
+
+@pytest.mark.parametrize("folded_to", [25.0, 690.0, 12_000.0, 19_990.0])
+@pytest.mark.parametrize("multiple", [1, 2])
+def test_folded_content_is_78_db_down(folded_to, multiple, oversampling):
+    for frequency in (multiple * RATE - folded_to, multiple * RATE + folded_to):
+        if frequency < 0.5 * oversampling * RATE:
+            found, _ = decimated(frequency, oversampling)
+            assert np.abs(found).max() < 10 ** (-78 / 20)
+
+
+def test_without_the_filter_it_would_fold(oversampling):
+    internal = np.arange(N_SAMPLES * oversampling)
+    plain = np.sin(2 * np.pi * (RATE - 690.0) * internal / (RATE * oversampling))[::oversampling]
+    assert np.abs(plain).max() > 0.9
+
+
+@pytest.mark.parametrize("n_samples", [1, 100, 1707])
+def test_length_and_channels(n_samples, oversampling):
+    low_pass = decimator(oversampling)
+    signal = np.zeros(((n_samples + 2 * low_pass.margin) * oversampling, 3))
+    assert low_pass.apply(signal).shape == (3, n_samples)
+
+
+def test_taps_are_symmetric_and_reach_the_margin(oversampling):
+    low_pass = decimator(oversampling)
+    assert len(low_pass.taps) == 2 * low_pass.margin * oversampling + 1
+    assert_allclose(low_pass.taps, low_pass.taps[::-1], rtol=0, atol=1e-15)
+    assert_allclose(low_pass.taps.sum(), 1.0, rtol=1e-12, atol=0)
+
+
+def test_no_oversampling_passes_everything():
+    signal = np.random.default_rng(0).standard_normal((64, 2))
+    assert_allclose(decimator(1).apply(signal), signal.T, rtol=0, atol=0)
+
+
+def test_usable_band_ends_at_20_khz():
+    assert_allclose(usable_band(RATE), (0.0, 20_000.0), rtol=1e-12, atol=0)

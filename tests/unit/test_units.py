@@ -1,0 +1,121 @@
+"""Names with units at the boundary, SI inside."""
+
+import math
+import re
+from dataclasses import dataclass, field
+
+import pytest
+from hypothesis import given
+from hypothesis import strategies as st
+from numpy.testing import assert_allclose
+
+from gensig.errors import ConfigError
+from gensig.units import UNITS, from_si, read, split_unit, to_si, unit
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class Shaft:
+    name: str
+    length: float = unit("mm")
+    inertia: float = unit("kg_m2")
+    angle: float | None = unit("deg")
+    n_keys: int
+    hollow: bool
+    share: float
+    labels: tuple[str, ...] = field(default=())
+
+
+GOOD = {"length_mm": 12.5, "inertia_kg_m2": 2, "angle_deg": 90, "n_keys": 2, "hollow": True, "share": 0.5}
+
+
+def shaft(**changes):
+    return read(Shaft, {**GOOD, **changes}, "gear.shaft", name="shaft")
+
+
+@given(st.sampled_from(sorted(UNITS)), st.floats(-1e9, 1e9))
+def test_there_and_back(suffix, value):
+    name = f"quantity_{suffix}"
+    assert_allclose(from_si(name, to_si(name, value)), value, rtol=1e-14, atol=1e-300)
+
+
+@given(st.floats(-1e9, 1e9))
+def test_a_name_without_unit_is_taken_as_it_is(value):
+    assert_allclose([to_si("share", value), from_si("share", value)], value, rtol=0, atol=0)
+
+
+@pytest.mark.parametrize(
+    ("name", "value", "expected"),
+    [
+        ("normal_module_mm", 2, 2e-3),
+        ("backlash_um", 80, 80e-6),
+        ("pressure_angle_deg", 180, math.pi),
+        ("speed_rpm", 60, 2 * math.pi),
+        ("youngs_modulus_gpa", 206, 206e9),
+        ("torque_nm", 20, 20),
+        ("inertia_kg_m2", 3, 3),
+        ("stiffness_x_n_per_m", 4, 4),
+        ("damping_x_ns_per_m", 5, 5),
+        ("snr_db", 20, 20),
+    ],
+)
+def test_factors(name, value, expected):
+    assert_allclose(to_si(name, value), expected, rtol=1e-14, atol=0)
+
+
+@pytest.mark.parametrize(
+    ("name", "parts"),
+    [
+        ("inertia_kg_m2", ("inertia", "kg_m2")),
+        ("stiffness_x_n_per_m", ("stiffness_x", "n_per_m")),
+        ("damping_ns_per_m", ("damping", "ns_per_m")),
+        ("stiffness_nm_per_rad", ("stiffness", "nm_per_rad")),
+        ("mass_kg", ("mass", "kg")),
+        ("n_teeth", ("n_teeth", None)),
+        ("profile_shift", ("profile_shift", None)),
+        ("mm", ("mm", None)),
+    ],
+)
+def test_the_longest_suffix_wins(name, parts):
+    assert split_unit(name) == parts
+
+
+def test_read_converts_and_fills():
+    found = shaft(labels=["a", "b"])
+    assert_allclose([found.length, found.inertia, found.angle], [12.5e-3, 2.0, math.pi / 2], rtol=1e-14, atol=0)
+    assert (found.name, found.n_keys, found.hollow, found.labels) == ("shaft", 2, True, ("a", "b"))
+    assert shaft(angle_deg=None).angle is None
+
+
+@pytest.mark.parametrize(
+    ("key", "value", "text"),
+    [
+        ("lenght_mm", 1, "gear.shaft: unknown key 'lenght_mm'; did you mean 'length_mm'?"),
+        ("length_deg", 1, "gear.shaft: 'length_deg' has the wrong unit; write it as 'length_mm'"),
+        ("length_um", 1, "gear.shaft: 'length_um' has the wrong unit; write it as 'length_mm'"),
+        ("length", 1, "gear.shaft: 'length' has the wrong unit; write it as 'length_mm'"),
+        ("share_mm", 1, "gear.shaft: 'share_mm' has the wrong unit; write it as 'share'"),
+        ("name", "x", "gear.shaft: unknown key 'name'"),
+        ("zzz", 1, "gear.shaft: unknown key 'zzz'; known: length_mm, inertia_kg_m2, angle_deg, n_keys"),
+        ("length_mm", "long", "gear.shaft.length_mm = 'long' is not a number"),
+        ("length_mm", True, "gear.shaft.length_mm = True is not a number"),
+        ("length_mm", math.nan, "gear.shaft.length_mm = nan is not finite"),
+        ("length_mm", math.inf, "gear.shaft.length_mm = inf is not finite"),
+        ("length_mm", None, "gear.shaft.length_mm is null; give a value"),
+        ("length_mm", [1], "gear.shaft.length_mm = [1] is not a number"),
+        ("n_keys", 2.5, "gear.shaft.n_keys = 2.5 is not a whole number"),
+        ("n_keys", True, "gear.shaft.n_keys = True is not a whole number"),
+        ("hollow", "yes", "gear.shaft.hollow = 'yes' is not true or false"),
+        ("labels", "ab", "gear.shaft.labels = 'ab' is not a list of names"),
+        ("labels", [1], "gear.shaft.labels = [1] is not a list of names"),
+    ],
+)
+def test_mistakes_are_answered(key, value, text):
+    with pytest.raises(ConfigError, match=re.escape(text)):
+        shaft(**{key: value})
+
+
+def test_missing_keys_are_named():
+    with pytest.raises(ConfigError, match=r"gear.shaft: missing length_mm, n_keys"):
+        read(
+            Shaft, {k: v for k, v in GOOD.items() if k not in ("length_mm", "n_keys")}, "gear.shaft", name="shaft"
+        )
