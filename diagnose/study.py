@@ -8,13 +8,13 @@ import sys
 import time
 from collections.abc import Callable, Sequence
 from dataclasses import asdict
+from importlib.metadata import version
 from pathlib import Path
 from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
 
-import gensig
 from diagnose.jobs import BASELINES, Job, Prediction, run_jobs
 from diagnose.metrics import SCORES, confusion_by_unit, recall, score_with_interval
 from diagnose.model_io import data_fingerprint, model_description, save_model
@@ -234,7 +234,7 @@ def _environment() -> dict[str, str]:
     import torch
 
     return {
-        "gensig": gensig.__version__,
+        "gensig": version("gensig"),
         "python": platform.python_version(),
         "numpy": np.__version__,
         "torch": str(torch.__version__),

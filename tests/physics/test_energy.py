@@ -143,7 +143,9 @@ def test_action_equals_reaction(xiamen, dynamics_of):
         q[5] -= (rng.uniform(1e-6, 2e-5) - q @ direction) / xiamen.pair.wheel.base_radius
         v = rng.normal(0, 1e-3, 6)
         out, state = np.empty((1, 6)), (q.copy(), v.copy())
-        _kernels.integrate(system.arrays(), mesh, *state, step, 0, 1, np.arange(6), out, np.empty((5, 6)), np.empty((6, 4)))
+        _kernels.integrate(
+            system.arrays(), mesh, *state, step, 0, 1, np.arange(6), out, np.empty((5, 6)), np.empty((6, 4))
+        )
         force = system.mass * out[0] - system.force + system.stiffness @ q + system.damping @ v
         assert force[1] > 0
         assert_allclose(force[1], -force[4], rtol=1e-9, atol=1e-6)
@@ -159,7 +161,9 @@ def test_a_larger_approach_meets_a_larger_force_back(xiamen, dynamics_of):
     dynamics = dynamics_of(xiamen)
     mesh = dynamics.arrays(1e-6)
     for roll in np.linspace(0.01, 0.99, 9) * xiamen.pair.base_pitch:
-        found = [_kernels.mesh_law(*mesh, roll, a, 0.0, 4.0, np.empty((6, 4)))[0] for a in np.linspace(-20e-6, 20e-6, 41)]
+        found = [
+            _kernels.mesh_law(*mesh, roll, a, 0.0, 4.0, np.empty((6, 4)))[0] for a in np.linspace(-20e-6, 20e-6, 41)
+        ]
         assert np.all(np.diff(found) >= 0)
         assert found[0] == pytest.approx(0.0, abs=0.0)
         coast = _kernels.mesh_law(*mesh, roll, -xiamen.pair.backlash - 5e-6, 0.0, 4.0, np.empty((6, 4)))[0]

@@ -20,7 +20,12 @@ class Reference:
     """Six equations of a pair, written as the theory has them; one-sided law, drive flank."""
 
     def __init__(self, dynamics, step):
-        self.d, self.table, self.pair, self.options = dynamics, dynamics.table, dynamics.table.pair, dynamics.table.options
+        self.d, self.table, self.pair, self.options = (
+            dynamics,
+            dynamics.table,
+            dynamics.table.pair,
+            dynamics.table.options,
+        )
         self.system = dynamics.system()
         self.damping = dynamics.arrays(step).numbers.damping
 
@@ -71,7 +76,11 @@ class Reference:
         sliding = self.options.friction_coefficient * load * x * (1.5 - 0.5 * x**2)
         arm = self.pair.start_curvature_radius + np.clip(position, 0, self.pair.path_of_contact)
         own = c - self.table.shared_compliance
-        stored = elastic @ (approach - gap) - 0.5 * own @ elastic**2 - 0.5 * self.table.shared_compliance * elastic.sum() ** 2
+        stored = (
+            elastic @ (approach - gap)
+            - 0.5 * own @ elastic**2
+            - 0.5 * self.table.shared_compliance * elastic.sum() ** 2
+        )
         return (
             load.sum(),
             sliding.sum(),
@@ -128,7 +137,9 @@ def test_mesh_law_agrees_for_random_states(dynamics):
 def test_another_shared_compliance_would_show(dynamics):
     mesh, work = dynamics.arrays(1e-6), np.empty((6, 4))
     other = mesh._replace(numbers=mesh.numbers._replace(shared=1.001 * mesh.numbers.shared))
-    loads = [[_kernels.mesh_law(*m, *state, work)[0] for m in (mesh, other)] for state in random_states(dynamics, 50, 7)]
+    loads = [
+        [_kernels.mesh_law(*m, *state, work)[0] for m in (mesh, other)] for state in random_states(dynamics, 50, 7)
+    ]
     one, two = np.array(loads).T
     assert np.abs(one / np.maximum(two, 1e-9) - 1)[one > 100].max() > 1e-6
 

@@ -9,8 +9,13 @@ from numpy.testing import assert_allclose
 
 from gensig.geometry.tooth_profile import involute_point, root_curve
 
-CASES = {"z23": {}, "z84": {"n_teeth": 84}, "z30_plus": {"n_teeth": 30, "profile_shift": 0.3},
-         "z40_minus": {"n_teeth": 40, "profile_shift": -0.2}, "z12_cured": {"n_teeth": 12, "profile_shift": 0.5}}  # fmt: skip
+CASES = {
+    "z23": {},
+    "z84": {"n_teeth": 84},
+    "z30_plus": {"n_teeth": 30, "profile_shift": 0.3},
+    "z40_minus": {"n_teeth": 40, "profile_shift": -0.2},
+    "z12_cured": {"n_teeth": 12, "profile_shift": 0.5},
+}
 
 
 @pytest.fixture(params=CASES.values(), ids=CASES.keys())
@@ -20,11 +25,19 @@ def gear(request, gear_with):
 
 def rack_clearance(gear, x, y):
     """Smallest distance of a tooth point from the rack while it rolls by; 0 on the cut outline, (point,) m."""
-    m, alpha, rounding = gear.normal_module, gear.pressure_angle, gear.cutter_tip_radius_coefficient * gear.normal_module
+    m, alpha, rounding = (
+        gear.normal_module,
+        gear.pressure_angle,
+        gear.cutter_tip_radius_coefficient * gear.normal_module,
+    )
     below_datum = (gear.addendum_coefficient + gear.clearance_coefficient) * m - rounding
     center_depth = below_datum - gear.profile_shift * m
     center_offset = math.pi * m / 4 + below_datum * math.tan(alpha) + rounding / math.cos(alpha)
-    radius, polar, pitch_radius = np.hypot(x, y)[:, None], np.arctan2(y, x)[:, None], gear.normal_module * gear.n_teeth / 2
+    radius, polar, pitch_radius = (
+        np.hypot(x, y)[:, None],
+        np.arctan2(y, x)[:, None],
+        gear.normal_module * gear.n_teeth / 2,
+    )
 
     def distance(roll):
         along = radius * np.sin(polar - roll) + pitch_radius * roll - center_offset

@@ -72,11 +72,25 @@ class TestMistakes:
         assert "\n" not in text
         assert all(needle in text for needle in needles), text
 
-    @pytest.mark.parametrize("word", ["~fault", "gear.pinion=3", "mesh=coupled", "quality=null", "plan.vary=3", "plan=null",
-                                      "gear.pinion.support=null", "gear.helix_angle_deg=abc", "mesh.law=papr",
-                                      "operating.speed_rpm=abc", "+mesh.foo=1", "system.kind=x"])  # fmt: skip
+    @pytest.mark.parametrize(
+        "word",
+        [
+            "~fault",
+            "gear.pinion=3",
+            "mesh=coupled",
+            "quality=null",
+            "plan.vary=3",
+            "plan=null",
+            "gear.pinion.support=null",
+            "gear.helix_angle_deg=abc",
+            "mesh.law=papr",
+            "operating.speed_rpm=abc",
+            "+mesh.foo=1",
+            "system.kind=x",
+        ],
+    )
     def test_values_that_make_no_machine_are_one_line(self, word):
-        with pytest.raises(GensigError) as caught:  # noqa: PT012
+        with pytest.raises(GensigError) as caught:
             read_system(read_request([word]).config)
         assert "\n" not in str(caught.value)
 
@@ -107,7 +121,8 @@ class TestFaultKeys:
 
     def test_a_typed_key_is_pinned_and_leaves_the_severity_draw(self):
         free, pinned = (
-            read_request([FOUR, *words]).config["classes"] for words in ((), ("fault.crack_depth_mm=1.5", "fault.tooth=4"))
+            read_request([FOUR, *words]).config["classes"]
+            for words in ((), ("fault.crack_depth_mm=1.5", "fault.tooth=4"))
         )
         assert set(free["crack"]["vary"]) == {"tooth", "crack_depth_mm"}
         assert pinned["crack"]["vary"] == {}
@@ -122,7 +137,9 @@ class TestFaultKeys:
 
 class TestPinnedKeys:
     def test_a_typed_key_leaves_vary(self):
-        free, pinned = (read_request(["experiment=quickstart", *words]).config for words in ((), ("operating.speed_rpm=1500",)))
+        free, pinned = (
+            read_request(["experiment=quickstart", *words]).config for words in ((), ("operating.speed_rpm=1500",))
+        )
         assert "operating.speed_rpm" in free["plan"]["vary"]
         assert set(free["plan"]["vary"]) - set(pinned["plan"]["vary"]) == {"operating.speed_rpm"}
         assert pinned["operating"]["speed_rpm"] == 1500

@@ -76,7 +76,7 @@ def test_mistakes_are_answered(spec, text):
 
 
 def test_whole_numbers_need_whole_ends():
-    with pytest.raises(ConfigError, match="0.5"):
+    with pytest.raises(ConfigError, match=r"0\.5"):
         check_distribution("key", {"distribution": "integers", "low": 0.5, "high": 2.5})
 
 

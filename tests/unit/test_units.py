@@ -116,6 +116,4 @@ def test_mistakes_are_answered(key, value, text):
 
 def test_missing_keys_are_named():
     with pytest.raises(ConfigError, match=r"gear.shaft: missing length_mm, n_keys"):
-        read(
-            Shaft, {k: v for k, v in GOOD.items() if k not in ("length_mm", "n_keys")}, "gear.shaft", name="shaft"
-        )
+        read(Shaft, {k: v for k, v in GOOD.items() if k not in ("length_mm", "n_keys")}, "gear.shaft", name="shaft")

@@ -4,12 +4,21 @@ import numpy as np
 import pytest
 from fake_dataset import FakeDataset
 from numpy.testing import assert_allclose
+from threadpoolctl import threadpool_limits
 
 from diagnose.baselines import indicator_model, rms_threshold
 from diagnose.features import GEARS, INDICATORS, FeatureTable, feature_table, indicators
 from diagnose.metrics import balanced_accuracy, confusion_by_unit, macro_f1, over_records, recall, score_with_interval
 from diagnose.windows import SUBSETS, subset_segments, task_of
 from gensig.errors import DatasetError
+
+
+@pytest.fixture(autouse=True)
+def one_thread():
+    """As in a worker; many small OpenMP loops on busy cores take minutes."""
+    with threadpool_limits(1):
+        yield
+
 
 CONFUSION = np.array([[8, 2, 0], [1, 1, 0], [0, 0, 0]])
 

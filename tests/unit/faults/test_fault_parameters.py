@@ -16,7 +16,14 @@ from gensig.faults.registry import FAULTS, read_fault
 from gensig.geometry.tooth import healthy_tooth
 from gensig.systems.spur_pair import severity
 
-CRACK = {"kind": "crack", "gear": "pinion", "tooth": 3, "crack_depth_mm": 1.0, "crack_angle_deg": 45, "crack_start": "arc_mid"}
+CRACK = {
+    "kind": "crack",
+    "gear": "pinion",
+    "tooth": 3,
+    "crack_depth_mm": 1.0,
+    "crack_angle_deg": 45,
+    "crack_start": "arc_mid",
+}
 PIT = {"kind": "pitting", "gear": "pinion", "tooth": 3, "pit_length_mm": 1.0, "pit_width_mm": 10, "pit_depth_mm": 0.5,
        "pit_position_mm": None}  # fmt: skip
 MISSING = {"kind": "missing_tooth", "gear": "wheel", "tooth": 3}
@@ -62,7 +69,10 @@ class TestReading:
     ("values", "text"),
     [
         ({**CRACK, "crack_depth_mm": -0.1}, "fault.crack_depth_mm = -0.1 must not be negative"),
-        ({**CRACK, "crack_depth_mm": 4.2}, "crack_depth 4.2 mm reaches through the root chord 3.984 mm of the pinion tooth"),
+        (
+            {**CRACK, "crack_depth_mm": 4.2},
+            "crack_depth 4.2 mm reaches through the root chord 3.984 mm of the pinion tooth",
+        ),
         ({**CRACK, "crack_angle_deg": 0}, "fault.crack_angle_deg = 0 must lie in 0..90"),
         ({**CRACK, "crack_angle_deg": 91}, "fault.crack_angle_deg = 91 must lie in 0..90"),
         ({**CRACK, "crack_start": "tip"}, "fault.crack_start = 'tip'; allowed: arc_mid, gamma_mid"),
@@ -113,7 +123,9 @@ class TestWhatChanges:
         width, pit_width, depth = xiamen.pair.pinion.face_width, 10e-3, 0.5e-3
         area = 2 * half * width - pit_width * depth
         centroid = -pit_width * depth * (half - depth / 2) / area
-        about_middle = (2 * half) ** 3 * width / 12 - pit_width * depth**3 / 12 - pit_width * depth * (half - depth / 2) ** 2
+        about_middle = (
+            (2 * half) ** 3 * width / 12 - pit_width * depth**3 / 12 - pit_width * depth * (half - depth / 2) ** 2
+        )
         assert_allclose(tooth.area[inside], area, rtol=1e-12, atol=0)
         assert_allclose(tooth.second_moment[inside], about_middle - area * centroid**2, rtol=1e-9, atol=0)
         x = tooth.cell_abscissa[tooth.area < sound.area]

@@ -150,7 +150,7 @@ class TestPairsThatCannotMesh:
     def test_tip_in_the_root(self, pair):
         shallow = {"clearance_coefficient": 0.02, "cutter_tip_radius_coefficient": 0.01, "profile_shift": 0.6}
         large = replace(pair.pinion, n_teeth=40)
-        with pytest.raises(GeometryError, match="pinion: its tip cuts .* mm into the root of the wheel"):
+        with pytest.raises(GeometryError, match=r"pinion: its tip cuts .* mm into the root of the wheel"):
             replace(pair, pinion=replace(large, **shallow), wheel=replace(pair.wheel, **shallow))
         assert replace(pair, pinion=large)
 

@@ -92,7 +92,10 @@ def test_a_large_shift_makes_the_tooth_pointed(gear_with):
         ({"addendum_coefficient": 0.0}, "addendum_coefficient = 0 must be positive"),
         ({"pressure_angle": math.radians(5)}, "pressure_angle_deg = 5 must lie between 10 and 35"),
         ({"clearance_coefficient": 1.5}, "clearance_coefficient = 1.5"),
-        ({"cutter_tip_radius_coefficient": 0.5}, "cutter_tip_radius_coefficient = 0.5 must be positive and at most 0.38"),
+        (
+            {"cutter_tip_radius_coefficient": 0.5},
+            "cutter_tip_radius_coefficient = 0.5 must be positive and at most 0.38",
+        ),
         ({"bore_radius": 21e-3}, "bore_radius_mm = 21 must lie between 0 and the root radius 20.5 mm"),
         ({"bore_radius": 0.0}, "bore_radius_mm = 0 must lie between"),
     ],

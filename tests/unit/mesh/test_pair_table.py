@@ -9,6 +9,7 @@ from numpy.testing import assert_allclose
 from gensig.errors import ConfigError, ExtrapolationError
 from gensig.faults.crack import Crack
 from gensig.geometry.contact import corner_gap_by_pinion
+from gensig.mesh.fillet_foundation import ExtrapolationWarning
 from gensig.mesh.pair_table import pair_compliance, pair_table
 
 # single pairs of the reference pair at A, B, C, D, E, 1e8 N/m (shared/physics/spur.md table 2.2)
@@ -51,7 +52,10 @@ def test_only_the_faulty_tooth_has_its_own_row(xiamen):
 def test_the_bodies_cannot_share_more_than_a_pair_has(xiamen):
     small = replace(xiamen.pair, pinion=replace(xiamen.pair.pinion, bore_radius=1e-3))
     options = replace(xiamen.mesh, allow_extrapolation=True)
-    with pytest.raises(ExtrapolationError, match=r"share .* of the stiffest pair's"), pytest.warns(UserWarning):
+    with (
+        pytest.raises(ExtrapolationError, match=r"share .* of the stiffest pair's"),
+        pytest.warns(ExtrapolationWarning),
+    ):
         pair_table(small, xiamen.material, options)
 
 

@@ -1,0 +1,167 @@
+"""Static start, settling, what the integrator refuses, and what a run tells of itself."""
+
+import math
+import re
+from dataclasses import replace
+
+import numpy as np
+import pytest
+from numpy.testing import assert_allclose
+
+from gensig.dynamics import _kernels
+from gensig.dynamics.integrator import Solver, integrate, settling_time
+from gensig.dynamics.pair import Support, solid_disc
+from gensig.errors import ConfigError, SimulationError
+from gensig.faults.missing_tooth import MissingTooth
+from gensig.systems.spur_pair import Start
+
+
+def run(system, dynamics, **changes):
+    values = {"sampling_rate": 51200.0, "channels": ("pinion_y",), "margin": 4, **changes}
+    return integrate(dynamics, values.pop("solver", system.solver), **values)
+
+
+@pytest.mark.parametrize("phase", [0.0, 0.4, 0.9])
+def test_static_start_is_in_equilibrium_along_the_line_of_action(xiamen, dynamics_of, phase):
+    dynamics = dynamics_of(xiamen, phase=phase)
+    q, direction = dynamics.static_start(0.0), dynamics.approach_direction()
+    law = _kernels.mesh_law(*dynamics.arrays(1e-6), dynamics.start_roll, q @ direction, 0.0, 0.0, np.empty((6, 4)))
+    assert_allclose(law[0], dynamics.mesh_force, rtol=1e-6, atol=0)
+    system = dynamics.system()
+    assert_allclose(system.stiffness[[1, 4], [1, 4]] * q[[1, 4]], [law[0], -law[0]], rtol=1e-6, atol=0)
+
+
+def test_reduced_values(xiamen, dynamics_of):
+    dynamics = dynamics_of(xiamen)
+    assert_allclose(dynamics.mesh_force, 925.37, rtol=1e-5, atol=0)  # shared/physics/spur.md section 3.4
+    assert_allclose(dynamics.mesh_frequency, 690.0, rtol=1e-12, atol=0)
+    inverse = 21.61293e-3**2 / 4.858e-5 + 78.93418e-3**2 / 3.509e-3
+    assert_allclose(dynamics.equivalent_mass, 1 / inverse, rtol=1e-5, atol=0)
+
+
+def test_mean_mesh_stiffness_ignores_the_faulty_tooth(xiamen, dynamics_of):
+    sound, faulty = (dynamics_of(xiamen, faults) for faults in ((), (MissingTooth(gear="pinion", tooth=3),)))
+    assert_allclose(faulty.mean_mesh_stiffness(), sound.mean_mesh_stiffness(), rtol=1e-9, atol=0)
+    assert 2e8 < sound.mean_mesh_stiffness() < 3e8
+
+
+def test_friction_torque_is_a_per_cent_loss(xiamen, dynamics_of, machine):
+    torque = dynamics_of(xiamen).friction_torque()
+    assert 0.003 < torque / xiamen.operating.torque < 0.02
+    assert_allclose(
+        dynamics_of(machine({"mesh.friction_coefficient": 0.1})).friction_torque(), 2 * torque, rtol=1e-9, atol=0
+    )
+
+
+def test_the_system_is_not_driven_on_balance(xiamen, dynamics_of):
+    """Load and drive differ by the mean friction torque only."""
+    force, dynamics = dynamics_of(xiamen).system().force, dynamics_of(xiamen)
+    assert_allclose(force[2] + force[5] / xiamen.pair.ratio, dynamics.friction_torque(), rtol=1e-9, atol=0)
+
+
+def test_settling_time_is_capped(machine, dynamics_of):
+    assert_allclose(settling_time(dynamics_of(machine())), 0.3, rtol=1e-12, atol=0)
+    quick = {"operating.drive_frequency_hz": 20, "gear.pinion.support.damping_x_ns_per_m": 100,
+             "gear.wheel.support.damping_x_ns_per_m": 500}  # fmt: skip
+    assert settling_time(dynamics_of(machine(quick))) < 0.3
+
+
+class TestRefusals:
+    def test_unknown_channels_list_the_known(self, xiamen, dynamics_of):
+        with pytest.raises(ConfigError, match=r"no channel housing; allowed: pinion_x, pinion_y, pinion_rotation"):
+            run(xiamen, dynamics_of(xiamen), channels=("housing",))
+
+    def test_a_step_too_long(self, xiamen, dynamics_of):
+        with pytest.raises(SimulationError, match=r"raise solver.oversampling by at least [\d.]+ times"):
+            run(xiamen, dynamics_of(xiamen), sampling_rate=20e3, solver=Solver(oversampling=1, precision="float64"))
+
+    def test_a_duration_without_samples(self, machine, dynamics_of):
+        system = machine({"operating.duration_s": 1e-6})
+        with pytest.raises(ConfigError, match=re.escape("operating.duration_s = 1e-06 holds no sample")):
+            run(system, dynamics_of(system))
+
+    @pytest.mark.parametrize(
+        ("changes", "text"),
+        [
+            ({"oversampling": 0}, "solver.oversampling = 0 must lie in 1..256"),
+            ({"precision": "float32"}, "solver.precision = 'float32'; allowed: float64"),
+        ],
+    )
+    def test_solvers(self, changes, text):
+        with pytest.raises(ConfigError, match=re.escape(text)):
+            Solver(**{"oversampling": 8, "precision": "float64", **changes})
+
+    @pytest.mark.parametrize(("key", "unit"), [("stiffness_x", "n_per_m"), ("damping_y", "ns_per_m")])
+    def test_supports_name_the_key_as_typed(self, xiamen, key, unit):
+        with pytest.raises(ConfigError, match=f"{key}_{unit} = -1 must not be negative"):
+            replace(xiamen.pinion.support, **{key: -1.0})
+
+    @pytest.mark.parametrize(
+        ("changes", "text"),
+        [
+            ({"speed": 0.0}, "operating.speed_rpm = 0 must be positive"),
+            ({"torque": -5.0}, "operating.torque_nm = -5 must be positive"),
+            ({"duration": -1.0}, "operating.duration_s = -1 must be positive"),
+            ({"drive_damping_ratio": 0.0}, "operating.drive_damping_ratio = 0 must lie in 0..10"),
+        ],
+    )
+    def test_operating_points(self, xiamen, changes, text):
+        with pytest.raises(ConfigError, match=re.escape(text)):
+            replace(xiamen.operating, **changes)
+
+
+def test_solid_disc():
+    mass, inertia = solid_disc(0.1, 0.0, 0.02, 7800.0)
+    assert_allclose([mass, inertia], [7800 * math.pi * 2e-4, 0.5 * 7800 * math.pi * 2e-4 * 0.01], rtol=1e-12, atol=0)
+    assert Support(stiffness_x=1.0, stiffness_y=1.0, damping_x=0.0, damping_y=0.0).damping_x == pytest.approx(0.0)
+
+
+class TestRecord:
+    @pytest.fixture(scope="class")
+    @classmethod
+    def short(cls, machine):
+        return machine({"operating.duration_s": 0.05})
+
+    def test_same_run_same_bits(self, short):
+        one, two = (short.simulate().acceleration for _ in range(2))
+        assert one.shape == (4, 2560)
+        assert one.tobytes() == two.tobytes()
+
+    def test_the_start_phase_moves_the_signal(self, short):
+        """Half a mesh period later by phase is half a mesh period later in time."""
+        period = 51200 / 690
+        one = short.simulate().acceleration[1]
+        two = short.simulate(start=Start(tooth_pinion=0, tooth_wheel=0, phase=0.5)).acceleration[1]
+        samples = np.arange(200, 400)
+        shifted = np.interp(samples + 1.5 * period, np.arange(2560), one)
+        assert np.corrcoef(shifted, two[samples + round(period)])[0, 1] > 0.8
+        assert np.corrcoef(one[samples], two[samples])[0, 1] < 0.6
+
+    def test_contact_is_lost_only_where_the_load_is_too_light(self, machine):
+        tooth = (MissingTooth(gear="pinion", tooth=3),)
+        light, rated = (
+            machine({"operating.torque_nm": torque, "operating.duration_s": 0.1}).simulate(tooth).contact_loss_fraction
+            for torque in (2, 20)
+        )
+        assert light > 0
+        assert rated < light
+
+    @pytest.mark.parametrize("law", ["one_sided", "paper"])
+    def test_a_missing_tooth_jolts_once_a_turn(self, machine, law):
+        coupling = "coupled" if law == "one_sided" else "sum"
+        system = machine({"mesh.law": law, "mesh.pair_coupling": coupling, "operating.speed_rpm": 1500,
+                          "operating.duration_s": 4 * 2048 / 51200})  # fmt: skip
+        signal = system.simulate((MissingTooth(gear="pinion", tooth=3),)).acceleration[1]
+        turns = np.abs(signal.reshape(4, 2048))
+        peaks = turns.argmax(axis=1)
+        assert np.ptp(peaks) <= 3
+        assert turns.max() > 2 * np.abs(system.simulate().acceleration[1]).max()
+
+    def test_the_reference_rise_of_a_missing_tooth(self, machine):
+        """shared/physics/spur.md table 5.2, "gap" rows: another implementation of the same law, pairs not coupled."""
+        system = machine({"mesh.pair_coupling": "sum", "operating.duration_s": 0.3})
+        healthy, missing = (
+            system.simulate(faults).acceleration[1] for faults in ((), (MissingTooth(gear="pinion", tooth=3),))
+        )
+        assert_allclose([healthy.std(), missing.std()], [158.2, 183.9], rtol=0.05, atol=0)
+        assert_allclose(np.abs(missing).max() / np.abs(healthy).max(), 2404 / 694, rtol=0.15, atol=0)
