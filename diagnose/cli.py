@@ -4,7 +4,6 @@ from __future__ import annotations
 
 import argparse
 import difflib
-import re
 import sys
 from collections.abc import Sequence
 from pathlib import Path
@@ -105,20 +104,16 @@ def _train(words: list[str]) -> int:
 
 def _expand(overrides: Sequence[str], config_dir: str | None) -> list[dict[str, Any]]:
     """Configurations of a multirun, each with its own ``out``; all composed before the first one runs."""
-    from gensig.compose import compose, sweep
+    from gensig.compose import compose, job_folders, sweep
 
     jobs = sweep(overrides)
-    swept = [len({job[index] for job in jobs}) > 1 for index in range(len(overrides))]
-    if any(is_swept and word.startswith("out=") for is_swept, word in zip(swept, overrides, strict=True)):
+    configs = [compose("train", job, config_dir=config_dir) for job in jobs]
+    parents = {str(config["out"]) for config in configs}
+    if len(parents) > 1:
         raise ConfigError("out must be one folder; with -m each run gets a folder below it")
-    configs = []
-    for number, job in enumerate(jobs):
-        config = compose("train", job, config_dir=config_dir)
-        _refuse_existing(Path(str(config["out"])))
-        varied = ",".join(word for word, is_swept in zip(job, swept, strict=True) if is_swept)
-        name = re.sub(r"[^A-Za-z0-9_.,=+-]+", "_", varied)[:120]
-        configs.append({**config, "out": str(Path(str(config["out"])) / (f"{number}-{name}" if name else str(number)))})
-    return configs
+    parent = Path(parents.pop())
+    _refuse_existing(parent)
+    return [{**config, "out": str(parent / name)} for config, name in zip(configs, job_folders(jobs), strict=True)]
 
 
 def _train_one(config: dict[str, Any]) -> None:
