@@ -51,6 +51,7 @@ def read_request(overrides: Sequence[str], *, config_dir: str | Path | None = No
     }
     others = [word for word in overrides if word not in fault_words.values()]
     base = compose(CONFIG_NAME, others, config_dir=config_dir)
+    _check_shape(base)
     plan = base["plan"]
     names = [typed["fault"]] if "fault" in typed else plan["classes"] or [base["fault"]["kind"]]
     if not isinstance(names, list) or not all(isinstance(name, str) for name in names) or len(set(names)) < len(names):
@@ -65,19 +66,41 @@ def read_request(overrides: Sequence[str], *, config_dir: str | Path | None = No
         if mine:
             fault = compose(CONFIG_NAME, [*words, *mine.values()], config_dir=config_dir)["fault"]
         unused.difference_update(f"fault.{key}" for key in fault_vary if key in fault)
-        vary = {**(fault.get("vary") or {}), **{key: spec for key, spec in fault_vary.items() if key in fault}}
+        option = {} if clear_fault_vary else fault.get("vary") or {}
+        vary = {**option, **{key: spec for key, spec in fault_vary.items() if key in fault}}
         return {**fault, "vary": {key: spec for key, spec in vary.items() if f"fault.{key}" not in mine}}
 
+    clear_fault_vary = "fault.vary" in typed and not fault_vary
     unused = {*fault_words, *(f"fault.{key}" for key in fault_vary)}
     selected = class_fault(None)
     classes = {name: class_fault(name) for name in names}
     if unused:
         raise ConfigError(_no_such_fault_key(sorted(unused)[0], selected))
     plan["classes"] = names
-    plan["vary"] = {key: value for key, value in {**(plan["vary"] or {}), **plan_vary}.items() if key not in typed}
+    plan_option = {} if "plan.vary" in typed and not plan_vary else plan["vary"] or {}
+    plan["vary"] = {key: value for key, value in {**plan_option, **plan_vary}.items() if key not in typed}
     config = {**base, "fault": selected, "classes": classes}
     _reset_derived(config, set(typed) | set(plan["vary"]))
     return Request(config=config, overrides=as_typed)
+
+
+SECTIONS = (
+    "system", "gear", "material", "fault", "operating", "sensing", "plan", "executor",
+    "mesh", "solver", "quality", "dataset",
+)  # fmt: skip
+PLAIN_KEYS = ("seed", "out")
+
+
+def _check_shape(config: Mapping[str, Any]) -> None:
+    """Raise for groups that were replaced or deleted, and for keys that nothing reads."""
+    for key in SECTIONS:
+        if not isinstance(config.get(key), dict):
+            raise ConfigError(
+                f"{key} = {config.get(key)!r} must be a group of keys; choose an option or leave it alone"
+            )
+    for key in config:
+        if key not in SECTIONS + PLAIN_KEYS:
+            raise ConfigError(f"unknown key '{key}'; the configuration has {', '.join(SECTIONS + PLAIN_KEYS)}")
 
 
 def _no_such_fault_key(key: str, selected: Mapping[str, Any]) -> str:

@@ -37,9 +37,11 @@ def make_plan(config: Mapping[str, Any]) -> Plan:
     names = list(plan["classes"])
     n_records = whole_number("plan.n_records", plan["n_records"], at_least=len(names))
     n_units = whole_number("plan.n_units", plan["n_units"], at_least=1)
-    n_gearboxes = min(
-        n_units, whole_number("plan.n_gearboxes", plan["n_gearboxes"] or max(1, round(math.sqrt(n_units))), at_least=1)
-    )
+    asked = round(math.sqrt(n_units)) if plan["n_gearboxes"] is None else plan["n_gearboxes"]
+    n_gearboxes = min(n_units, whole_number("plan.n_gearboxes", asked, at_least=1))
+    if not isinstance(plan["sham"], bool):
+        raise ConfigError(f"plan.sham = {plan['sham']!r} must be true or false")
+    read_system(config).check()
     n_groups = math.ceil(n_records / len(names))
     for key in plan["vary"]:
         replace_key(copy.deepcopy(dict(config)), key, 0.0)
@@ -139,6 +141,7 @@ def _draw_faults(
 ) -> list[dict[str, Any]]:
     """One complete fault a group, its severity distribution drawn."""
     plain = {key: value for key, value in fault.items() if key != "vary"}
+    read_fault(plain)
     vary = {}
     for key, spec in (fault.get("vary") or {}).items():
         if key not in plain:

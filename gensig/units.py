@@ -78,6 +78,8 @@ def read(cls: type[T], values: Mapping[str, Any], where: str, **given: Any) -> T
     fields = {field.name: field for field in dataclasses.fields(cls) if field.name not in given}  # type: ignore[arg-type]
     names = {_boundary_name(field): field for field in fields.values()}
     hints = typing.get_type_hints(cls)
+    if not isinstance(values, Mapping):
+        raise ConfigError(f"{where} = {values!r} must be a group of keys, not one value")
     result = dict(given)
     for key, value in values.items():
         if key not in names:

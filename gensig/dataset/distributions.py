@@ -13,6 +13,7 @@ from gensig.errors import ConfigError
 
 Array = NDArray[np.float64]
 
+DESIGNS = ("latin_hypercube", "sobol")
 KEYS: dict[str, tuple[str, ...]] = {
     "uniform": ("low", "high"),
     "log_uniform": ("low", "high"),
@@ -47,6 +48,8 @@ def check_distribution(key: str, spec: Any) -> None:
         raise ConfigError(
             f"{key}: low = {spec['low']:g} and high = {spec['high']:g} are no range for {spec['distribution']}"
         )
+    if spec["distribution"] == "integers" and not all(float(spec[name]).is_integer() for name in needed):
+        raise ConfigError(f"{key}: low = {spec['low']:g} and high = {spec['high']:g} must be whole numbers")
     if spec["distribution"] == "normal" and spec["std"] <= 0.0:
         raise ConfigError(f"{key}: std = {spec['std']:g} must be positive")
 
@@ -73,12 +76,12 @@ def values_at(key: str, spec: Mapping[str, Any], unit: Array) -> list[Any]:
 
 def design_points(design: str, n_points: int, n_dimensions: int, rng: np.random.Generator) -> Array:
     """Space-filling points of the unit cube, (point, dimension)."""
+    if design not in DESIGNS:
+        raise ConfigError(f"plan.design = {design!r}; allowed: {', '.join(DESIGNS)}")
     if n_dimensions == 0:
         return np.empty((n_points, 0))
     from scipy.stats import qmc
 
     if design == "latin_hypercube":
         return qmc.LatinHypercube(n_dimensions, rng=rng).random(n_points)
-    if design == "sobol":
-        return qmc.Sobol(n_dimensions, rng=rng).random_base2(max(1, math.ceil(math.log2(n_points))))[:n_points]
-    raise ConfigError(f"plan.design = {design!r}; allowed: latin_hypercube, sobol")
+    return qmc.Sobol(n_dimensions, rng=rng).random_base2(max(1, math.ceil(math.log2(n_points))))[:n_points]

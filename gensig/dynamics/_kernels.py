@@ -14,6 +14,9 @@ from numba import njit
 
 from gensig.mesh.pair_table import FIRST_PITCH, N_PAIRS
 
+SUBSTEPS = 8
+LOADED = 6  # row of a mesh law's scratch whose first entry counts the pairs that bear load
+
 # Without Numba's reference counting (arrays are borrowed, none is made here) a step costs a third less; inlined,
 # because the numbers of a mesh would otherwise be copied at every call.
 _OPTIONS: dict[str, Any] = {"cache": True, "error_model": "numpy", "_nrt": False}
@@ -100,7 +103,8 @@ def mesh_law(
     """Forces of all pairs at one instant.
 
     Returns normal force, friction force, friction moments about pinion and wheel, force on the roll coordinate
-    (energy balance), stored energy, and the power lost in mesh damping. ``work`` is (6, N_PAIRS) scratch.
+    (energy balance), stored energy, and the power lost in mesh damping. ``work`` is (7, N_PAIRS) scratch; its
+    last row begins with the number of loaded pairs, negative on the coast flank.
     """
     if not m.one_sided:
         return _paper_law(m, table, pinion_row, wheel_row, roll, approach, rate, work)
@@ -108,10 +112,12 @@ def mesh_law(
         n = _gather(m, table, pinion_row, wheel_row, pinion_error, wheel_error, roll, approach, work)
         return _flank_law(m, n, rate, roll_rate, work)
     if -approach <= m.backlash:
+        work[LOADED, 0] = 0.0
         return 0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0
     mirrored = 2.0 * m.pitch_point + 0.5 * m.pitch - roll
     n = _gather_coast(m, table, pinion_row, wheel_row, sound_wheel, mirrored, -approach - m.backlash, work)
     back = _flank_law(m, n, -rate, -roll_rate, work)
+    work[LOADED, 0] = -work[LOADED, 0]
     return -back[0], 0.0, 0.0, 0.0, -back[4], back[5], back[6]
 
 
@@ -210,6 +216,7 @@ def _flank_law(m, n_active, approach_rate, roll_rate, work):
     total = _total_load(m.shared, n_active, work)
     normal, friction, moment_p, moment_w, along, lost = 0.0, 0.0, 0.0, 0.0, 0.0, 0.0
     stored = -0.5 * m.shared * total * total
+    work[LOADED, 0] = 0.0
     for k in range(n_active):
         if work[0, k] <= 0.0:
             continue
@@ -217,6 +224,7 @@ def _flank_law(m, n_active, approach_rate, roll_rate, work):
         rate = approach_rate - work[3, k] * roll_rate
         load = max(0.0, elastic * (1.0 + m.damping * rate))
         normal += load
+        work[LOADED, 0] += load > 0.0
         stored += elastic * (work[0, k] - 0.5 * work[2, k] * elastic)
         lost += (load - elastic) * rate
         along += load * work[3, k] + 0.5 * elastic * elastic * work[4, k]
@@ -235,6 +243,7 @@ def _paper_law(m, table, pinion_row, wheel_row, roll, approach, rate, work):
     """F = k(t) delta + c_m delta': two-sided, no gap, pairs in and out over one integration step."""
     newest = int(np.floor(roll / m.pitch)) + 1
     stiffness = 0.0
+    work[LOADED, 0] = 0.0
     for k in range(N_PAIRS):
         pair = newest - k
         position = roll - pair * m.pitch
@@ -244,6 +253,7 @@ def _paper_law(m, table, pinion_row, wheel_row, roll, approach, rate, work):
         share = min(max(0.5 * (1.0 + inside), 0.0), 1.0)
         work[0, k] = 0.0
         work[4, k] = position
+        work[LOADED, 0] += (share > 0.0) + (share == 1.0)
         if share > 0.0 and row_p >= 0 and row_w >= 0:
             x = (position - FIRST_PITCH * m.pitch) * m.nodes_per_meter
             cell = min(max(int(x), 0), table.shape[1] - 2)
@@ -263,7 +273,7 @@ def _paper_law(m, table, pinion_row, wheel_row, roll, approach, rate, work):
 
 
 @_inlined
-def _acceleration(
+def acceleration(
     inverse_mass, k_row, k_column, k_value, c_row, c_column, c_value, force,
     m, table, pinion_row, wheel_row, pinion_error, wheel_error, sound_wheel, time, q, v, a, work,
 ):  # fmt: skip
@@ -307,9 +317,11 @@ def _acceleration(
 def integrate(system, mesh, q, v, step, first_step, n_steps, channels, out, scratch, work):
     """Advance q and v in place by ``n_steps`` of classical RK4.
 
-    ``out`` (n_steps, channel) takes the acceleration of the chosen degrees of freedom at the start of each step; with
-    no rows nothing is stored. Returns the number of steps without contact, and the step at which a value stopped
-    being finite (-1 if none).
+    A step in which a pair takes up or lets go of its load is taken again in ``SUBSTEPS`` parts: the force has a kink
+    there, which would otherwise set the accuracy of everything. ``out`` (n_steps, channel) takes the mean acceleration
+    of the chosen degrees of freedom over each step (what the equations add to the velocity, over the step: kinks then
+    alias far less than point values would); with no rows nothing is stored. Returns the number of steps without
+    contact, and the step at which a value stopped being finite (-1 if none).
     """
     inverse_mass, k_row, k_column, k_value, c_row, c_column, c_value, force = system
     m, table, pinion_row, wheel_row, pinion_error, wheel_error, sound_wheel = mesh
@@ -318,33 +330,49 @@ def integrate(system, mesh, q, v, step, first_step, n_steps, channels, out, scra
     store = len(out) > 0
     n_lost = 0
     for n in range(n_steps):
-        time = (first_step + n) * step
-        for i in range(n_dof):
-            trial_q[i], trial_v[i] = q[i], v[i]
-            sum_q[i], sum_v[i] = 0.0, 0.0
-        for stage in range(4):
-            ahead = step * (0.0 if stage == 0 else 1.0 if stage == 3 else 0.5)
-            normal = _acceleration(
-                inverse_mass, k_row, k_column, k_value, c_row, c_column, c_value, force,
-                m, table, pinion_row, wheel_row, pinion_error, wheel_error, sound_wheel,
-                time + ahead, trial_q, trial_v, a, work,
-            )  # fmt: skip
-            if stage == 0:
-                if normal == 0.0:
-                    n_lost += 1
-                if store:
-                    for c in range(len(channels)):
-                        out[n, c] = a[channels[c]]
-            weight = 1.0 if stage == 0 or stage == 3 else 2.0
-            reach = step * (1.0 if stage == 2 else 0.5)
+        n_parts, part = 1, 0
+        while part < n_parts:
+            h = step / n_parts
+            time = (first_step + n) * step + part * h
             for i in range(n_dof):
-                sum_q[i] += weight * trial_v[i]
-                sum_v[i] += weight * a[i]
-                trial_q[i] = q[i] + reach * trial_v[i]
-                trial_v[i] = v[i] + reach * a[i]
-        for i in range(n_dof):
-            q[i] += step / 6.0 * sum_q[i]
-            v[i] += step / 6.0 * sum_v[i]
+                trial_q[i], trial_v[i] = q[i], v[i]
+                sum_q[i], sum_v[i] = 0.0, 0.0
+            loaded, changed = 0.0, False
+            for stage in range(4):
+                ahead = h * (0.0 if stage == 0 else 1.0 if stage == 3 else 0.5)
+                normal = acceleration(
+                    inverse_mass, k_row, k_column, k_value, c_row, c_column, c_value, force,
+                    m, table, pinion_row, wheel_row, pinion_error, wheel_error, sound_wheel,
+                    time + ahead, trial_q, trial_v, a, work,
+                )  # fmt: skip
+                if stage == 0:
+                    loaded = work[LOADED, 0]
+                    if n_parts == 1:
+                        n_lost += normal == 0.0
+                changed = changed or work[LOADED, 0] != loaded
+                weight = 1.0 if stage == 0 or stage == 3 else 2.0
+                reach = h * (1.0 if stage == 2 else 0.5)
+                for i in range(n_dof):
+                    sum_q[i] += weight * trial_v[i]
+                    sum_v[i] += weight * a[i]
+                    trial_q[i] = q[i] + reach * trial_v[i]
+                    trial_v[i] = v[i] + reach * a[i]
+            if changed and n_parts == 1:
+                n_parts = SUBSTEPS
+                continue
+            if store:
+                for c in range(len(channels)):
+                    mean = sum_v[channels[c]] / (6.0 * n_parts)
+                    out[n, c] = mean if part == 0 else out[n, c] + mean
+            for i in range(n_dof):
+                q[i] += h / 6.0 * sum_q[i]
+                v[i] += h / 6.0 * sum_v[i]
+            part += 1
         if not np.isfinite(v[n_dof - 1]):
             return n_lost, n
     return n_lost, -1
+
+
+def work_arrays(n_dof):
+    """Scratch of ``integrate``: (5, dof) and (7, pair)."""
+    return np.empty((5, n_dof)), np.empty((LOADED + 1, N_PAIRS))

@@ -14,7 +14,7 @@ from gensig.errors import ConfigError
 from gensig.mesh.load_distribution import PairStates, pair_states, static_mesh
 from gensig.mesh.pair_table import GearTable, PairTable
 from gensig.operating import Operating
-from gensig.units import unit
+from gensig.units import split_unit, unit
 
 Array = NDArray[np.float64]
 
@@ -32,9 +32,10 @@ class Support:
     damping_y: float = unit("ns_per_m")
 
     def __post_init__(self) -> None:
-        for key in ("stiffness_x", "stiffness_y", "damping_x", "damping_y"):
-            if getattr(self, key) < 0.0:
-                raise ConfigError(f"support.{key} = {getattr(self, key):g} must not be negative")
+        for key in ("stiffness_x_n_per_m", "stiffness_y_n_per_m", "damping_x_ns_per_m", "damping_y_ns_per_m"):
+            value = getattr(self, split_unit(key)[0])
+            if value < 0.0:
+                raise ConfigError(f"support.{key} = {value:g} must not be negative")
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)

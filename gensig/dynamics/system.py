@@ -53,15 +53,22 @@ class LumpedSystem:
         )
 
 
+def eigenvalues(system: LumpedSystem, direction: Array, mesh_stiffness: float) -> NDArray[np.complex128]:
+    """Eigenvalues in 1/s of the system with its mesh held at one stiffness.
+
+    ``direction`` (dof,) is the gradient of the approach.
+    """
+    n = len(system.mass)
+    k = (system.stiffness + mesh_stiffness * np.outer(direction, direction)) / system.mass[:, None]
+    c = system.damping / system.mass[:, None]
+    return np.linalg.eigvals(np.block([[np.zeros((n, n)), np.eye(n)], [-k, -c]])).astype(np.complex128)
+
+
 def slowest_decay(system: LumpedSystem, direction: Array, mesh_stiffness: float) -> float:
     """Slowest decay rate in 1/s of the system with its mesh held at a mean stiffness.
 
     ``direction`` (dof,) is the gradient of the approach. Rigid-body motion without restoring force is left out.
     """
-    n = len(system.mass)
-    k = (system.stiffness + mesh_stiffness * np.outer(direction, direction)) / system.mass[:, None]
-    c = system.damping / system.mass[:, None]
-    state = np.block([[np.zeros((n, n)), np.eye(n)], [-k, -c]])
-    rates = -np.real(np.linalg.eigvals(state))
+    rates = -np.real(eigenvalues(system, direction, mesh_stiffness))
     moving = rates[rates > 1e-3]
     return float(moving.min()) if len(moving) else np.inf

@@ -23,7 +23,9 @@ class Crack(Fault):
     """Crack from the middle of the root transition curve, at ``crack_angle`` to the tooth centreline, inward.
 
     Source: spur paper eqs. (11) and (12): h_q = h_c - q sin(angle), and every section thicker than h_q keeps
-    h_x + h_q of its height. The body stays whole, which makes the crack weaker than finite elements find it.
+    h_x + h_q of its height. The body stays whole, which makes the crack weaker than finite elements find it. Below
+    its mouth every section is thicker than h_c, so (11) and (12) cut the tooth even at depth 0: a crack of no depth is
+    therefore left out, and the first micrometre costs up to 34e-12 m/N.
     """
 
     kind: ClassVar[str] = "crack"
@@ -51,6 +53,8 @@ class Crack(Fault):
 
     def apply(self, tooth: Tooth) -> Tooth:
         """Reduce the sections that the crack cuts."""
+        if self.crack_depth == 0.0:
+            return tooth
         chord = self.root_chord(tooth.gear)
         if self.crack_depth >= chord:
             raise FaultError(

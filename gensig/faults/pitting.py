@@ -39,12 +39,16 @@ class Pitting(Fault):
 
     def severity(self, gear: Gear) -> float:
         """Pitted share of the flank (involute height on the tooth axis times face width)."""
+        if self.pit_depth == 0.0:
+            return 0.0
         tip = math.sqrt(gear.tip_radius**2 - gear.base_radius**2)
         ends = np.hypot(gear.base_radius, np.array([gear.junction_curvature_radius, tip]))
         return self.pit_length * self.pit_width / (float(ends[1] - ends[0]) * gear.face_width)
 
     def apply(self, tooth: Tooth) -> Tooth:
-        """Remove the pit from the sections and from the width in contact."""
+        """Remove the pit from the sections and from the width in contact; a pit without extent is none."""
+        if self.pit_length * self.pit_width * self.pit_depth == 0.0:
+            return tooth
         gear, profile = tooth.gear, tooth.profile
         flank = profile.abscissa[profile.n_root_cells :]
         low, high = self._edges(tooth)
@@ -68,14 +72,18 @@ class Pitting(Fault):
                 f"pit_depth {self.pit_depth * 1e3:.4g} mm reaches the centreline of the {self.gear} tooth (half "
                 f"thickness {float(half[overlap > 0.0].min()) * 1e3:.4g} mm there); reduce fault.pit_depth_mm"
             )
+        # shares of the sound section, so that a pit and a crack compose in any order
         lost_width = self.pit_width * overlap
         lost_area = lost_width * self.pit_depth
-        parallel_axis = tooth.area * lost_area * (half - 0.5 * self.pit_depth) ** 2 / (tooth.area - lost_area)
+        area = 2.0 * half * gear.face_width
+        second_moment = area * half**2 / 3.0
+        parallel_axis = area * lost_area * (half - 0.5 * self.pit_depth) ** 2 / (area - lost_area)
+        lost_moment = lost_width * self.pit_depth**3 / 12.0 + parallel_axis
         inside = (flank >= low) & (flank <= high)
         return replace(
             tooth,
-            area=tooth.area - lost_area,
-            second_moment=tooth.second_moment - lost_width * self.pit_depth**3 / 12.0 - parallel_axis,
+            area=tooth.area * (1.0 - lost_area / area),
+            second_moment=tooth.second_moment * (1.0 - lost_moment / second_moment),
             contact_width=np.where(inside, tooth.contact_width - self.pit_width, tooth.contact_width),
         )
 

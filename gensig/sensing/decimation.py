@@ -12,11 +12,11 @@ from numpy.typing import NDArray
 Array = NDArray[np.float64]
 
 PASS_SHARE = 0.390625  # 20 kHz of 51.2 kHz
-ATTENUATION_DB = 80.0
+ATTENUATION_DB = 100.0
 
 
 def usable_band(sampling_rate: float) -> tuple[float, float]:
-    """Band in Hz in which the recorded signal is flat to 0.01 dB; nothing folds above -80 dB at any frequency."""
+    """Band in Hz in which the recorded signal is flat to 0.01 dB; nothing folds above -100 dB at any frequency."""
     return 0.0, PASS_SHARE * sampling_rate
 
 
@@ -28,12 +28,21 @@ class Decimator:
     oversampling: int
     margin: int
 
-    def apply(self, signal: Array) -> Array:
-        """(internal sample, channel) with ``margin`` output samples on both sides -> (channel, sample)."""
+    def apply(self, means: Array) -> Array:
+        """Mean values over internal steps to samples at the output rate.
+
+        Parameters
+        ----------
+        means : (step, channel)    the first step ends ``margin`` output samples before the first output sample
+
+        Returns
+        -------
+        (channel, sample)
+        """
         from scipy.signal import upfirdn
 
-        filtered = upfirdn(self.taps, signal, up=1, down=self.oversampling, axis=0)
-        n_samples = len(signal) // self.oversampling - 2 * self.margin
+        filtered = upfirdn(self.taps, means, up=1, down=self.oversampling, axis=0)
+        n_samples = (len(means) - 1) // self.oversampling - 2 * self.margin
         return np.ascontiguousarray(filtered[2 * self.margin : 2 * self.margin + n_samples].T)
 
 
@@ -41,15 +50,18 @@ class Decimator:
 def decimator(oversampling: int) -> Decimator:
     """Kaiser-window design: pass to 0.39 of the output rate, stop from half of it, so that nothing folds anywhere.
 
-    A stop band that began where content folds into the pass band would need half the taps, but would leave mesh
-    harmonics of 20 to 31 kHz in 20 to 25.6 kHz, between the mesh lines, where residuals see them.
+    An even number of taps puts samples at the ends of steps, whose means lie half a step earlier; the pass band makes
+    up for what the mean over a step takes (0.03 dB at 20 kHz for 8 steps a sample). A stop band that began where
+    content folds into the pass band would need half the taps, but would leave mesh harmonics of 20 to 31 kHz in 20 to
+    25.6 kHz, between the mesh lines, where residuals see them.
     """
-    if oversampling == 1:
-        return Decimator(np.ones(1), 1, 0)
-    from scipy.signal import firwin, kaiserord
+    from scipy.signal import firwin2, kaiserord
 
-    stop = 0.5
-    n_taps, beta = kaiserord(ATTENUATION_DB, (stop - PASS_SHARE) / (0.5 * oversampling))
+    nyquist = 0.5 * oversampling  # in units of the output rate
+    n_taps, beta = kaiserord(ATTENUATION_DB, (0.5 - PASS_SHARE) / nyquist)
     margin = math.ceil(0.5 * n_taps / oversampling)
-    taps = firwin(2 * margin * oversampling + 1, 0.5 * (PASS_SHARE + stop), window=("kaiser", beta), fs=oversampling)
+    middle = 0.5 * (PASS_SHARE + 0.5)
+    frequency = np.append(np.linspace(0.0, middle, 65), [middle, nyquist])
+    gain = np.append(1.0 / np.sinc(frequency[:65] / oversampling), [0.0, 0.0])
+    taps = firwin2(2 * margin * oversampling, frequency, gain, nfreqs=16385, window=("kaiser", beta), fs=2.0 * nyquist)
     return Decimator(taps, oversampling, margin)

@@ -31,23 +31,21 @@ BODY_KEYS = ("mass_kg", "inertia_kg_m2", "support")
 
 def read_spur_pair(config: Mapping[str, Any]) -> SpurPair:
     """Build a spur pair from the boundary keys of a configuration."""
-    gear = config["gear"]
-    if gear.get("helix_angle_deg"):
-        raise ConfigError(
-            f"gear.helix_angle_deg = {gear['helix_angle_deg']:g}: system=spur_pair takes spur gears only, 0"
-        )
-    material = read(Material, config["material"], "material")
+    gear = section(config, "gear")
+    if _number("gear.helix_angle_deg", gear["helix_angle_deg"]) != 0.0:
+        raise ConfigError(f"gear.helix_angle_deg = {gear['helix_angle_deg']:g}: system=spur_pair takes spur gears, 0")
+    material = read(Material, section(config, "material"), "material")
     gears = {name: _read_gear(name, gear) for name in SIDES}
     return SpurPair(
         pair=GearPair(**gears, backlash=_number("gear.backlash_um", gear["backlash_um"])),
         material=material,
-        mesh=read(MeshOptions, config["mesh"], "mesh"),
+        mesh=read(MeshOptions, section(config, "mesh"), "mesh"),
         pinion=_read_body(gears["pinion"], gear["pinion"], material),
         wheel=_read_body(gears["wheel"], gear["wheel"], material),
-        operating=read(Operating, config["operating"], "operating"),
-        sensing=read(Sensing, config["sensing"], "sensing"),
-        quality=read(Quality, config["quality"], "quality"),
-        solver=read(Solver, config["solver"], "solver"),
+        operating=read(Operating, section(config, "operating"), "operating"),
+        sensing=read(Sensing, section(config, "sensing"), "sensing"),
+        quality=read(Quality, section(config, "quality"), "quality"),
+        solver=read(Solver, section(config, "solver"), "solver"),
     )
 
 
@@ -61,14 +59,25 @@ def read_system(config: Mapping[str, Any]) -> SpurPair:
     ------
     ConfigError, GeometryError    for keys or values that make no machine
     """
-    kind = config["system"].get("kind")
+    kind = section(config, "system").get("kind")
     if kind not in SYSTEMS:
         raise ConfigError(f"system.kind = {kind!r}; allowed: {', '.join(SYSTEMS)}")
     return SYSTEMS[kind](config)
 
 
+def section(config: Mapping[str, Any], *path: str) -> Mapping[str, Any]:
+    """A group of keys of the configuration; ConfigError where there is none."""
+    node: Any = config
+    for name in path:
+        node = node.get(name)
+        if not isinstance(node, Mapping):
+            place = ".".join(path)
+            raise ConfigError(f"{place} = {node!r} must be a group of keys; choose an option or leave it alone")
+    return node
+
+
 def _read_gear(name: str, gear: Mapping[str, Any]) -> Gear:
-    own = {key: value for key, value in gear[name].items() if key not in BODY_KEYS}
+    own = {key: value for key, value in section(gear, name).items() if key not in BODY_KEYS}
     return read(Gear, {**{key: gear[key] for key in COMMON_GEAR_KEYS}, **own}, f"gear.{name}", name=name)
 
 
@@ -83,7 +92,11 @@ def _read_body(gear: Gear, values: Mapping[str, Any], material: Material) -> Bod
     for key, value in (("mass_kg", mass), ("inertia_kg_m2", inertia)):
         if not value > 0.0:
             raise ConfigError(f"gear.{gear.name}.{key} = {value:g} must be positive, or null to derive it")
-    return Body(mass=mass, inertia=inertia, support=read(Support, values["support"], f"gear.{gear.name}.support"))
+    try:
+        support = read(Support, section(values, "support"), "support")
+    except ConfigError as error:
+        raise ConfigError(f"gear.{gear.name}.{error}") from None
+    return Body(mass=mass, inertia=inertia, support=support)
 
 
 def _number(key: str, value: Any) -> float:

@@ -9,7 +9,7 @@ from functools import lru_cache
 import numpy as np
 from numpy.typing import NDArray
 
-from gensig.dynamics.integrator import Solver, integrate
+from gensig.dynamics.integrator import Solver, check_channels, check_step, integrate
 from gensig.dynamics.pair import Body, PairDynamics, Support
 from gensig.errors import FaultError
 from gensig.faults.base import Fault, faulty_teeth
@@ -85,6 +85,18 @@ class SpurPair:
         """Compliance and gap tables with the given faults."""
         return _mesh_table(self.pair, self.material, self.mesh, tuple(faults))
 
+    def check(self) -> None:
+        """Raise for what would stop every record: interrupted drive, fits out of range, channels, step length."""
+        self.pair.require_continuous_drive()
+        self.mesh_table()
+        check_channels(self.sensing.channels)
+        perfect, start = (
+            perfect_specimen(self.pair.pinion, self.pair.wheel),
+            Start(tooth_pinion=0, tooth_wheel=0, phase=0),
+        )
+        nominal = self._dynamics((), start, perfect, nominal_gearbox(len(self.sensing.channels)))
+        check_step(nominal, 1.0 / (self.sensing.sampling_rate * self.solver.oversampling))
+
     def simulate(
         self,
         faults: Sequence[Fault] = (),
@@ -98,20 +110,9 @@ class SpurPair:
         begin = start or Start(tooth_pinion=0, tooth_wheel=0, phase=0.0)
         gears = specimen or perfect_specimen(self.pair.pinion, self.pair.wheel)
         housing = gearbox or nominal_gearbox(len(self.sensing.channels))
-        dynamics = PairDynamics(
-            table=self.mesh_table(faults),
-            pinion=_scaled(self.pinion, housing.stiffness_factor[:2], housing.damping_factor[:2]),
-            wheel=_scaled(self.wheel, housing.stiffness_factor[2:], housing.damping_factor[2:]),
-            operating=self.operating,
-            pinion_error=gears.pinion_error,
-            wheel_error=gears.wheel_error,
-            start_tooth_pinion=begin.tooth_pinion,
-            start_tooth_wheel=begin.tooth_wheel,
-            start_phase=begin.phase,
-        )
         low_pass = decimator(self.solver.oversampling)
         motion = integrate(
-            dynamics,
+            self._dynamics(faults, begin, gears, housing),
             self.solver,
             sampling_rate=self.sensing.sampling_rate,
             channels=self.sensing.channels,
@@ -121,6 +122,19 @@ class SpurPair:
             acceleration=low_pass.apply(motion.acceleration) * housing.gain[:, None],
             mean_speed=motion.mean_speed,
             contact_loss_fraction=motion.contact_loss_fraction,
+        )
+
+    def _dynamics(self, faults: Sequence[Fault], start: Start, specimen: Specimen, gearbox: Gearbox) -> PairDynamics:
+        return PairDynamics(
+            table=self.mesh_table(faults),
+            pinion=_scaled(self.pinion, gearbox.stiffness_factor[:2], gearbox.damping_factor[:2]),
+            wheel=_scaled(self.wheel, gearbox.stiffness_factor[2:], gearbox.damping_factor[2:]),
+            operating=self.operating,
+            pinion_error=specimen.pinion_error,
+            wheel_error=specimen.wheel_error,
+            start_tooth_pinion=start.tooth_pinion,
+            start_tooth_wheel=start.tooth_wheel,
+            start_phase=start.phase,
         )
 
     def stiffness_curves(

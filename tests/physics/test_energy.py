@@ -39,7 +39,7 @@ def trajectory(dynamics, oversampling=OVERSAMPLING):
     step = 1 / (SAMPLING_RATE * oversampling)
     system, mesh = dynamics.system().arrays(), dynamics.arrays(step)
     q, v = dynamics.static_start(0.0), np.zeros(6)
-    scratch, work, nothing, channel = np.empty((5, 6)), np.empty((6, 4)), np.empty((0, 1)), np.array([0])
+    scratch, work, nothing, channel = *_kernels.work_arrays(6), np.empty((0, 1)), np.array([0])
     states = [(q.copy(), v.copy())]
     for n in range(round(DURATION / step)):
         _kernels.integrate(system, mesh, q, v, step, n, 1, channel, nothing, scratch, work)
@@ -49,7 +49,7 @@ def trajectory(dynamics, oversampling=OVERSAMPLING):
 
 def balance(dynamics):
     q, v, mesh, step = trajectory(dynamics)
-    system, m, work = dynamics.system(), mesh.numbers, np.empty((6, 4))
+    system, m, work = dynamics.system(), mesh.numbers, _kernels.work_arrays(6)[1]
     direction = dynamics.approach_direction()
     time = np.arange(len(q)) * step
     rolls = m.start_roll + m.pinion_radius * (m.speed * time + q[:, 2]), m.pinion_radius * (m.speed + v[:, 2])
@@ -123,7 +123,7 @@ def test_friction_dissipates(case):
 def test_friction_of_rigid_gears_dissipates_at_every_position(xiamen, dynamics_of, seed):
     mesh = dynamics_of(xiamen).arrays(1e-6)
     speed, ratio = xiamen.operating.speed, xiamen.pair.ratio
-    rng, work = np.random.default_rng(seed), np.empty((6, 4))
+    rng, work = np.random.default_rng(seed), _kernels.work_arrays(6)[1]
     for roll in rng.uniform(0, 50, 500) * xiamen.pair.base_pitch:
         rate = xiamen.pair.pinion.base_radius * speed
         law = _kernels.mesh_law(*mesh, roll, rng.uniform(0, 20e-6), rng.normal(0, 1e-3), rate, work)
@@ -142,11 +142,9 @@ def test_action_equals_reaction(xiamen, dynamics_of):
         q = rng.normal(0, 1e-6, 6)
         q[5] -= (rng.uniform(1e-6, 2e-5) - q @ direction) / xiamen.pair.wheel.base_radius
         v = rng.normal(0, 1e-3, 6)
-        out, state = np.empty((1, 6)), (q.copy(), v.copy())
-        _kernels.integrate(
-            system.arrays(), mesh, *state, step, 0, 1, np.arange(6), out, np.empty((5, 6)), np.empty((6, 4))
-        )
-        force = system.mass * out[0] - system.force + system.stiffness @ q + system.damping @ v
+        found = np.empty(6)
+        _kernels.acceleration(*system.arrays(), *mesh, 0.0, q, v, found, _kernels.work_arrays(6)[1])
+        force = system.mass * found - system.force + system.stiffness @ q + system.damping @ v
         assert force[1] > 0
         assert_allclose(force[1], -force[4], rtol=1e-9, atol=1e-6)
         assert_allclose(force[0], -force[3], rtol=1e-9, atol=1e-6)
@@ -162,9 +160,10 @@ def test_a_larger_approach_meets_a_larger_force_back(xiamen, dynamics_of):
     mesh = dynamics.arrays(1e-6)
     for roll in np.linspace(0.01, 0.99, 9) * xiamen.pair.base_pitch:
         found = [
-            _kernels.mesh_law(*mesh, roll, a, 0.0, 4.0, np.empty((6, 4)))[0] for a in np.linspace(-20e-6, 20e-6, 41)
+            _kernels.mesh_law(*mesh, roll, a, 0.0, 4.0, _kernels.work_arrays(6)[1])[0]
+            for a in np.linspace(-20e-6, 20e-6, 41)
         ]
         assert np.all(np.diff(found) >= 0)
         assert found[0] == pytest.approx(0.0, abs=0.0)
-        coast = _kernels.mesh_law(*mesh, roll, -xiamen.pair.backlash - 5e-6, 0.0, 4.0, np.empty((6, 4)))[0]
+        coast = _kernels.mesh_law(*mesh, roll, -xiamen.pair.backlash - 5e-6, 0.0, 4.0, _kernels.work_arrays(6)[1])[0]
         assert coast < -100

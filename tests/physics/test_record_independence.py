@@ -112,7 +112,7 @@ def test_values_of_a_record(config, plan, in_order):
 
 def test_a_run_that_cannot_be_is_a_failed_record(config, plan):
     coarse = copy.deepcopy(config)
-    coarse["solver"]["oversampling"], coarse["sensing"]["sampling_rate_hz"] = 1, 20_000
+    coarse["solver"]["oversampling"], coarse["sensing"]["sampling_rate_hz"] = 2, 6_000
     found = simulate_record(coarse, plan.record(0))
     assert found.values["status"] == "failed"
     assert "solver.oversampling" in found.values["status_reason"]

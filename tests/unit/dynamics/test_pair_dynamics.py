@@ -59,11 +59,13 @@ def test_the_system_is_not_driven_on_balance(xiamen, dynamics_of):
     assert_allclose(force[2] + force[5] / xiamen.pair.ratio, dynamics.friction_torque(), rtol=1e-9, atol=0)
 
 
-def test_settling_time_is_capped(machine, dynamics_of):
-    assert_allclose(settling_time(dynamics_of(machine())), 0.3, rtol=1e-12, atol=0)
+def test_settling_time_follows_the_slowest_motion_and_is_capped(machine, dynamics_of):
+    assert 0.4 < settling_time(dynamics_of(machine())) < 0.45
+    slow = {"operating.drive_frequency_hz": 1}
+    assert_allclose(settling_time(dynamics_of(machine(slow))), 0.45, rtol=1e-12, atol=0)
     quick = {"operating.drive_frequency_hz": 20, "gear.pinion.support.damping_x_ns_per_m": 100,
              "gear.wheel.support.damping_x_ns_per_m": 500}  # fmt: skip
-    assert settling_time(dynamics_of(machine(quick))) < 0.3
+    assert settling_time(dynamics_of(machine(quick))) < 0.2
 
 
 class TestRefusals:
@@ -73,7 +75,7 @@ class TestRefusals:
 
     def test_a_step_too_long(self, xiamen, dynamics_of):
         with pytest.raises(SimulationError, match=r"raise solver.oversampling by at least [\d.]+ times"):
-            run(xiamen, dynamics_of(xiamen), sampling_rate=20e3, solver=Solver(oversampling=1, precision="float64"))
+            run(xiamen, dynamics_of(xiamen), sampling_rate=6e3, solver=Solver(oversampling=2, precision="float64"))
 
     def test_a_duration_without_samples(self, machine, dynamics_of):
         system = machine({"operating.duration_s": 1e-6})
@@ -83,7 +85,7 @@ class TestRefusals:
     @pytest.mark.parametrize(
         ("changes", "text"),
         [
-            ({"oversampling": 0}, "solver.oversampling = 0 must lie in 1..256"),
+            ({"oversampling": 0}, "solver.oversampling = 0 must lie in 2..256"),
             ({"precision": "float32"}, "solver.precision = 'float32'; allowed: float64"),
         ],
     )
