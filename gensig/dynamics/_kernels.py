@@ -318,7 +318,7 @@ def integrate(system, mesh, q, v, step, first_step, n_steps, channels, out, scra
     """Advance q and v in place by ``n_steps`` of classical RK4.
 
     A step in which a pair takes up or lets go of its load is taken again in ``SUBSTEPS`` parts: the force has a kink
-    there, which would otherwise set the accuracy of everything. ``out`` (n_steps, channel) takes the mean acceleration
+    there, which would otherwise set the accuracy of everything. ``out`` (channel, n_steps) takes the mean acceleration
     of the chosen degrees of freedom over each step (what the equations add to the velocity, over the step: kinks then
     alias far less than point values would); with no rows nothing is stored. Returns the number of steps without
     contact, and the step at which a value stopped being finite (-1 if none).
@@ -327,7 +327,7 @@ def integrate(system, mesh, q, v, step, first_step, n_steps, channels, out, scra
     m, table, pinion_row, wheel_row, pinion_error, wheel_error, sound_wheel = mesh
     n_dof = len(q)
     a, trial_q, trial_v, sum_q, sum_v = scratch[0], scratch[1], scratch[2], scratch[3], scratch[4]
-    store = len(out) > 0
+    store = out.shape[1] > 0
     n_lost = 0
     for n in range(n_steps):
         n_parts, part = 1, 0
@@ -363,7 +363,7 @@ def integrate(system, mesh, q, v, step, first_step, n_steps, channels, out, scra
             if store:
                 for c in range(len(channels)):
                     mean = sum_v[channels[c]] / (6.0 * n_parts)
-                    out[n, c] = mean if part == 0 else out[n, c] + mean
+                    out[c, n] = mean if part == 0 else out[c, n] + mean
             for i in range(n_dof):
                 q[i] += h / 6.0 * sum_q[i]
                 v[i] += h / 6.0 * sum_v[i]

@@ -44,7 +44,7 @@ class Solver:
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Motion:
-    """Mean accelerations over the internal steps, (step, channel) m/s2 or rad/s2, and what the run tells about itself.
+    """Mean accelerations over the internal steps, (channel, step) m/s2 or rad/s2, and what the run tells about itself.
 
     The first step ends where the first sample of the margin lies.
     """
@@ -92,11 +92,12 @@ def integrate(
     q = dynamics.static_start((begin - n_settle + n_fine) / sampling_rate)
     v = np.zeros_like(q)
     scratch = _kernels.work_arrays(len(q))
-    out = np.empty((n_record, len(index)))
+    nothing = np.empty((len(index), 0))
+    out = np.empty((len(index), n_record))
     angle, n_lost, broken = 0.0, 0, -1
     for width, first, n_steps, target in (
-        (coarse_step, (begin - n_settle + n_fine) * coarse, (n_settle - n_fine) * coarse, out[:0]),
-        (step, begin * fine, n_fine * fine - 1, out[:0]),
+        (coarse_step, (begin - n_settle + n_fine) * coarse, (n_settle - n_fine) * coarse, nothing),
+        (step, begin * fine, n_fine * fine - 1, nothing),
         (step, -margin * fine - 1, n_record, out),
     ):
         angle = q[2]

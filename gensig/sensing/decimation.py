@@ -33,17 +33,16 @@ class Decimator:
 
         Parameters
         ----------
-        means : (step, channel)    the first step ends ``margin`` output samples before the first output sample
+        means : (channel, step)    the first step ends ``margin`` output samples before the first output sample
 
         Returns
         -------
         (channel, sample)
         """
-        from scipy.signal import upfirdn
-
-        filtered = upfirdn(self.taps, means, up=1, down=self.oversampling, axis=0)
-        n_samples = (len(means) - 1) // self.oversampling - 2 * self.margin
-        return np.ascontiguousarray(filtered[2 * self.margin : 2 * self.margin + n_samples].T)
+        n_samples = (means.shape[1] - 1) // self.oversampling - 2 * self.margin
+        windows = np.lib.stride_tricks.sliding_window_view(means[:, 1:], len(self.taps), axis=1)
+        # twice as fast as scipy.signal.upfirdn; the taps are symmetric, so no reversal
+        return np.einsum("csk,k->cs", windows[:, :: self.oversampling][:, :n_samples], self.taps)
 
 
 @lru_cache(maxsize=16)

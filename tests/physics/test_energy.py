@@ -39,7 +39,7 @@ def trajectory(dynamics, oversampling=OVERSAMPLING):
     step = 1 / (SAMPLING_RATE * oversampling)
     system, mesh = dynamics.system().arrays(), dynamics.arrays(step)
     q, v = dynamics.static_start(0.0), np.zeros(6)
-    scratch, work, nothing, channel = *_kernels.work_arrays(6), np.empty((0, 1)), np.array([0])
+    scratch, work, nothing, channel = *_kernels.work_arrays(6), np.empty((1, 0)), np.array([0])
     states = [(q.copy(), v.copy())]
     for n in range(round(DURATION / step)):
         _kernels.integrate(system, mesh, q, v, step, n, 1, channel, nothing, scratch, work)

@@ -163,7 +163,7 @@ def test_one_millisecond_against_dop853(xiamen, dynamics_of):
     n_steps = round(duration / (64 * step)) * 64
     reference = Reference(dynamics, step)
     start = dynamics.static_start(0.0) + 1e-6 * np.array([1, 1, 0, -1, 1, 0])
-    stored = np.empty((n_steps, 6))
+    stored = np.empty((6, n_steps))
     q, v, mesh, work = start.copy(), np.zeros(6), dynamics.arrays(step), _kernels.work_arrays(6)[1]
     _kernels.integrate(
         dynamics.system().arrays(), mesh, q, v, step, 0, n_steps, np.arange(6), stored, np.empty((5, 6)), work
@@ -185,6 +185,6 @@ def test_one_millisecond_against_dop853(xiamen, dynamics_of):
     )
     # what is stored are means over steps, so means over 64 of them are differences of velocity
     expected = np.diff(solution.y[6:], axis=1).T / (64 * step)
-    found = stored.reshape(-1, 64, 6).mean(axis=1)
+    found = stored.reshape(6, -1, 64).mean(axis=2).T
     scale = np.sqrt(np.mean(expected**2, axis=0))
     assert_allclose(found / scale, expected / scale, rtol=0, atol=1e-4)

@@ -23,7 +23,7 @@ def decimated(frequency, oversampling, phase=0.4):
     turn = 2 * np.pi * frequency
     integral = -np.cos(turn * edge + phase) / turn if frequency else edge * np.sin(phase)
     signal = np.diff(integral) * RATE * oversampling
-    return low_pass.apply(signal[:, None])[0], np.sin(2 * np.pi * frequency * np.arange(N_SAMPLES) / RATE + phase)
+    return low_pass.apply(signal[None])[0], np.sin(2 * np.pi * frequency * np.arange(N_SAMPLES) / RATE + phase)
 
 
 @pytest.mark.parametrize("frequency", [0.0, 31.0, 690.0, 9000.0, 15_000.0, 20_000.0])
@@ -51,7 +51,7 @@ def test_without_the_filter_it_would_fold(oversampling):
 @pytest.mark.parametrize("n_samples", [1, 100, 1707])
 def test_length_and_channels(n_samples, oversampling):
     low_pass = decimator(oversampling)
-    signal = np.zeros(((n_samples + 2 * low_pass.margin) * oversampling + 1, 3))
+    signal = np.zeros((3, (n_samples + 2 * low_pass.margin) * oversampling + 1))
     assert low_pass.apply(signal).shape == (3, n_samples)
 
 
