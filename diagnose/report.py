@@ -81,6 +81,12 @@ def _page(metrics: Mapping[str, Any], with_severity: Sequence[str]) -> list[str]
         "",
         *result_table(metrics),
         "",
+        "## Which faults are found",
+        "",
+        f"Share of the test records of each class that {metrics['model']} recognises:",
+        "",
+        *_recall_table(metrics),
+        "",
         "## What the numbers mean",
         "",
         "- **Balanced accuracy**: mean over the classes of the share of records recognised. A record's label is the "
@@ -109,6 +115,17 @@ def _page(metrics: Mapping[str, Any], with_severity: Sequence[str]) -> list[str]
     return lines
 
 
+def _recall_table(metrics: Mapping[str, Any]) -> list[str]:
+    """Recall by class and clean protocol, a Markdown table."""
+    names = metrics["class_names"]
+    lines = ["| protocol | " + " | ".join(_safe(name) for name in names) + " |", "|---" * (len(names) + 1) + "|"]
+    for protocol, result in metrics["protocols"].items():
+        if not result["leaky"]:
+            shares = result["methods"][metrics["model"]]["recall"]
+            lines.append(f"| **{protocol}** | " + " | ".join(f"{shares[name]:.2f}" for name in names) + " |")
+    return lines
+
+
 def _headline(name: str, result: Mapping[str, Any], model: str) -> str:
     """One sentence: the score against chance and against the best baseline."""
     methods = result["methods"]
@@ -119,7 +136,10 @@ def _headline(name: str, result: Mapping[str, Any], model: str) -> str:
     if others:
         best = max(others, key=lambda key: others[key]["balanced_accuracy"]["mean"])
         value = others[best]["balanced_accuracy"]["mean"]
-        comparison = "better than" if score["mean"] > value else "no better than"
+        # an interval that holds the other's mean tells the two apart neither way
+        comparison = (
+            "better than" if score["low"] > value else "worse than" if score["high"] < value else "not told from"
+        )
         text += f"; {comparison} the {best.replace('_', ' ')} baseline ({value:.2f})"
     if "label_shuffle" in methods:
         shuffled = methods["label_shuffle"]["balanced_accuracy"]
