@@ -141,8 +141,9 @@ def test_a_sham_has_severity_zero_and_keeps_its_labels(planned, plan):
 def test_units_are_specimens_in_gearboxes(plan, quickstart):
     units = set(zip(*(plan.columns[key].tolist() for key in ("unit_id", "gearbox_id", "specimen_id")), strict=True))
     assert len(units) == quickstart["plan"]["n_units"] == len({unit for unit, _, _ in units})
-    assert len({gearbox for _, gearbox, _ in units}) == 4
-    assert len({(gearbox, specimen) for _, gearbox, specimen in units}) == 16
+    assert len({gearbox for _, gearbox, _ in units}) == quickstart["plan"]["n_gearboxes"]
+    assert len({(gearbox, specimen) for _, gearbox, specimen in units}) == len(units)
+    assert len({specimen for _, _, specimen in units}) * quickstart["plan"]["n_gearboxes"] == len(units)
 
 
 class TestRefusals:
