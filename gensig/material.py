@@ -19,10 +19,24 @@ class Material:
     def __post_init__(self) -> None:
         if not self.youngs_modulus > 0.0:
             raise ConfigError(f"material.youngs_modulus_gpa = {self.youngs_modulus / 1e9:g} must be positive")
-        if not 0.0 <= self.poisson_ratio < 0.5:
-            raise ConfigError(f"material.poisson_ratio = {self.poisson_ratio:g} must be at least 0 and below 0.5")
+        if not 0.0 <= self.poisson_ratio < 1.0:
+            raise ConfigError(f"material.poisson_ratio = {self.poisson_ratio:g} must be at least 0 and below 1")
         if not self.density_kg_per_m3 > 0.0:
             raise ConfigError(f"material.density_kg_per_m3 = {self.density_kg_per_m3:g} must be positive")
+
+    def in_plane(self, elasticity: str) -> Material:
+        """The material whose plane-stress formulas are those of this one under ``plane_stress`` or ``plane_strain``.
+
+        Plane strain is plane stress with E / (1 - nu^2) and nu / (1 - nu); the shear modulus stays.
+        """
+        if elasticity == "plane_stress":
+            return self
+        nu = self.poisson_ratio
+        return Material(
+            youngs_modulus=self.youngs_modulus / (1.0 - nu**2),
+            poisson_ratio=nu / (1.0 - nu),
+            density_kg_per_m3=self.density_kg_per_m3,
+        )
 
     @property
     def shear_modulus(self) -> float:

@@ -9,8 +9,8 @@ from gensig.errors import ConfigError
 CHOICES = {
     "law": ("one_sided", "paper"),
     "pair_coupling": ("coupled", "sum"),
-    "contact": ("linear",),
-    "elasticity": ("plane_stress",),
+    "contact": ("linear", "weber"),
+    "elasticity": ("plane_stress", "plane_strain"),
     "crack": ("paper",),
     "roll_torque": ("consistent", "classical"),
 }
@@ -22,7 +22,10 @@ class MeshOptions:
 
     law : ``one_sided`` solves contact with gaps (no pull, corner contact), ``paper`` is a spring k(t) without gaps
     pair_coupling : ``coupled`` lets pairs share the gear bodies, ``sum`` adds pair stiffnesses as the paper does
-    contact, elasticity, crack : the compliance terms; one choice each so far
+    contact : ``linear`` is the paper's constant Hertz term, ``weber`` the load-dependent local compliance, a secant at
+        the quasi-static pair load
+    elasticity : ``plane_stress`` (the paper's) or ``plane_strain``, of bending, axial and body terms
+    crack : the paper's equations, the one choice so far
     roll_torque : ``consistent`` keeps the energy balance where compliance and gap change with roll angle,
         ``classical`` leaves that torque out
     damping_ratio : of the mesh mode at the mean mesh stiffness

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+from collections.abc import Callable, Mapping
 from dataclasses import dataclass
 
 import numpy as np
@@ -17,7 +17,7 @@ from gensig.material import Material
 from gensig.mesh.body_coupling import shared_body_compliance
 from gensig.mesh.compliance import tooth_compliance
 from gensig.mesh.fillet_foundation import fillet_foundation_compliance
-from gensig.mesh.hertz import linear_contact_compliance
+from gensig.mesh.local_contact import contact_compliance
 from gensig.mesh.options import MeshOptions
 
 Array = NDArray[np.float64]
@@ -58,28 +58,46 @@ class PairTable:
     shared_compliance: float
 
 
+def node_positions(pair: GearPair, options: MeshOptions) -> Array:
+    """Positions s of the table's nodes, (node,) m; their distance divides the base pitch."""
+    n_nodes = (LAST_PITCH - FIRST_PITCH) * options.points_per_pitch + 1
+    return pair.base_pitch * np.linspace(FIRST_PITCH, LAST_PITCH, n_nodes)
+
+
 def pair_table(
-    pair: GearPair, material: Material, options: MeshOptions, teeth: Mapping[tuple[str, int], Tooth] | None = None
+    pair: GearPair,
+    material: Material,
+    options: MeshOptions,
+    teeth: Mapping[tuple[str, int], Tooth] | None = None,
+    *,
+    load: Array | float,
 ) -> PairTable:
     """Tabulate the mesh of a gear pair.
 
     Parameters
     ----------
     teeth : the teeth that are not sound, by (gear, tooth), as ``faulty_teeth`` gives them
+    load : (node,) N    load of a pair by position, at which a load-dependent contact term is taken
     """
     odd = dict(teeth or {})
-    n_nodes = (LAST_PITCH - FIRST_PITCH) * options.points_per_pitch + 1
-    position = pair.base_pitch * np.linspace(FIRST_PITCH, LAST_PITCH, n_nodes)
+    position = node_positions(pair, options)
     on_path = np.clip(position, 0.0, pair.path_of_contact)
     corner = corner_gap_by_pinion(pair, position)
-    sound_contact = linear_contact_compliance(np.array(pair.pinion.face_width), material)
+
+    def contact(width: Array) -> Array:
+        return contact_compliance(pair, on_path, width, np.asarray(load), material, options)
+
+    sound = contact(np.full_like(position, pair.pinion.face_width))
+    structure = material.in_plane(options.elasticity)
     sides = {}
-    for gear, curvature, extra, gap in (
-        (pair.pinion, pair.pinion_curvature(on_path), sound_contact, corner),
-        (pair.wheel, pair.wheel_curvature(on_path), np.zeros(()), np.zeros_like(corner)),
+    for gear, curvature, base, gap in (
+        (pair.pinion, pair.pinion_curvature(on_path), np.zeros_like(sound), corner),
+        (pair.wheel, pair.wheel_curvature(on_path), -sound, np.zeros_like(corner)),
     ):
-        sides[gear.name] = _gear_table(gear, np.asarray(curvature), position, extra, gap, material, options, odd)
-    shared = shared_body_compliance(pair, material) if options.pair_coupling == "coupled" else 0.0
+        sides[gear.name] = _gear_table(
+            gear, np.asarray(curvature), position, contact, base, gap, structure, options, odd
+        )
+    shared = shared_body_compliance(pair, structure) if options.pair_coupling == "coupled" else 0.0
     stiffest = float(sides["pinion"].compliance.min() + sides["wheel"].compliance.min())
     if shared >= 0.95 * stiffest:
         raise ExtrapolationError(
@@ -97,21 +115,19 @@ def pair_table(
 
 
 def structural_compliance(tooth: Tooth, curvature: Array, material: Material, options: MeshOptions) -> Array:
-    """Tooth and body compliance of one loaded tooth, (phase,) m/N, plus what its narrowed contact adds."""
+    """Tooth and body compliance of one loaded tooth, (phase,) m/N; the material as ``Material.in_plane`` gives it."""
     gear = tooth.gear
-    own = tooth_compliance(tooth, curvature, material).total + fillet_foundation_compliance(
+    return tooth_compliance(tooth, curvature, material).total + fillet_foundation_compliance(
         gear, load_angle(gear, curvature), material, allow_extrapolation=options.allow_extrapolation
     )
-    width = np.interp(curvature, tooth.profile.curvature_radius, tooth.contact_width)
-    sound = linear_contact_compliance(np.array(gear.face_width), material)
-    return own + linear_contact_compliance(width, material) - sound
 
 
 def _gear_table(
     gear: Gear,
     curvature: Array,
     position: Array,
-    extra: Array,
+    contact: Callable[[Array], Array],
+    base: Array,
     gap: Array,
     material: Material,
     options: MeshOptions,
@@ -122,7 +138,13 @@ def _gear_table(
     kind = np.zeros(gear.n_teeth, dtype=np.int64)
     for row, tooth_index in enumerate(mine, start=1):
         kind[tooth_index] = row
-    compliance = np.stack([structural_compliance(tooth, curvature, material, options) for tooth in distinct]) + extra
+    widths = [np.interp(curvature, tooth.profile.curvature_radius, tooth.contact_width) for tooth in distinct]
+    compliance = np.stack(
+        [
+            structural_compliance(tooth, curvature, material, options) + contact(width) + base
+            for tooth, width in zip(distinct, widths, strict=True)
+        ]
+    )
     deviation = np.stack(
         [np.interp(curvature, tooth.profile.curvature_radius, tooth.flank_deviation.mean(axis=0)) for tooth in distinct]
     )
@@ -138,7 +160,7 @@ def _gear_table(
 
 
 def pair_compliance(table: PairTable, position: Array, pinion_kind: int = 0, wheel_kind: int = 0) -> Array:
-    """Compliance of a single pair that carries the whole load, (phase,) m/N."""
+    """Compliance of a single pair under the table's load, (phase,) m/N."""
     return np.interp(position, table.position, table.pinion.compliance[pinion_kind]) + np.interp(
         position, table.position, table.wheel.compliance[wheel_kind]
     )

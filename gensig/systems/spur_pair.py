@@ -19,10 +19,10 @@ from gensig.geometry.tooth_profile import load_angle
 from gensig.material import Material
 from gensig.mesh.compliance import tooth_compliance
 from gensig.mesh.fillet_foundation import fillet_foundation_compliance
-from gensig.mesh.hertz import linear_contact_compliance
-from gensig.mesh.load_distribution import pair_states, static_mesh
+from gensig.mesh.load_distribution import loaded_pair_table, pair_states, static_mesh
+from gensig.mesh.local_contact import contact_compliance
 from gensig.mesh.options import MeshOptions
-from gensig.mesh.pair_table import PairTable, pair_table
+from gensig.mesh.pair_table import PairTable
 from gensig.operating import Operating
 from gensig.sensing.chain import Sensing
 from gensig.sensing.decimation import decimator
@@ -83,7 +83,12 @@ class SpurPair:
 
     def mesh_table(self, faults: Sequence[Fault] = ()) -> PairTable:
         """Compliance and gap tables with the given faults."""
-        return _mesh_table(self.pair, self.material, self.mesh, tuple(faults))
+        return _mesh_table(self.pair, self.material, self.mesh, tuple(faults), self.mesh_force)
+
+    @property
+    def mesh_force(self) -> float:
+        """Normal force of the set torque, N."""
+        return self.operating.torque / self.pair.pinion.base_radius
 
     def check(self) -> None:
         """Raise for what would stop every record: interrupted drive, fits out of range, channels, step length."""
@@ -148,7 +153,7 @@ class SpurPair:
         gone = any(not tooth.present for tooth in faulty_teeth(pair, faults).values())
         gear = pair.wheel if faults and faults[0].gear == "wheel" else pair.pinion
         roll = pair.base_pitch * (np.arange(gear.n_teeth * points_per_tooth) + 0.5) / points_per_tooth
-        static = static_mesh(table, pair_states(table, roll), self.operating.torque / pair.pinion.base_radius)
+        static = static_mesh(table, pair_states(table, roll), self.mesh_force)
         return StiffnessCurves(
             contact_position=position / pair.base_pitch,
             single_pair_stiffness=_stiffness(sound),
@@ -165,15 +170,20 @@ class SpurPair:
         Half of the contact term of sound flanks belongs to either gear, what a fault adds to it to the faulty one.
         """
         odd = faulty_teeth(self.pair, faults)
+        structure = self.material.in_plane(self.mesh.elasticity)
+        load = np.full_like(position, self.mesh_force)
+
+        def contact(width: Array) -> Array:
+            return contact_compliance(self.pair, position, width, load, self.material, self.mesh)
+
+        sound = contact(np.full_like(position, self.pair.pinion.face_width))
         terms = {}
         for gear, curvature in (
             (self.pair.pinion, np.asarray(self.pair.pinion_curvature(position))),
             (self.pair.wheel, np.asarray(self.pair.wheel_curvature(position))),
         ):
             tooth: Tooth = next((tooth for (name, _), tooth in odd.items() if name == gear.name), healthy_tooth(gear))
-            parts = tooth_compliance(tooth, curvature, self.material)
-            width = np.interp(curvature, tooth.profile.curvature_radius, tooth.contact_width)
-            sound = linear_contact_compliance(np.array(gear.face_width), self.material)
+            parts = tooth_compliance(tooth, curvature, structure)
             terms[gear.name] = {
                 "bending": parts.bending,
                 "shear": parts.shear,
@@ -181,10 +191,11 @@ class SpurPair:
                 "foundation": fillet_foundation_compliance(
                     gear,
                     load_angle(gear, curvature),
-                    self.material,
+                    structure,
                     allow_extrapolation=self.mesh.allow_extrapolation,
                 ),
-                "contact": linear_contact_compliance(width, self.material) - 0.5 * sound,
+                "contact": contact(np.interp(curvature, tooth.profile.curvature_radius, tooth.contact_width))
+                - 0.5 * sound,
             }
         return terms
 
@@ -204,8 +215,10 @@ def _stiffness(terms: dict[str, dict[str, Array]]) -> Array:
 
 
 @lru_cache(maxsize=32)
-def _mesh_table(pair: GearPair, material: Material, mesh: MeshOptions, faults: tuple[Fault, ...]) -> PairTable:
-    return pair_table(pair, material, mesh, faulty_teeth(pair, faults))
+def _mesh_table(
+    pair: GearPair, material: Material, mesh: MeshOptions, faults: tuple[Fault, ...], force: float
+) -> PairTable:
+    return loaded_pair_table(pair, material, mesh, faulty_teeth(pair, faults), force=force)
 
 
 def _scaled(body: Body, stiffness: Array, damping: Array) -> Body:

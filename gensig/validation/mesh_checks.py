@@ -16,8 +16,8 @@ from gensig.material import Material
 from gensig.mesh.body_coupling import cross_compliance
 from gensig.mesh.compliance import tooth_compliance
 from gensig.mesh.fillet_foundation import body_coefficients, fillet_foundation_compliance
-from gensig.mesh.hertz import linear_contact_compliance
 from gensig.mesh.load_distribution import pair_states, static_mesh
+from gensig.mesh.local_contact import linear_contact_compliance
 from gensig.mesh.pair_table import pair_compliance, structural_compliance
 from gensig.validation.case import Array, Case, read_case, with_fault
 from gensig.validation.geometry_checks import Check

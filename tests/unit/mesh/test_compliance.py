@@ -14,7 +14,7 @@ from gensig.geometry.tooth import healthy_tooth
 from gensig.geometry.tooth_profile import involute_point, load_angle, tooth_profile
 from gensig.mesh.compliance import tooth_compliance
 from gensig.mesh.fillet_foundation import ExtrapolationWarning, body_coefficients, fillet_foundation_compliance
-from gensig.mesh.hertz import linear_contact_compliance
+from gensig.mesh.local_contact import linear_contact_compliance
 
 # pinion at B, C and E, 1e-12 m/N (shared/physics/spur.md table 2.2)
 CURVATURE = np.array([6.66082e-3, 7.86646e-3, 12.56508e-3])

@@ -1,0 +1,106 @@
+"""The load-dependent contact and plane strain: closed forms, laws, and the finite-element rows of the reference."""
+
+import numpy as np
+import pytest
+from numpy.testing import assert_allclose
+
+from gensig.mesh.load_distribution import pair_states, static_mesh
+from gensig.mesh.local_contact import linear_contact_compliance, weber_contact_compliance
+
+PHYSICAL = {"mesh.contact": "weber", "mesh.elasticity": "plane_strain"}
+# spur reference, section 3.4: named points by pinion curvature radius (mm), pair in plane strain at 20 N m (1e8 N/m)
+CURVATURE_MM = (2.45827, 4.55954, 6.66082, 7.51168, 7.86646, 8.36253, 10.46381, 12.56508)
+FINITE_ELEMENTS = (1.5067, 1.7595, 1.9036, 1.9262, 1.9291, 1.9264, 1.8218, 1.5706)
+LOCAL_PART = (1251.0, 1177.5, 1169.2, 1163.5, 1160.4, 1155.1, 1117.5, 1058.9)  # 1e-12 m/N
+
+
+@pytest.fixture(scope="module")
+def physical(machine):
+    return machine(PHYSICAL)
+
+
+def positions(system):
+    return np.clip(np.array(CURVATURE_MM) * 1e-3 - system.pair.start_curvature_radius, 0.0, system.pair.path_of_contact)
+
+
+def single_pair(system):
+    curves = system.stiffness_curves()
+    return np.interp(positions(system) / system.pair.base_pitch, curves.contact_position, curves.single_pair_stiffness)
+
+
+def test_single_pair_against_finite_elements(physical):
+    ratio = single_pair(physical) / (np.array(FINITE_ELEMENTS) * 1e8)
+    assert_allclose(ratio[1:7], 1.0, rtol=0.05, atol=0)
+    assert_allclose(ratio[[0, 7]], 1.0, rtol=0.08, atol=0)
+
+
+@pytest.mark.parametrize("key", PHYSICAL)
+def test_either_choice_alone_misses_them(machine, key):
+    ratio = single_pair(machine({key: PHYSICAL[key]})) / (np.array(FINITE_ELEMENTS) * 1e8)
+    assert np.abs(ratio - 1.0)[1:7].max() > 0.05
+
+
+def test_local_part_against_finite_elements(physical):
+    at = positions(physical)
+    width, load = (np.full_like(at, value) for value in (physical.pair.pinion.face_width, physical.mesh_force))
+    found = weber_contact_compliance(physical.pair, at, width, load, physical.material)
+    assert np.all((found / (np.array(LOCAL_PART) * 1e-12) > 0.90) & (found / (np.array(LOCAL_PART) * 1e-12) < 0.95))
+    assert linear_contact_compliance(width, physical.material)[0] < 0.3 * found.min()
+
+
+def test_coupled_double_zone_against_finite_elements(physical):
+    """Section 3.4: coupled with local contact at 20 N m, plane stress times 1.04."""
+    along_mm = np.array([0.0, 0.7, 1.401, 2.101, 2.802, 3.502, 4.203])
+    expected = np.array([2.355, 2.386, 2.403, 2.408, 2.401, 2.381, 2.347]) * 1e8 * 1.04
+    table = physical.mesh_table()
+    found = static_mesh(table, pair_states(table, along_mm * 1e-3), physical.mesh_force).stiffness
+    assert_allclose(found, expected, rtol=0.05, atol=0)
+
+
+def test_local_compliance_falls_with_load_and_width(physical):
+    at = np.full(4, physical.pair.pitch_point)
+    width = np.full(4, physical.pair.pinion.face_width)
+    loads = np.array([50.0, 200.0, 900.0, 4000.0])
+    assert np.all(np.diff(weber_contact_compliance(physical.pair, at, width, loads, physical.material)) < 0)
+    widths, load = width * np.array([0.25, 0.5, 0.75, 1.0]), np.full(4, 900.0)
+    assert np.all(np.diff(weber_contact_compliance(physical.pair, at, widths, load, physical.material)) < 0)
+
+
+def test_load_sharing_and_compliance_agree(physical):
+    """The table's contact term belongs to the loads that the table itself gives: a fourth round changes nothing."""
+    table, force = physical.mesh_table(), physical.mesh_force
+    roll = physical.pair.base_pitch * (np.arange(40) + 0.5) / 40
+    states = pair_states(table, roll)
+    load = static_mesh(table, states, force).load
+    inside = (states.position > 0) & (states.position < physical.pair.path_of_contact) & (load > 0.1 * force)
+    at, width = states.position[inside], np.full(inside.sum(), physical.pair.pinion.face_width)
+    own = states.compliance[inside] + table.shared_compliance
+    contact = weber_contact_compliance(physical.pair, at, width, load[inside], physical.material)
+    full = weber_contact_compliance(physical.pair, at, width, np.full_like(at, force), physical.material)
+    curves = physical.stiffness_curves()
+    alone = 1.0 / np.interp(at / physical.pair.base_pitch, curves.contact_position, curves.single_pair_stiffness)
+    assert_allclose(own - contact, alone - full, rtol=2e-3, atol=0)
+
+
+def test_more_torque_is_stiffer(machine):
+    stiffness = [
+        machine({**PHYSICAL, "operating.torque_nm": torque}).stiffness_curves().mesh_stiffness.mean()
+        for torque in (5.0, 20.0, 80.0)
+    ]
+    assert np.all(np.diff(stiffness) > 0)
+    assert 1.01 < stiffness[2] / stiffness[0] < 1.3
+
+
+def test_plane_strain_is_plane_stress_of_another_material(xiamen):
+    material = xiamen.material
+    inside = material.in_plane("plane_strain")
+    assert_allclose(inside.youngs_modulus, material.youngs_modulus / 0.91, rtol=1e-12, atol=0)
+    assert_allclose(inside.shear_modulus, material.shear_modulus, rtol=1e-12, atol=0)
+    assert material.in_plane("plane_stress") is material
+
+
+def test_records_run_with_it(machine):
+    system = machine({**PHYSICAL, "operating.duration_s": 0.05})
+    record = system.simulate()
+    assert np.isfinite(record.acceleration).all()
+    assert record.contact_loss_fraction == 0.0
