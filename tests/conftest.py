@@ -53,7 +53,7 @@ def xiamen(machine) -> SpurPair:
 @pytest.fixture(scope="session")
 def paper_machine(machine) -> SpurPair:
     """Every convention of the spur paper."""
-    return machine({"mesh.law": "paper", "mesh.pair_coupling": "sum"})
+    return machine({"mesh.law": "paper", "mesh.pair_coupling": "sum", "mesh.contact": "linear"})
 
 
 @pytest.fixture(scope="session")

@@ -60,6 +60,7 @@ def cross_compliance(gear: Gear, material: Material, loaded: Array, probed: Arra
     return np.einsum("pi,ij,pj->p", _load(gear, probed), flexibility, _load(gear, loaded))
 
 
+@lru_cache(maxsize=64)
 def arc_flexibility(gear: Gear, material: Material, angle: float) -> Array:
     """Displacements (u_x, u_y, rotation about the centre) of a root arc per (F_x, F_y, moment) on the arc at angle 0.
 

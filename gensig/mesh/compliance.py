@@ -30,12 +30,16 @@ class ToothCompliance:
         return self.bending + self.shear + self.axial
 
 
-def tooth_compliance(tooth: Tooth, curvature_radius: Array, material: Material) -> ToothCompliance:
+def tooth_compliance(
+    tooth: Tooth, curvature_radius: Array, material: Material, *, reach: str = "to_contact"
+) -> ToothCompliance:
     """Bending, shear and axial compliance of a tooth loaded at the given contact points.
 
     Parameters
     ----------
     curvature_radius : (phase,) m    of the tooth's own flank at the contact
+    reach : ``"to_contact"`` integrates up to the contact abscissa as the paper does, ``"to_centreline"`` up to where
+        the load crosses the centreline: what lies between is the local contact's
 
     Returns
     -------
@@ -48,23 +52,24 @@ def tooth_compliance(tooth: Tooth, curvature_radius: Array, material: Material) 
     root = profile.abscissa[0]
     x, step = tooth.cell_abscissa - root, np.diff(profile.abscissa)
     bend = step / (material.youngs_modulus * tooth.second_moment)
-    flank = slice(profile.n_root_cells, None)
-
-    def up_to_contact(cells: Array) -> Array:
-        running = np.concatenate([[0.0], np.cumsum(cells)])
-        return np.interp(curvature_radius, profile.curvature_radius, running[flank])
-
-    zeroth, first, second = (up_to_contact(bend * x**power) for power in range(3))
-    x_load, h_load = involute_point(gear, curvature_radius)
-    arm = x_load - root
     angle = load_angle(gear, curvature_radius)
     cos, sin = np.cos(angle), np.sin(angle)
+    x_load, h_load = involute_point(gear, curvature_radius)
+    if reach == "to_centreline":
+        # the same force, moved along its line to the centreline: arm and integral end there
+        x_load, h_load = np.maximum(x_load - h_load * np.tan(angle), root), np.zeros_like(h_load)
+    arm = x_load - root
+
+    def up_to_load(cells: Array) -> Array:
+        return np.interp(x_load, profile.abscissa, np.concatenate([[0.0], np.cumsum(cells)]))
+
+    zeroth, first, second = (up_to_load(bend * x**power) for power in range(3))
     return ToothCompliance(
         bending=(
             cos**2 * (arm**2 * zeroth - 2.0 * arm * first + second)
             - 2.0 * cos * sin * h_load * (arm * zeroth - first)
             + sin**2 * h_load**2 * zeroth
         ),
-        shear=cos**2 * up_to_contact(SHEAR_FACTOR * step / (material.shear_modulus * tooth.area)),
-        axial=sin**2 * up_to_contact(step / (material.youngs_modulus * tooth.area)),
+        shear=cos**2 * up_to_load(SHEAR_FACTOR * step / (material.shear_modulus * tooth.area)),
+        axial=sin**2 * up_to_load(step / (material.youngs_modulus * tooth.area)),
     )

@@ -2,17 +2,28 @@
 
 from __future__ import annotations
 
+from collections.abc import Mapping
 from dataclasses import dataclass
+from typing import Any
 
 from gensig.errors import ConfigError
+from gensig.units import read
 
 CHOICES = {
     "law": ("one_sided", "paper"),
     "pair_coupling": ("coupled", "sum"),
     "contact": ("linear", "weber"),
     "elasticity": ("plane_stress", "plane_strain"),
+    "body": ("ring", "sainsot"),
+    "tooth": ("to_centreline", "to_contact"),
     "crack": ("paper",),
     "roll_torque": ("consistent", "classical"),
+}
+
+# what null stands for: the paper's law comes with the paper's conventions
+CONVENTIONS = {
+    "paper": {"elasticity": "plane_stress", "body": "sainsot", "tooth": "to_contact"},
+    "one_sided": {"elasticity": "plane_strain", "body": "ring", "tooth": "to_centreline"},
 }
 
 
@@ -25,6 +36,9 @@ class MeshOptions:
     contact : ``linear`` is the paper's constant Hertz term, ``weber`` the load-dependent local compliance, a secant at
         the quasi-static pair load
     elasticity : ``plane_stress`` (the paper's) or ``plane_strain``, of bending, axial and body terms
+    body : ``ring`` solves the elastic ring clamped at the bore, ``sainsot`` is the fit that the paper uses
+    tooth : ``to_centreline`` integrates up to where the load crosses the tooth centreline, from where the local contact
+        term counts; ``to_contact`` up to the contact abscissa, as the paper does
     crack : the paper's equations, the one choice so far
     roll_torque : ``consistent`` keeps the energy balance where compliance and gap change with roll angle,
         ``classical`` leaves that torque out
@@ -37,6 +51,8 @@ class MeshOptions:
     pair_coupling: str
     contact: str
     elasticity: str
+    body: str
+    tooth: str
     crack: str
     roll_torque: str
     damping_ratio: float
@@ -58,3 +74,9 @@ class MeshOptions:
             value = getattr(self, key)
             if not low <= value <= high:
                 raise ConfigError(f"mesh.{key} = {value:g} must lie in {low:g}..{high:g}")
+
+
+def read_mesh_options(values: Mapping[str, Any]) -> MeshOptions:
+    """Options from boundary keys; a convention that is null follows ``law``."""
+    convention = CONVENTIONS.get(str(values.get("law")), {})
+    return read(MeshOptions, {**values, **{k: v for k, v in convention.items() if values.get(k) is None}}, "mesh")

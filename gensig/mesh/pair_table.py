@@ -14,9 +14,9 @@ from gensig.geometry.gear import Gear
 from gensig.geometry.tooth import Tooth, healthy_tooth
 from gensig.geometry.tooth_profile import load_angle
 from gensig.material import Material
+from gensig.mesh.body import body_compliance
 from gensig.mesh.body_coupling import shared_body_compliance
 from gensig.mesh.compliance import tooth_compliance
-from gensig.mesh.fillet_foundation import fillet_foundation_compliance
 from gensig.mesh.local_contact import contact_compliance
 from gensig.mesh.options import MeshOptions
 
@@ -117,9 +117,8 @@ def pair_table(
 def structural_compliance(tooth: Tooth, curvature: Array, material: Material, options: MeshOptions) -> Array:
     """Tooth and body compliance of one loaded tooth, (phase,) m/N; the material as ``Material.in_plane`` gives it."""
     gear = tooth.gear
-    return tooth_compliance(tooth, curvature, material).total + fillet_foundation_compliance(
-        gear, load_angle(gear, curvature), material, allow_extrapolation=options.allow_extrapolation
-    )
+    own = tooth_compliance(tooth, curvature, material, reach=options.tooth).total
+    return own + body_compliance(gear, load_angle(gear, curvature), material, options)
 
 
 def _gear_table(

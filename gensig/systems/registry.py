@@ -11,7 +11,7 @@ from gensig.errors import ConfigError
 from gensig.geometry.contact import GearPair
 from gensig.geometry.gear import Gear
 from gensig.material import Material
-from gensig.mesh.options import MeshOptions
+from gensig.mesh.options import read_mesh_options
 from gensig.operating import Operating
 from gensig.sensing.chain import Sensing
 from gensig.sensing.manufacturing import Quality
@@ -39,7 +39,7 @@ def read_spur_pair(config: Mapping[str, Any]) -> SpurPair:
     return SpurPair(
         pair=GearPair(**gears, backlash=_number("gear.backlash_um", gear["backlash_um"])),
         material=material,
-        mesh=read(MeshOptions, section(config, "mesh"), "mesh"),
+        mesh=read_mesh_options(section(config, "mesh")),
         pinion=_read_body(gears["pinion"], gear["pinion"], material),
         wheel=_read_body(gears["wheel"], gear["wheel"], material),
         operating=read(Operating, section(config, "operating"), "operating"),

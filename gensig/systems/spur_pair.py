@@ -17,8 +17,8 @@ from gensig.geometry.contact import GearPair
 from gensig.geometry.tooth import Tooth, healthy_tooth
 from gensig.geometry.tooth_profile import load_angle
 from gensig.material import Material
+from gensig.mesh.body import body_compliance
 from gensig.mesh.compliance import tooth_compliance
-from gensig.mesh.fillet_foundation import fillet_foundation_compliance
 from gensig.mesh.load_distribution import loaded_pair_table, pair_states, static_mesh
 from gensig.mesh.local_contact import contact_compliance
 from gensig.mesh.options import MeshOptions
@@ -183,17 +183,12 @@ class SpurPair:
             (self.pair.wheel, np.asarray(self.pair.wheel_curvature(position))),
         ):
             tooth: Tooth = next((tooth for (name, _), tooth in odd.items() if name == gear.name), healthy_tooth(gear))
-            parts = tooth_compliance(tooth, curvature, structure)
+            parts = tooth_compliance(tooth, curvature, structure, reach=self.mesh.tooth)
             terms[gear.name] = {
                 "bending": parts.bending,
                 "shear": parts.shear,
                 "axial": parts.axial,
-                "foundation": fillet_foundation_compliance(
-                    gear,
-                    load_angle(gear, curvature),
-                    structure,
-                    allow_extrapolation=self.mesh.allow_extrapolation,
-                ),
+                "foundation": body_compliance(gear, load_angle(gear, curvature), structure, self.mesh),
                 "contact": contact(np.interp(curvature, tooth.profile.curvature_radius, tooth.contact_width))
                 - 0.5 * sound,
             }

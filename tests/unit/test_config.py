@@ -215,8 +215,21 @@ class TestSweeps:
 
 def test_paper_experiment_means_every_convention_of_the_paper():
     config = read_request(["experiment=paper"]).config
-    assert [config["mesh"][key] for key in ("law", "pair_coupling", "contact", "elasticity", "crack")] == [
-        "paper", "sum", "linear", "plane_stress", "paper"]  # fmt: skip
+    mesh = read_system(config).mesh
+    keys = ("law", "pair_coupling", "contact", "elasticity", "body", "tooth", "crack")
+    assert [getattr(mesh, key) for key in keys] == [
+        "paper", "sum", "linear", "plane_stress", "sainsot", "to_contact", "paper"]  # fmt: skip
+
+
+def test_three_keys_mean_the_papers_conventions_for_ever():
+    words = ["mesh.law=paper", "mesh.pair_coupling=sum", "mesh.contact=linear"]
+    by_keys, by_experiment = (read_system(read_request(own).config).mesh for own in (words, ["experiment=paper"]))
+    assert by_keys == by_experiment
+    assert read_system(read_request([]).config).mesh.elasticity == "plane_strain"
+
+
+def test_paper_experiment_has_neither_noise_nor_errors():
+    config = read_request(["experiment=paper"]).config
     assert config["sensing"]["snr_db"] is None
     assert config["quality"]["iso1328_grade"] is None
 

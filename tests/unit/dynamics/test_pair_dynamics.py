@@ -161,7 +161,9 @@ class TestRecord:
 
     def test_the_reference_rise_of_a_missing_tooth(self, machine):
         """shared/physics/spur.md table 5.2, "gap" rows: another implementation of the same law, pairs not coupled."""
-        system = machine({"mesh.pair_coupling": "sum", "operating.duration_s": 0.3})
+        terms = {"contact": "linear", "elasticity": "plane_stress", "body": "sainsot", "tooth": "to_contact"}
+        own = {f"mesh.{key}": value for key, value in terms.items()}
+        system = machine({**own, "mesh.pair_coupling": "sum", "operating.duration_s": 0.3})
         healthy, missing = (
             system.simulate(faults).acceleration[1] for faults in ((), (MissingTooth(gear="pinion", tooth=3),))
         )

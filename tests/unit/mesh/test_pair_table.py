@@ -17,9 +17,9 @@ RC_MM = np.array([2.45827, 6.66082, 7.86646, 8.36253, 12.56508])
 SINGLE_PAIR = np.array([1.5692, 2.0650, 2.0929, 2.0864, 1.5779])
 
 
-def test_single_pair_stiffness_of_the_reference_pair(xiamen):
-    position = RC_MM * 1e-3 - xiamen.pair.start_curvature_radius
-    assert_allclose(1e-8 / pair_compliance(xiamen.mesh_table(), position), SINGLE_PAIR, rtol=1e-3, atol=0)
+def test_single_pair_stiffness_of_the_reference_pair(paper_machine):
+    position = RC_MM * 1e-3 - paper_machine.pair.start_curvature_radius
+    assert_allclose(1e-8 / pair_compliance(paper_machine.mesh_table(), position), SINGLE_PAIR, rtol=1e-3, atol=0)
 
 
 def test_sound_teeth_have_the_corner_gap_and_nothing_else(xiamen):
@@ -38,7 +38,8 @@ def test_slopes_are_those_of_the_tables(xiamen):
     for key in ("compliance", "gap"):
         value, slope = getattr(table.pinion, key)[0, here], getattr(table.pinion, f"{key}_slope")[0, here]
         climbed = np.cumsum(0.5 * (slope[1:] + slope[:-1]) * step)
-        assert_allclose(climbed, value[1:] - value[0], rtol=0, atol=2e-3 * np.ptp(value))
+        # central differences miss up to half a cell's rise at the kinks, where a pair takes up and lets go of its load
+        assert_allclose(climbed, value[1:] - value[0], rtol=0, atol=0.015 * np.ptp(value))
 
 
 def test_only_the_faulty_tooth_has_its_own_row(xiamen):
@@ -51,7 +52,7 @@ def test_only_the_faulty_tooth_has_its_own_row(xiamen):
 
 def test_the_bodies_cannot_share_more_than_a_pair_has(xiamen):
     small = replace(xiamen.pair, pinion=replace(xiamen.pair.pinion, bore_radius=1e-3))
-    options = replace(xiamen.mesh, allow_extrapolation=True)
+    options = replace(xiamen.mesh, body="sainsot", allow_extrapolation=True)
     with (
         pytest.raises(ExtrapolationError, match=r"share .* of the stiffest pair's"),
         pytest.warns(ExtrapolationWarning),
