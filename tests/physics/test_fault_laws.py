@@ -86,7 +86,7 @@ def test_stiffness_falls_with_severity(xiamen, kind):
 
 @pytest.mark.parametrize(("start", "loss"), [("gamma_mid", 0.0281), ("arc_mid", 0.0403)])
 def test_the_papers_crack_costs_what_its_formula_says(paper_machine, start, loss):
-    # shared/physics/spur.md section 2.3: loss of pair stiffness at the pitch point, 1 mm
+    # spur reference (docs/validation.md), section 2.3: loss of pair stiffness at the pitch point, 1 mm
     at = [np.array([paper_machine.pair.pitch_point])]
     faulty = pair_compliance(paper_machine.mesh_table((crack(1e-3, start=start),)), *at, pinion_kind=1)
     healthy = pair_compliance(paper_machine.mesh_table(), *at)

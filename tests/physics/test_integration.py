@@ -91,7 +91,7 @@ def sideband_level(system, turns, faults=()):
 
 @pytest.mark.parametrize(("speed_rpm", "turns"), [(1800, 15), (1500, 10)])
 class TestSidebandProof:
-    """Perfect healthy teeth have no sidebands: shared/physics/spur.md section 7."""
+    """Perfect healthy teeth have no sidebands (docs/theory/spur_dynamics.md)."""
 
     def level(self, machine, speed_rpm, turns, refinement, faults=()):
         system = machine()

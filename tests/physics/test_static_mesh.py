@@ -167,7 +167,7 @@ class TestPaperLaw:
         assert (load > 0).sum(axis=1).mean() > xiamen.pair.transverse_contact_ratio + 0.01
 
     def test_double_zone_is_the_plain_sum(self, paper_machine):
-        # shared/physics/spur.md table 2.3, bores 9 / 15 mm
+        # spur reference (docs/validation.md), table 2.3, bores 9 / 15 mm
         double = [
             3.6774,
             3.7165,

@@ -72,7 +72,7 @@ class TestPairModes:
         return frequencies
 
     def test_reference_frequencies(self, modes):
-        # shared/physics/spur.md section 5.1, mesh 3.28e8 N/m
+        # spur reference (docs/validation.md), section 5.1, mesh 3.28e8 N/m
         found = modes(3.28e8, drive=False)
         assert_allclose(found[1:], [60.8, 178.6, 269.4, 690.2, 11704], rtol=3e-3, atol=0)
 

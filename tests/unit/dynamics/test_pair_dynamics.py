@@ -33,7 +33,7 @@ def test_static_start_is_in_equilibrium_along_the_line_of_action(xiamen, dynamic
 
 def test_reduced_values(xiamen, dynamics_of):
     dynamics = dynamics_of(xiamen)
-    assert_allclose(dynamics.mesh_force, 925.37, rtol=1e-5, atol=0)  # shared/physics/spur.md section 3.4
+    assert_allclose(dynamics.mesh_force, 925.37, rtol=1e-5, atol=0)  # spur reference (docs/validation.md), section 3.4
     assert_allclose(dynamics.mesh_frequency, 690.0, rtol=1e-12, atol=0)
     inverse = 21.61293e-3**2 / 4.858e-5 + 78.93418e-3**2 / 3.509e-3
     assert_allclose(dynamics.equivalent_mass, 1 / inverse, rtol=1e-5, atol=0)
@@ -160,7 +160,7 @@ class TestRecord:
         assert turns.max() > 2 * np.abs(system.simulate().acceleration[1]).max()
 
     def test_the_reference_rise_of_a_missing_tooth(self, machine):
-        """shared/physics/spur.md table 5.2, "gap" rows: another implementation of the same law, pairs not coupled."""
+        """Spur reference (docs/validation.md), table 5.2, "gap" rows: the same law elsewhere, pairs not coupled."""
         terms = {"contact": "linear", "elasticity": "plane_stress", "body": "sainsot", "tooth": "to_contact"}
         own = {f"mesh.{key}": value for key, value in terms.items()}
         system = machine({**own, "mesh.pair_coupling": "sum", "operating.duration_s": 0.3})

@@ -109,7 +109,7 @@ class TestWhatChanges:
         """Spur paper eqs. (11) and (12): sections thicker than h_q keep h_x + h_q, the others all."""
         tooth = applied(xiamen, CRACK)["pinion", 3]
         half = tooth.cell_half_thickness
-        h_q = 1.28475e-3  # shared/physics/spur.md section 2.3, arc mid
+        h_q = 1.28475e-3  # spur reference (docs/validation.md), section 2.3, arc mid
         height = np.where(half > h_q, half + h_q, 2 * half)
         width = xiamen.pair.pinion.face_width
         assert_allclose(tooth.area, height * width, rtol=1e-5, atol=0)
@@ -136,7 +136,7 @@ class TestWhatChanges:
         tooth = applied(xiamen, PIT)["pinion", 3]
         narrow = tooth.profile.curvature_radius[tooth.contact_width < 20e-3]
         assert_allclose(np.unique(tooth.contact_width), [10e-3, 20e-3], rtol=1e-12, atol=0)
-        # shared/physics/spur.md section 2.3: rc 6.2928 to 9.1975 mm
+        # spur reference (docs/validation.md), section 2.3: rc 6.2928 to 9.1975 mm
         assert_allclose([narrow[0], narrow[-1]], [6.2928e-3, 9.1975e-3], rtol=0, atol=0.03e-3)
 
     def test_a_missing_tooth_is_absent(self, xiamen):

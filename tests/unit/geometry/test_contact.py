@@ -29,7 +29,7 @@ def shifted(pair):
 
 
 def test_reference_line_of_action(pair):
-    # shared/physics/spur.md section 1
+    # spur reference (docs/validation.md), section 1
     assert_allclose(pair.transverse_contact_ratio, 1.71178, rtol=0, atol=6e-6)
     assert_allclose(pair.base_pitch, 5.90426e-3, rtol=0, atol=6e-9)
     assert_allclose(pair.tangent_length, 36.59616e-3, rtol=0, atol=6e-9)
@@ -116,7 +116,7 @@ class TestCornerGap:
         ("side", "expected"), [("before", [1.61, 10.0, 28.8, 57.5, 115.9]), ("after", [0.83, 5.25, 15.4, 31.3, 64.2])]
     )
     def test_reference_numbers(self, pair, side, expected):
-        # shared/physics/spur.md section 5.3, point 6
+        # spur reference (docs/validation.md), section 5.3, point 6
         beyond = np.array([0.2, 0.5, 0.85, 1.2, 1.7]) * 1e-3
         position = -beyond if side == "before" else pair.path_of_contact + beyond
         assert_allclose(corner_gap(pair, position) * 1e6, expected, rtol=5e-3, atol=0.006)

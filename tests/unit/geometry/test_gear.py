@@ -11,7 +11,7 @@ from numpy.testing import assert_allclose
 from gensig.errors import GeometryError
 from gensig.geometry.tooth_profile import load_angle, root_curve_point, tooth_profile
 
-# shared/physics/spur.md section 1, m = 2 mm, 20 deg, no shift
+# spur reference (docs/validation.md), section 1, m = 2 mm, 20 deg, no shift
 TABLE = {
     23: {"pitch_radius": 23.0, "base_radius": 21.61293, "tip_radius": 25.0, "root_radius": 20.5},
     84: {"pitch_radius": 84.0, "base_radius": 78.93418, "tip_radius": 86.0, "root_radius": 81.5},

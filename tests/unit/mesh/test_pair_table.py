@@ -12,7 +12,7 @@ from gensig.geometry.contact import corner_gap_by_pinion
 from gensig.mesh.fillet_foundation import ExtrapolationWarning
 from gensig.mesh.pair_table import pair_compliance, pair_table
 
-# single pairs of the reference pair at A, B, C, D, E, 1e8 N/m (shared/physics/spur.md table 2.2)
+# single pairs of the reference pair at A, B, C, D, E, 1e8 N/m (spur reference (docs/validation.md), table 2.2)
 RC_MM = np.array([2.45827, 6.66082, 7.86646, 8.36253, 12.56508])
 SINGLE_PAIR = np.array([1.5692, 2.0650, 2.0929, 2.0864, 1.5779])
 
