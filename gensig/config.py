@@ -57,6 +57,9 @@ def read_request(overrides: Sequence[str], *, config_dir: str | Path | None = No
     if not isinstance(names, list) or not all(isinstance(name, str) for name in names) or len(set(names)) < len(names):
         raise ConfigError(f"plan.classes = {names!r} must be a list of different fault options")
 
+    clear_fault_vary = "fault.vary" in typed and not fault_vary
+    unused = {*fault_words, *(f"fault.{key}" for key in fault_vary)}
+
     def class_fault(name: str | None) -> dict[str, Any]:
         words = [word for word in others if name is None or not word.startswith("fault=")]
         words += [] if name is None else [f"fault={name}"]
@@ -70,8 +73,6 @@ def read_request(overrides: Sequence[str], *, config_dir: str | Path | None = No
         vary = {**option, **{key: spec for key, spec in fault_vary.items() if key in fault}}
         return {**fault, "vary": {key: spec for key, spec in vary.items() if f"fault.{key}" not in mine}}
 
-    clear_fault_vary = "fault.vary" in typed and not fault_vary
-    unused = {*fault_words, *(f"fault.{key}" for key in fault_vary)}
     selected = class_fault(None)
     classes = {name: class_fault(name) for name in names}
     if unused:

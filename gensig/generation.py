@@ -19,8 +19,8 @@ from gensig.dataset.manifest import (
     record_shard,
 )
 from gensig.dataset.plan import read_plan
-from gensig.dataset.shard import ShardWriter
-from gensig.errors import DatasetError
+from gensig.dataset.shard import COMPRESSIONS, ShardWriter
+from gensig.errors import ConfigError, DatasetError
 from gensig.execution.local import ShardFailure, n_workers, run_shards
 from gensig.planning import make_plan
 from gensig.records import read_seed, simulate_record
@@ -49,6 +49,12 @@ def begin_folder(config: dict[str, Any], overrides: Sequence[str], out: Path) ->
     number of shards
     """
     n_workers(config["executor"]["n_workers"])
+    if config["dataset"]["compression"] not in COMPRESSIONS:
+        raise ConfigError(
+            f"dataset.compression = {config['dataset']['compression']!r}; allowed: {', '.join(COMPRESSIONS)}"
+        )
+    if not isinstance(config["dataset"]["store_clean"], bool):
+        raise ConfigError(f"dataset.store_clean = {config['dataset']['store_clean']!r} must be true or false")
     plan = make_plan(config)
     recorded = {**config, "out": None}
     create_folder(

@@ -11,6 +11,8 @@ from contextlib import contextmanager
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
+from gensig.errors import ConfigError
+
 if TYPE_CHECKING:
     from gensig.generation import Progress
 
@@ -84,6 +86,8 @@ class ShardProgress:
 def replaced_file(path: str | Path) -> Iterator[Path]:
     """A temporary name beside ``path`` that takes its place when the block ends well: nothing is half written."""
     target = Path(path)
+    if not target.parent.is_dir():
+        raise ConfigError(f"{target}: there is no folder {target.parent}; make it first")
     temporary = target.with_name(f".{target.name}.{os.getpid()}{target.suffix}")
     try:
         yield temporary

@@ -21,8 +21,19 @@ from gensig.systems.spur_pair import SpurPair, StiffnessCurves
 Array = NDArray[np.float64]
 
 
+FIGURE_TYPES = (".png", ".svg", ".pdf")
+RECORD_TYPES = (".h5", ".hdf5", ".csv")
+
+
+def _check_file(flag: str, name: str | None, types: tuple[str, ...]) -> None:
+    """Refuse a file name before anything is computed for it."""
+    if name is not None and Path(name).suffix not in types:
+        raise ConfigError(f"{flag} {name}: the name must end in {', '.join(types)}")
+
+
 def stiffness(arguments: Namespace) -> int:
     """Mesh stiffness of a gear pair: curves to JSON, a figure, or a summary."""
+    _check_file("--plot", arguments.plot, FIGURE_TYPES)
     request = read_request(arguments.overrides, config_dir=arguments.config_dir)
     system = read_system(request.config)
     fault = read_fault({key: value for key, value in request.config["fault"].items() if key != "vary"})
@@ -86,6 +97,8 @@ def simulate(arguments: Namespace) -> int:
     from gensig.planning import make_plan
     from gensig.records import simulate_record
 
+    _check_file("--plot", arguments.plot, FIGURE_TYPES)
+    _check_file("--output", arguments.output, RECORD_TYPES)
     request = read_request(arguments.overrides, config_dir=arguments.config_dir)
     config = request.config
     name = config["fault"]["kind"]
@@ -111,20 +124,18 @@ def simulate(arguments: Namespace) -> int:
 def _write_record(config: dict[str, Any], system: SpurPair, record: Any, output: str) -> None:
     """One record as a shard of one row, or as a table with time and channels."""
     path = Path(output)
-    if path.suffix in (".h5", ".hdf5"):
+    if path.suffix != ".csv":
         from gensig.generation import open_shard
 
         params = [name.removeprefix("params/") for name in record.values if name.startswith("params/")]
         with replaced_file(path) as temporary, open_shard(temporary, config, 1, params) as writer:
             writer.write(0, record.signals, record.values)
-    elif path.suffix == ".csv":
+    else:
         acceleration = record.signals["acceleration"]
         time = np.arange(acceleration.shape[1]) / system.sensing.sampling_rate
         header = ",".join(["time_s", *(f"{name}_{_unit_suffix(name)}" for name in system.sensing.channels)])
         with replaced_file(path) as temporary:
             np.savetxt(temporary, np.column_stack([time, *acceleration]), "%.9g", ",", header=header, comments="")
-    else:
-        raise ConfigError(f"--output {output}: the name must end in .h5, .hdf5 or .csv")
 
 
 def _unit_suffix(channel: str) -> str:

@@ -77,11 +77,7 @@ def integrate(
     check_step(dynamics, step)
     mesh, arrays = dynamics.arrays(step), system.arrays()
     index = np.array([system.names.index(name) for name in channels], dtype=np.int64)
-    n_samples = round(dynamics.operating.duration * sampling_rate)
-    if n_samples < 1:
-        raise ConfigError(
-            f"operating.duration_s = {dynamics.operating.duration:g} holds no sample at {sampling_rate:g} Hz"
-        )
+    n_samples = count_samples(dynamics.operating.duration, sampling_rate)
     fine = solver.oversampling
     coarse = COARSE_OVERSAMPLING if fine > COARSE_OVERSAMPLING and _stable(dynamics, step * fine / 4) else fine
     n_settle = math.ceil(settling_time(dynamics) * sampling_rate)
@@ -124,6 +120,14 @@ def _stable(dynamics: PairDynamics, step: float) -> bool:
 def _rates(dynamics: PairDynamics) -> NDArray[np.complex128]:
     """Eigenvalues with the mesh held somewhat above its mean stiffness, 1/s."""
     return eigenvalues(dynamics.system(), dynamics.approach_direction(), 1.2 * dynamics.mean_mesh_stiffness())
+
+
+def count_samples(duration: float, sampling_rate: float) -> int:
+    """Samples of a record; ConfigError where there is none."""
+    n_samples = round(duration * sampling_rate)
+    if n_samples < 1:
+        raise ConfigError(f"operating.duration_s = {duration:g} holds no sample at {sampling_rate:g} Hz")
+    return n_samples
 
 
 def check_channels(channels: tuple[str, ...]) -> None:

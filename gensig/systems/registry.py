@@ -35,13 +35,16 @@ def read_spur_pair(config: Mapping[str, Any]) -> SpurPair:
     if _number("gear.helix_angle_deg", gear["helix_angle_deg"]) != 0.0:
         raise ConfigError(f"gear.helix_angle_deg = {gear['helix_angle_deg']:g}: system=spur_pair takes spur gears, 0")
     material = read(Material, section(config, "material"), "material")
+    if material.poisson_ratio >= 0.5:
+        raise ConfigError(f"material.poisson_ratio = {material.poisson_ratio:g} must be below 0.5")
+    sides = {name: section(config, "gear", name) for name in SIDES}
     gears = {name: _read_gear(name, gear) for name in SIDES}
     return SpurPair(
         pair=GearPair(**gears, backlash=_number("gear.backlash_um", gear["backlash_um"])),
         material=material,
         mesh=read_mesh_options(section(config, "mesh")),
-        pinion=_read_body(gears["pinion"], gear["pinion"], material),
-        wheel=_read_body(gears["wheel"], gear["wheel"], material),
+        pinion=_read_body(gears["pinion"], sides["pinion"], material),
+        wheel=_read_body(gears["wheel"], sides["wheel"], material),
         operating=read(Operating, section(config, "operating"), "operating"),
         sensing=read(Sensing, section(config, "sensing"), "sensing"),
         quality=read(Quality, section(config, "quality"), "quality"),

@@ -9,7 +9,7 @@ from functools import lru_cache
 import numpy as np
 from numpy.typing import NDArray
 
-from gensig.dynamics.integrator import Solver, check_channels, check_step, integrate
+from gensig.dynamics.integrator import Solver, check_channels, check_step, count_samples, integrate
 from gensig.dynamics.pair import Body, PairDynamics, Support
 from gensig.errors import FaultError
 from gensig.faults.base import Fault, faulty_teeth
@@ -95,6 +95,7 @@ class SpurPair:
         self.pair.require_continuous_drive()
         self.mesh_table()
         check_channels(self.sensing.channels)
+        count_samples(self.operating.duration, self.sensing.sampling_rate)
         perfect, start = (
             perfect_specimen(self.pair.pinion, self.pair.wheel),
             Start(tooth_pinion=0, tooth_wheel=0, phase=0),
