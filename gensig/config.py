@@ -11,6 +11,7 @@ from typing import Any
 
 from gensig.compose import compose, options, override_keys, typed_mapping
 from gensig.errors import ConfigError
+from gensig.faults.registry import COMPOUND, fault_parts
 from gensig.systems.registry import SIDES
 
 CONFIG_NAME = "generate"
@@ -73,8 +74,8 @@ def read_request(overrides: Sequence[str], *, config_dir: str | Path | None = No
         vary = {**option, **{key: spec for key, spec in fault_vary.items() if key in fault}}
         return {**fault, "vary": {key: spec for key, spec in vary.items() if f"fault.{key}" not in mine}}
 
-    selected = class_fault(None)
-    classes = {name: class_fault(name) for name in names}
+    selected = _with_whole_parts(class_fault(None), config_dir)
+    classes = {name: _with_whole_parts(class_fault(name), config_dir) for name in names}
     if unused:
         raise ConfigError(_no_such_fault_key(sorted(unused)[0], selected))
     plan["classes"] = names
@@ -83,6 +84,20 @@ def read_request(overrides: Sequence[str], *, config_dir: str | Path | None = No
     config = {**base, "fault": selected, "classes": classes}
     _reset_derived(config, set(typed) | set(plan["vary"]))
     return Request(config=config, overrides=as_typed)
+
+
+def _with_whole_parts(fault: dict[str, Any], config_dir: str | Path | None) -> dict[str, Any]:
+    """A compound fault whose parts have every key: what a part leaves out is its kind's option, ``vary`` included."""
+    if fault["kind"] != COMPOUND:
+        return fault
+    parts = []
+    for part in fault_parts(fault):
+        if part.get("kind") in (None, COMPOUND, "healthy"):
+            raise ConfigError(f"fault.parts: kind = {part.get('kind')!r}; give the kind of one single fault")
+        option = compose(CONFIG_NAME, [f"fault={part['kind']}"], config_dir=config_dir)["fault"]
+        vary = {key: spec for key, spec in (option.get("vary") or {}).items() if key not in part}
+        parts.append({**option, "vary": vary, **part})
+    return {**fault, "parts": parts}
 
 
 SECTIONS = (

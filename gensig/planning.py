@@ -14,7 +14,7 @@ from gensig.dataset.distributions import design_points, values_at
 from gensig.dataset.plan import Plan, record_ids, shard_places
 from gensig.errors import ConfigError
 from gensig.faults.base import faulty_teeth
-from gensig.faults.registry import read_fault
+from gensig.faults.registry import COMPOUND, fault_parts, read_faults
 from gensig.records import MISSING, Stream, read_seed, record_system, replace_key, stream, whole_number
 from gensig.systems.registry import read_system
 from gensig.systems.spur_pair import severity
@@ -79,16 +79,15 @@ def _row(
     """Columns of one record that follow from its drawn values; building its machine checks them all."""
     system = record_system(config, values)
     system.pair.require_continuous_drive()
-    applied = read_fault(fault)
-    applied_list = [] if applied is None else [applied]
-    faulty_teeth(system.pair, applied_list)
+    applied = read_faults(fault)
+    faulty_teeth(system.pair, applied)
     rng = stream(seed, Stream.START, index)
-    sizes = {key: value for key, value in fault.items() if isinstance(value, int | float) and key != "tooth"}
+    parts = fault_parts(fault)
     return {
-        "faults_json": json.dumps([] if applied is None else [fault], separators=(",", ":")),
-        "severity": 0.0 if config["plan"]["sham"] else severity(applied_list, system.pair),
-        "fault_gear": "" if applied is None else applied.gear,
-        "fault_tooth": -1 if applied is None else applied.tooth,
+        "faults_json": json.dumps(parts, separators=(",", ":")),
+        "severity": 0.0 if config["plan"]["sham"] else severity(applied, system.pair),
+        "fault_gear": applied[0].gear if applied else "",
+        "fault_tooth": applied[0].first_tooth if applied else -1,
         "start_tooth_pinion": int(rng.integers(system.pair.pinion.n_teeth)),
         "start_tooth_wheel": int(rng.integers(system.pair.wheel.n_teeth)),
         "start_phase": float(rng.random()),
@@ -96,7 +95,7 @@ def _row(
         "torque_nm": system.operating.torque,
         "snr_db": MISSING if system.sensing.snr is None else system.sensing.snr,
         **{f"params/{key}": float(value) for key, value in values.items()},
-        **{f"params/fault.{key}": float(value) for key, value in sizes.items()},
+        **{f"params/fault.{key}": value for key, value in _sizes(fault).items()},
     }
 
 
@@ -136,18 +135,42 @@ def _draw(
     return {key: values_at(f"{where}.vary.{key}", spec, points[:, k]) for k, (key, spec) in enumerate(vary.items())}
 
 
+def _sizes(fault: Mapping[str, Any]) -> dict[str, float]:
+    """The numbers of a fault by key; those of a compound one carry the place of their part."""
+    if "parts" in fault:
+        numbered = enumerate(fault["parts"])
+        return {f"parts.{place}.{key}": value for place, part in numbered for key, value in _sizes(part).items()}
+    numbers = {key: value for key, value in fault.items() if isinstance(value, int | float) and key != "tooth"}
+    return {key: float(value) for key, value in numbers.items()}
+
+
 def _draw_faults(
     config: Mapping[str, Any], fault: Mapping[str, Any], n: int, rng: np.random.Generator
 ) -> list[dict[str, Any]]:
-    """One complete fault a group, its severity distribution drawn."""
-    plain = {key: value for key, value in fault.items() if key != "vary"}
-    read_fault(plain)
-    vary = {}
-    for key, spec in (fault.get("vary") or {}).items():
-        if key not in plain:
-            raise ConfigError(f"fault.vary: '{key}' is no key of fault={plain['kind']}")
-        any_tooth = isinstance(spec, Mapping) and spec.get("distribution") == "tooth"
-        last = config["gear"][plain["gear"]]["n_teeth"] - 1 if any_tooth else 0
-        vary[key] = {"distribution": "integers", "low": 0, "high": last} if any_tooth else spec
-    drawn = _draw(config, vary, n, rng, "fault")
-    return [{**plain, **{key: values[group] for key, values in drawn.items()}} for group in range(n)]
+    """One complete fault a group, its severity distribution drawn; one design for all parts of a compound fault."""
+    read_faults(fault)
+    parts = [{key: value for key, value in part.items() if key != "vary"} for part in fault_parts(fault)]
+    specs: dict[str, Any] = {}
+    places: dict[str, tuple[int, str]] = {}
+    for place, (plain, part) in enumerate(zip(parts, fault_parts(fault), strict=True)):
+        for key, spec in (part.get("vary") or {}).items():
+            if key not in plain:
+                raise ConfigError(f"fault.vary: '{key}' is no key of fault={plain['kind']}")
+            name = f"parts.{place}.{key}" if fault["kind"] == COMPOUND else key
+            specs[name], places[name] = _tooth_range(config, plain["gear"], spec), (place, key)
+    drawn = _draw(config, specs, n, rng, "fault")
+    faults: list[dict[str, Any]] = []
+    for group in range(n):
+        own = [dict(plain) for plain in parts]
+        for name, values in drawn.items():
+            place, key = places[name]
+            own[place][key] = values[group]
+        faults.append({"kind": fault["kind"], "parts": own} if fault["kind"] == COMPOUND else (own or [dict(fault)])[0])
+    return faults
+
+
+def _tooth_range(config: Mapping[str, Any], gear: str, spec: Any) -> Any:
+    """``distribution: tooth`` as whole numbers over the gear's teeth, anything else as it is."""
+    if not (isinstance(spec, Mapping) and spec.get("distribution") == "tooth"):
+        return spec
+    return {"distribution": "integers", "low": 0, "high": config["gear"][gear]["n_teeth"] - 1}

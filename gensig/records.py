@@ -15,7 +15,7 @@ from numpy.typing import NDArray
 from gensig.dataset.manifest import identity_hash
 from gensig.errors import ConfigError, SimulationError
 from gensig.faults.base import Fault
-from gensig.faults.registry import read_fault
+from gensig.faults.registry import read_faults
 from gensig.sensing.chain import add_noise, power
 from gensig.sensing.manufacturing import Gearbox, Specimen, draw_gearbox, draw_specimen
 from gensig.systems.registry import read_system
@@ -97,8 +97,14 @@ def simulate_record(config: Mapping[str, Any], row: Mapping[str, Any]) -> Record
     faults = [] if config["plan"]["sham"] else row_faults(row)
     columns = {key: value for key, value in row.items() if key not in ("shard", "row")}
     n_channels = len(system.sensing.channels)
-    multihot = np.zeros(len(config["plan"]["classes"]), dtype=np.int8)
-    multihot[int(row["label"])] = 1
+    kinds = {fault["kind"] for fault in json.loads(str(row["faults_json"]))}
+    multihot = np.array(
+        [
+            place == int(row["label"]) or (len(kinds) > 1 and config["classes"][name]["kind"] in kinds)
+            for place, name in enumerate(config["plan"]["classes"])
+        ],
+        dtype=np.int8,
+    )
     try:
         clean, noise_power, result = _simulate_clean(config, system, faults, row)
     except SimulationError as error:
@@ -119,8 +125,7 @@ def simulate_record(config: Mapping[str, Any], row: Mapping[str, Any]) -> Record
 
 def row_faults(row: Mapping[str, Any]) -> list[Fault]:
     """Faults of one row of a plan."""
-    found = [read_fault(fault, "faults_json") for fault in json.loads(str(row["faults_json"]))]
-    return [fault for fault in found if fault is not None]
+    return [fault for part in json.loads(str(row["faults_json"])) for fault in read_faults(part, "faults_json")]
 
 
 def _simulate_clean(

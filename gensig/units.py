@@ -98,9 +98,9 @@ def read(cls: type[T], values: Mapping[str, Any], where: str, **given: Any) -> T
     return cls(**result)
 
 
-def unit(suffix: str) -> Any:
+def unit(suffix: str, *, default: Any = dataclasses.MISSING) -> Any:
     """Dataclass field whose boundary name carries ``suffix``."""
-    return dataclasses.field(metadata={"unit": suffix})
+    return dataclasses.field(default=default, metadata={"unit": suffix})
 
 
 def _boundary_name(field: dataclasses.Field[Any]) -> str:
@@ -124,21 +124,31 @@ def _convert(place: str, key: str, value: Any, hint: Any) -> Any:
         if type(None) in kinds:
             return None
         raise ConfigError(f"{place} is null; give a value")
-    if float in kinds:
-        if isinstance(value, bool) or not isinstance(value, int | float):
-            raise ConfigError(f"{place} = {value!r} is not a number")
-        if not math.isfinite(value):
-            raise ConfigError(f"{place} = {value} is not finite")
-        return to_si(key, float(value))
-    if int in kinds:
-        if isinstance(value, bool) or not isinstance(value, int):
-            raise ConfigError(f"{place} = {value!r} is not a whole number")
-        return value
-    if typing.get_origin(hint) is tuple:
-        if not isinstance(value, list | tuple) or not all(isinstance(item, str) for item in value):
-            raise ConfigError(f"{place} = {value!r} is not a list of names")
-        return tuple(value)
-    for kind in (bool, str):
-        if kind in kinds and not isinstance(value, kind):
-            raise ConfigError(f"{place} = {value!r} is not {'true or false' if kind is bool else 'text'}")
-    return value
+    if isinstance(value, list | tuple):
+        items = {typing.get_args(kind)[0] for kind in kinds if typing.get_origin(kind) is tuple}
+        for item in items & {str, int, float}:
+            if all(_is_a(item, entry) for entry in value):
+                return tuple(to_si(key, float(entry)) if item is float else entry for entry in value)
+    for kind in (float, int, bool, str):
+        if kind in kinds and _is_a(kind, value):
+            return to_si(key, float(value)) if kind is float else value
+    if float in kinds and _is_a(float, value, finite=False):
+        raise ConfigError(f"{place} = {value} is not finite")
+    raise ConfigError(f"{place} = {value!r} is not {' or '.join(_named(kind) for kind in kinds if kind is not None)}")
+
+
+def _is_a(kind: type, value: Any, *, finite: bool = True) -> bool:
+    """Whether a value of a file stands for ``kind``: whole numbers are numbers too, true and false are none."""
+    if kind is float:
+        number = isinstance(value, int | float) and not isinstance(value, bool)
+        return number and (not finite or math.isfinite(value))
+    return isinstance(value, kind) and (kind is bool or not isinstance(value, bool))
+
+
+def _named(kind: Any) -> str:
+    """What a user calls a type."""
+    if typing.get_origin(kind) is tuple:
+        return {str: "a list of names", int: "a list of whole numbers", float: "a list of numbers"}[
+            typing.get_args(kind)[0]
+        ]
+    return {float: "a number", int: "a whole number", bool: "true or false", str: "text"}.get(kind, "null")

@@ -152,7 +152,7 @@ def _n_teeth(system: SpurPair, faults: Sequence[Fault]) -> int:
 
 def _fault_angle(system: SpurPair, fault: Fault) -> float:
     """Roll angle at which the faulty tooth enters contact, degrees."""
-    return 360.0 * fault.tooth / _n_teeth(system, [fault])
+    return 360.0 * max(fault.first_tooth, 0) / _n_teeth(system, [fault])
 
 
 def _contact_angle(system: SpurPair, fault: Fault) -> float:

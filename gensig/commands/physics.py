@@ -14,7 +14,7 @@ from numpy.typing import NDArray
 from gensig.commands.console import replaced_file
 from gensig.config import read_request
 from gensig.errors import ConfigError
-from gensig.faults.registry import read_fault
+from gensig.faults.registry import read_faults
 from gensig.systems.registry import read_system
 from gensig.systems.spur_pair import SpurPair, StiffnessCurves
 
@@ -36,8 +36,7 @@ def stiffness(arguments: Namespace) -> int:
     _check_file("--plot", arguments.plot, FIGURE_TYPES)
     request = read_request(arguments.overrides, config_dir=arguments.config_dir)
     system = read_system(request.config)
-    fault = read_fault({key: value for key, value in request.config["fault"].items() if key != "vary"})
-    faults = [] if fault is None else [fault]
+    faults = read_faults(request.config["fault"])
     curves = system.stiffness_curves(faults)
     if system.pair.transverse_contact_ratio < 1.0:
         print(

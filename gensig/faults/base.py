@@ -11,33 +11,82 @@ from gensig.errors import FaultError
 from gensig.geometry.contact import GearPair
 from gensig.geometry.gear import Gear
 from gensig.geometry.tooth import Tooth, healthy_tooth
+from gensig.units import from_si, split_unit
+
+ALL = "all"
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Fault(ABC):
-    """A fault of one tooth; ``gear`` is ``"pinion"`` or ``"wheel"``, ``tooth`` counts from 0."""
+    """A fault of one gear's teeth.
+
+    ``gear`` is ``"pinion"`` or ``"wheel"``; ``tooth`` counts from 0: one number, several, or ``"all"``.
+    """
 
     kind: ClassVar[str]
+    # whether the fault does the same to every tooth that it is on
+    alike: ClassVar[bool] = True
     gear: str = field()
-    tooth: int = field()
+    tooth: int | str | tuple[int, ...] = field()
 
     def __post_init__(self) -> None:
         if self.gear not in ("pinion", "wheel"):
             raise FaultError(f"fault.gear = {self.gear!r}; allowed: pinion, wheel")
-        if self.tooth < 0:
-            raise FaultError(f"fault.tooth = {self.tooth} must be at least 0 (teeth are counted from 0)")
+        if isinstance(self.tooth, str) and self.tooth != ALL:
+            raise FaultError(f"fault.tooth = {self.tooth!r}; give a number, a list of numbers, or {ALL}")
+        if isinstance(self.tooth, tuple) and not 0 < len(set(self.tooth)) == len(self.tooth):
+            raise FaultError(f"fault.tooth = {list(self.tooth)} must name one tooth or more, each once")
+        if self.first_tooth < 0 and self.tooth != ALL:
+            raise FaultError(f"fault.tooth = {self.first_tooth} must be at least 0 (teeth are counted from 0)")
+
+    @property
+    def first_tooth(self) -> int:
+        """The lowest tooth that carries the fault, -1 for all of them."""
+        if isinstance(self.tooth, str):
+            return -1
+        return self.tooth if isinstance(self.tooth, int) else min(self.tooth)
+
+    def teeth(self, gear: Gear) -> tuple[int, ...]:
+        """The teeth of ``gear`` that carry the fault; FaultError for one that is not on it."""
+        if isinstance(self.tooth, str):
+            return tuple(range(gear.n_teeth))
+        teeth = (self.tooth,) if isinstance(self.tooth, int) else self.tooth
+        if max(teeth) >= gear.n_teeth:
+            raise FaultError(
+                f"fault.tooth = {max(teeth)} is not on the {self.gear}, whose teeth are 0..{gear.n_teeth - 1}"
+            )
+        return teeth
 
     @abstractmethod
-    def apply(self, tooth: Tooth) -> Tooth:
-        """The faulty tooth; raises FaultError where the fault does not fit it."""
+    def apply(self, tooth: Tooth, number: int) -> Tooth:
+        """Tooth ``number`` with the fault; raises FaultError where it does not fit."""
 
     @abstractmethod
     def severity(self, gear: Gear) -> float:
         """Severity from 0 (healthy) to 1."""
 
 
+def require(fault: Fault, key: str, holds: bool, rule: str) -> None:
+    """Raise a FaultError with the value of ``key`` and the rule that it breaks, unless it holds."""
+    if not holds:
+        raise FaultError(f"fault.{key} = {_shown(fault, key)} {rule}")
+
+
+def require_not_negative(fault: Fault, *keys: str) -> None:
+    """Check lengths and depths."""
+    for key in keys:
+        require(fault, key, getattr(fault, split_unit(key)[0]) >= 0.0, "must not be negative")
+
+
+def _shown(fault: Fault, key: str) -> str:
+    value = getattr(fault, split_unit(key)[0])
+    return f"{from_si(key, value):g}" if isinstance(value, float) else repr(value)
+
+
 def faulty_teeth(pair: GearPair, faults: Iterable[Fault]) -> dict[tuple[str, int], Tooth]:
     """The teeth that differ from the sound one, by (gear, tooth); several faults of a tooth compose in order.
+
+    Teeth to which the same has happened are one object: the mesh computes them once.
 
     Raises
     ------
@@ -47,10 +96,10 @@ def faulty_teeth(pair: GearPair, faults: Iterable[Fault]) -> dict[tuple[str, int
     teeth: dict[tuple[str, int], Tooth] = {}
     for fault in faults:
         gear = gears[fault.gear]
-        if fault.tooth >= gear.n_teeth:
-            raise FaultError(
-                f"fault.tooth = {fault.tooth} is not on the {fault.gear}, whose teeth are 0..{gear.n_teeth - 1}"
-            )
-        place = (fault.gear, fault.tooth)
-        teeth[place] = fault.apply(teeth[place] if place in teeth else healthy_tooth(gear))
+        made: dict[int, Tooth] = {}
+        for number in fault.teeth(gear):
+            before = teeth.get((fault.gear, number), healthy_tooth(gear))
+            known = made.get(id(before)) if fault.alike else None
+            after = fault.apply(before, number) if known is None else known
+            made[id(before)] = teeth[fault.gear, number] = after
     return teeth

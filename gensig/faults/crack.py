@@ -1,4 +1,4 @@
-"""Root crack through the face width, as the spur paper has it (eqs. 11 and 12)."""
+"""Root crack from the middle of the root transition curve, over all or part of the face width."""
 
 from __future__ import annotations
 
@@ -7,68 +7,103 @@ from dataclasses import dataclass, replace
 from typing import ClassVar
 
 import numpy as np
+from numpy.typing import NDArray
 
 from gensig.errors import FaultError
-from gensig.faults.base import Fault
+from gensig.faults.base import Fault, require, require_not_negative
 from gensig.geometry.gear import Gear
-from gensig.geometry.tooth import Tooth
+from gensig.geometry.tooth import RootCrack, Tooth
 from gensig.geometry.tooth_profile import root_curve_point
 from gensig.units import unit
 
+Array = NDArray[np.float64]
+
 CRACK_STARTS = ("arc_mid", "gamma_mid")
+CRACK_FRONTS = ("straight", "parabolic", "linear")
+CRACK_SIDES = ("tension", "compression")
+CRACK_FACES = ("open", "breathing")
+N_STRIPS = 64  # across the face; a front ends within one of them
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Crack(Fault):
-    """Crack from the middle of the root transition curve, at ``crack_angle`` to the tooth centreline, inward.
+    """Crack at ``crack_angle`` to the tooth centreline, inward and towards the root.
 
-    Source: spur paper eqs. (11) and (12): h_q = h_c - q sin(angle), and every section thicker than h_q keeps
-    h_x + h_q of its height. The body stays whole, which makes the crack weaker than finite elements find it. Below
-    its mouth every section is thicker than h_c, so (11) and (12) cut the tooth even at depth 0: a crack of no depth is
-    therefore left out, and the first micrometre costs up to 34e-12 m/N.
+    It is ``crack_depth`` deep at one end of the face and reaches over ``crack_width`` of it (None: all), with a front
+    that is ``straight``, or falls off to 0 at ``crack_width`` in a ``parabolic`` or ``linear`` way; ``crack_side`` and
+    ``crack_faces`` as in ``RootCrack``. How much softer it makes the tooth is the mesh's choice (``mesh.crack``).
     """
 
     kind: ClassVar[str] = "crack"
     crack_depth: float = unit("mm")
     crack_angle: float = unit("deg")
     crack_start: str
+    crack_width: float | None = unit("mm", default=None)
+    crack_front: str = "straight"
+    crack_side: str = "tension"
+    crack_faces: str = "open"
 
     def __post_init__(self) -> None:
         # slots make a new class, so the zero-argument super() would look at the old one
         Fault.__post_init__(self)
-        if self.crack_depth < 0.0:
-            raise FaultError(f"fault.crack_depth_mm = {self.crack_depth * 1e3:g} must not be negative")
-        if not 0.0 < self.crack_angle <= 0.5 * math.pi:
-            raise FaultError(f"fault.crack_angle_deg = {math.degrees(self.crack_angle):g} must lie in 0..90")
-        if self.crack_start not in CRACK_STARTS:
-            raise FaultError(f"fault.crack_start = {self.crack_start!r}; allowed: {', '.join(CRACK_STARTS)}")
+        require_not_negative(self, "crack_depth_mm")
+        require(self, "crack_angle_deg", 0.0 < self.crack_angle <= 0.5 * math.pi, "must lie in 0..90")
+        for key, allowed in (
+            ("crack_start", CRACK_STARTS),
+            ("crack_front", CRACK_FRONTS),
+            ("crack_side", CRACK_SIDES),
+            ("crack_faces", CRACK_FACES),
+        ):
+            if getattr(self, key) not in allowed:
+                raise FaultError(f"fault.{key} = {getattr(self, key)!r}; allowed: {', '.join(allowed)}")
 
     def root_chord(self, gear: Gear) -> float:
         """Thickness of the sound tooth where the crack starts, m."""
         return 2.0 * root_curve_point(gear, self.crack_start)[1]
 
     def severity(self, gear: Gear) -> float:
-        """Crack depth over root chord."""
-        return self.crack_depth / self.root_chord(gear)
+        """Crack depth over root chord, averaged over the face."""
+        return float(self._depth(gear).mean()) / self.root_chord(gear)
 
-    def apply(self, tooth: Tooth) -> Tooth:
-        """Reduce the sections that the crack cuts."""
-        if self.crack_depth == 0.0:
+    def apply(self, tooth: Tooth, number: int) -> Tooth:
+        """Cut the root."""
+        gear = tooth.gear
+        depth = self._depth(gear)
+        if not depth.any():
             return tooth
-        chord = self.root_chord(tooth.gear)
-        if self.crack_depth >= chord:
+        abscissa, half = root_curve_point(gear, self.crack_start)
+        if self.crack_depth >= 2.0 * half:
             raise FaultError(
-                f"crack_depth {self.crack_depth * 1e3:.4g} mm reaches through the root chord {chord * 1e3:.4g} mm of "
-                f"the {self.gear} tooth (m = {tooth.gear.normal_module * 1e3:g} mm, z = {tooth.gear.n_teeth}); reduce "
+                f"crack_depth {self.crack_depth * 1e3:.4g} mm reaches through the root chord {2e3 * half:.4g} mm of "
+                f"the {self.gear} tooth (m = {gear.normal_module * 1e3:g} mm, z = {gear.n_teeth}); reduce "
                 f"fault.crack_depth_mm"
             )
-        half = tooth.cell_half_thickness
-        kept = half + np.minimum(half, 0.5 * chord - self.crack_depth * math.sin(self.crack_angle))
-        if np.any(kept <= 0.0):
-            limit = (0.5 * chord + float(half.min())) / math.sin(self.crack_angle)
+        crack = RootCrack(
+            depth=depth,
+            mouth_abscissa=abscissa,
+            mouth_half_thickness=half,
+            angle=self.crack_angle,
+            side=self.crack_side,
+            breathing=self.crack_faces == "breathing",
+        )
+        return replace(tooth, cracks=(*tooth.cracks, crack))
+
+    def _depth(self, gear: Gear) -> Array:
+        """Mean depth in every strip across the face, (strip,) m; one strip where the front is the same all along."""
+        width = gear.face_width if self.crack_width is None else self.crack_width
+        if not 0.0 <= width <= gear.face_width:
             raise FaultError(
-                f"crack_depth {self.crack_depth * 1e3:.4g} mm leaves no section near the tip of the {self.gear} tooth "
-                f"(spur paper eqs. 11-12 hold below {limit * 1e3:.4g} mm); reduce fault.crack_depth_mm"
+                f"fault.crack_width_mm = {width * 1e3:g} must lie in 0..{gear.face_width * 1e3:g}, the face width of "
+                f"the {self.gear}"
             )
-        share = kept / (2.0 * half)
-        return replace(tooth, area=tooth.area * share, second_moment=tooth.second_moment * share**3)
+        if self.crack_front == "straight" and width == gear.face_width:
+            return np.array([self.crack_depth])
+        edges = np.minimum(np.linspace(0.0, gear.face_width, N_STRIPS + 1), width)
+        along = edges / width if width > 0.0 else edges
+        if self.crack_front == "straight":
+            area = along
+        elif self.crack_front == "linear":
+            area = along - 0.5 * along**2
+        else:  # q sqrt(1 - z / width), whose integral is in closed form
+            area = 2.0 / 3.0 * (1.0 - (1.0 - along) ** 1.5)
+        return self.crack_depth * np.diff(area) * width * N_STRIPS / gear.face_width

@@ -160,7 +160,10 @@ def corner_gap_by_pinion(pair: GearPair, position: Array) -> Array:
     gap = corner_gap(pair, position)
     before = position < 0.0
     for _ in range(40):
-        gap[before] = _wheel_tip_gap(pair, position[before] - gap[before])
+        last = gap[before]
+        gap[before] = _wheel_tip_gap(pair, position[before] - last)
+        if np.all(np.abs(gap[before] - last) < 1e-15):
+            break
     return gap
 
 

@@ -10,6 +10,7 @@ from numpy.typing import NDArray
 from gensig.geometry.tooth import Tooth
 from gensig.geometry.tooth_profile import involute_point, load_angle
 from gensig.material import Material
+from gensig.mesh.sections import sections
 
 Array = NDArray[np.float64]
 
@@ -31,7 +32,12 @@ class ToothCompliance:
 
 
 def tooth_compliance(
-    tooth: Tooth, curvature_radius: Array, material: Material, *, reach: str = "to_contact"
+    tooth: Tooth,
+    curvature_radius: Array,
+    material: Material,
+    *,
+    reach: str = "to_contact",
+    papers_crack: bool = True,
 ) -> ToothCompliance:
     """Bending, shear and axial compliance of a tooth loaded at the given contact points.
 
@@ -40,6 +46,7 @@ def tooth_compliance(
     curvature_radius : (phase,) m    of the tooth's own flank at the contact
     reach : ``"to_contact"`` integrates up to the contact abscissa as the paper does, ``"to_centreline"`` up to where
         the load crosses the centreline: what lies between is the local contact's
+    papers_crack : a crack reduces the sections that it cuts, as eqs. (11) and (12) have it
 
     Returns
     -------
@@ -51,7 +58,8 @@ def tooth_compliance(
     profile, gear = tooth.profile, tooth.gear
     root = profile.abscissa[0]
     x, step = tooth.cell_abscissa - root, np.diff(profile.abscissa)
-    bend = step / (material.youngs_modulus * tooth.second_moment)
+    area, second_moment = sections(tooth, papers_crack=papers_crack)
+    bend = step / (material.youngs_modulus * second_moment)
     angle = load_angle(gear, curvature_radius)
     cos, sin = np.cos(angle), np.sin(angle)
     x_load, h_load = involute_point(gear, curvature_radius)
@@ -70,6 +78,6 @@ def tooth_compliance(
             - 2.0 * cos * sin * h_load * (arm * zeroth - first)
             + sin**2 * h_load**2 * zeroth
         ),
-        shear=cos**2 * up_to_load(SHEAR_FACTOR * step / (material.shear_modulus * tooth.area)),
-        axial=sin**2 * up_to_load(step / (material.youngs_modulus * tooth.area)),
+        shear=cos**2 * up_to_load(SHEAR_FACTOR * step / (material.shear_modulus * area)),
+        axial=sin**2 * up_to_load(step / (material.youngs_modulus * area)),
     )

@@ -2,8 +2,10 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Mapping
+from collections.abc import Mapping
 from dataclasses import dataclass
+from functools import lru_cache
+from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
@@ -17,7 +19,8 @@ from gensig.material import Material
 from gensig.mesh.body import body_compliance
 from gensig.mesh.body_coupling import shared_body_compliance
 from gensig.mesh.compliance import tooth_compliance
-from gensig.mesh.local_contact import contact_compliance
+from gensig.mesh.face import bearing_width, face_contact, is_nominal
+from gensig.mesh.local_contact import ContactLaw, contact_law, relative_radius
 from gensig.mesh.options import MeshOptions
 
 Array = NDArray[np.float64]
@@ -46,8 +49,8 @@ class GearTable:
 class PairTable:
     """Both gears' tables on the node positions s of -1 to 3 base pitches, and what the pairs share.
 
-    The contact term stands on the pinion's side for sound flanks; each side adds what its faults take off the
-    contact width. ``shared_compliance`` is the body compliance that all pairs in contact share.
+    The contact term stands on the pinion's side for sound flanks; each side adds what its own faults cost against a
+    sound mate. ``shared_compliance`` is the body compliance that all pairs in contact share.
     """
 
     pair: GearPair
@@ -81,28 +84,16 @@ def pair_table(
     """
     odd = dict(teeth or {})
     position = node_positions(pair, options)
-    on_path = np.clip(position, 0.0, pair.path_of_contact)
-    corner = corner_gap_by_pinion(pair, position)
-
-    def contact(width: Array) -> Array:
-        return contact_compliance(pair, on_path, width, np.asarray(load), material, options)
-
-    sound = contact(np.full_like(position, pair.pinion.face_width))
-    structure = material.in_plane(options.elasticity)
+    sound = _sound_structure(pair, material, options)
     sides = {}
-    for gear, curvature, base, gap in (
-        (pair.pinion, pair.pinion_curvature(on_path), np.zeros_like(sound), corner),
-        (pair.wheel, pair.wheel_curvature(on_path), -sound, np.zeros_like(corner)),
-    ):
-        sides[gear.name] = _gear_table(
-            gear, np.asarray(curvature), position, contact, base, gap, structure, options, odd
-        )
-    shared = shared_body_compliance(pair, structure) if options.pair_coupling == "coupled" else 0.0
+    for name, side in flank_sides(pair, position, material, options, load).items():
+        mine = {tooth: odd[gear, tooth] for gear, tooth in sorted(odd) if gear == name}
+        sides[name] = _gear_table(side, position, mine, sound[name], material.in_plane(options.elasticity), options)
     stiffest = float(sides["pinion"].compliance.min() + sides["wheel"].compliance.min())
-    if shared >= 0.95 * stiffest:
+    if sound["shared"] >= 0.95 * stiffest:
         raise ExtrapolationError(
-            f"the gear bodies share {shared:.3g} m/N of the stiffest pair's {stiffest:.3g} m/N, more than one pair "
-            f"has; use a larger bore_radius_mm or mesh.pair_coupling=sum"
+            f"the gear bodies share {sound['shared']:.3g} m/N of the stiffest pair's {stiffest:.3g} m/N, more than one "
+            f"pair has; use a larger bore_radius_mm or mesh.pair_coupling=sum"
         )
     return PairTable(
         pair=pair,
@@ -110,52 +101,145 @@ def pair_table(
         position=position,
         pinion=sides["pinion"],
         wheel=sides["wheel"],
-        shared_compliance=shared,
+        shared_compliance=sound["shared"],
     )
+
+
+@lru_cache(maxsize=16)
+def _sound_structure(pair: GearPair, material: Material, options: MeshOptions) -> dict[str, Any]:
+    """What neither load nor faults change: (corner gap, structural compliance) of either gear at the nodes, (node,)
+    each, and the shared body compliance."""
+    position = node_positions(pair, options)
+    structure = material.in_plane(options.elasticity)
+    on_path = np.clip(position, 0.0, pair.path_of_contact)
+    rows = {
+        gear.name: _structure_at_nodes(healthy_tooth(gear), curvature, structure, options)
+        for gear, curvature in (
+            (pair.pinion, np.asarray(pair.pinion_curvature(on_path))),
+            (pair.wheel, np.asarray(pair.wheel_curvature(on_path))),
+        )
+    }
+    shared = shared_body_compliance(pair, structure) if options.pair_coupling == "coupled" else 0.0
+    return {
+        "pinion": (corner_gap_by_pinion(pair, position), rows["pinion"]),
+        "wheel": (np.zeros_like(position), rows["wheel"]),
+        "shared": shared,
+    }
+
+
+def _structure_at_nodes(tooth: Tooth, curvature: Array, material: Material, options: MeshOptions) -> Array:
+    """Structural compliance at each different curvature radius once, most nodes being held at A or E, (node,)."""
+    different, place = np.unique(curvature, return_inverse=True)
+    return structural_compliance(tooth, different, material, options)[place]
 
 
 def structural_compliance(tooth: Tooth, curvature: Array, material: Material, options: MeshOptions) -> Array:
     """Tooth and body compliance of one loaded tooth, (phase,) m/N; the material as ``Material.in_plane`` gives it."""
     gear = tooth.gear
-    own = tooth_compliance(tooth, curvature, material, reach=options.tooth).total
+    own = tooth_compliance(tooth, curvature, material, reach=options.tooth, papers_crack=options.crack == "paper").total
     return own + body_compliance(gear, load_angle(gear, curvature), material, options)
 
 
-def _gear_table(
-    gear: Gear,
-    curvature: Array,
+@dataclass(frozen=True, slots=True, kw_only=True)
+class FlankSide:
+    """One gear's flank at contact positions: ``flank_curvature`` goes on beyond its tip, ``curvature`` is held at A
+    and E. ``base`` is the part of a sound pair's contact compliance that the mate's side carries already."""
+
+    gear: Gear
+    curvature: Array
+    flank_curvature: Array
+    relative_radius: Array
+    law: ContactLaw
+    load: Array
+    base: Array
+
+    def contact(self, tooth: Tooth, options: MeshOptions) -> tuple[Array, Array]:
+        """Gap and contact compliance of one tooth against a sound mate, (phase,) m and m/N, less ``base``."""
+        if is_nominal(tooth) or not tooth.present:
+            return np.zeros_like(self.load), self.law.compliance(self.gear.face_width, self.load) - self.base
+        if options.law == "paper":
+            width = bearing_width(tooth, self.curvature)
+            return np.zeros_like(self.load), self.law.compliance(width, self.load) - self.base
+        gap, compliance = face_contact(tooth, self.flank_curvature, self.relative_radius, self.law, self.load)
+        return gap, compliance - self.base
+
+
+def flank_sides(
+    pair: GearPair,
     position: Array,
-    contact: Callable[[Array], Array],
-    base: Array,
-    gap: Array,
     material: Material,
     options: MeshOptions,
-    odd: Mapping[tuple[str, int], Tooth],
+    load: Array | float,
+    *,
+    pinion_share: float = 1.0,
+) -> dict[str, FlankSide]:
+    """Both gears' flanks at positions s, (phase,) m, under the load of a pair in N.
+
+    ``pinion_share`` of the contact compliance of sound flanks is counted on the pinion's side.
+    """
+    on_path = np.clip(position, 0.0, pair.path_of_contact)
+    law = contact_law(pair, on_path, material, options)
+    loads = np.array(np.broadcast_to(np.asarray(load, dtype=np.float64), position.shape))
+    sound = law.compliance(pair.pinion.face_width, loads)
+    relative = relative_radius(pair, on_path)
+    return {
+        gear.name: FlankSide(
+            gear=gear,
+            curvature=np.asarray(curvature(on_path)),
+            flank_curvature=np.asarray(curvature(beyond_tip)),
+            relative_radius=relative,
+            law=law,
+            load=loads,
+            base=share * sound,
+        )
+        for gear, curvature, beyond_tip, share in (
+            (pair.pinion, pair.pinion_curvature, np.maximum(position, 0.0), 1.0 - pinion_share),
+            (pair.wheel, pair.wheel_curvature, np.minimum(position, pair.path_of_contact), pinion_share),
+        )
+    }
+
+
+def _gear_table(
+    side: FlankSide,
+    position: Array,
+    odd: Mapping[int, Tooth],
+    sound: tuple[Array, Array],
+    material: Material,
+    options: MeshOptions,
 ) -> GearTable:
-    mine = {tooth: odd[name, tooth] for name, tooth in sorted(odd) if name == gear.name}
-    distinct = [healthy_tooth(gear), *mine.values()]
-    kind = np.zeros(gear.n_teeth, dtype=np.int64)
-    for row, tooth_index in enumerate(mine, start=1):
-        kind[tooth_index] = row
-    widths = [np.interp(curvature, tooth.profile.curvature_radius, tooth.contact_width) for tooth in distinct]
-    compliance = np.stack(
-        [
-            structural_compliance(tooth, curvature, material, options) + contact(width) + base
-            for tooth, width in zip(distinct, widths, strict=True)
-        ]
-    )
-    deviation = np.stack(
-        [np.interp(curvature, tooth.profile.curvature_radius, tooth.flank_deviation.mean(axis=0)) for tooth in distinct]
-    )
-    total_gap = deviation + gap
+    """Rows of the distinct teeth: teeth that are one object share a row, equal structures are computed once."""
+    distinct = [healthy_tooth(side.gear)]
+    kind = np.zeros(side.gear.n_teeth, dtype=np.int64)
+    for number, tooth in odd.items():
+        row = next((row for row, known in enumerate(distinct) if known is tooth), len(distinct))
+        if row == len(distinct):
+            distinct.append(tooth)
+        kind[number] = row
+    corner, sound_row = sound
+    structures = {_structure_key(distinct[0]): sound_row}
+    compliance: Array = np.empty((len(distinct), len(position)))
+    gap: Array = np.empty_like(compliance)
+    for row, tooth in enumerate(distinct):
+        key = _structure_key(tooth)
+        if key not in structures:
+            reached = np.minimum(side.curvature, tooth.tip_curvature_radius)
+            structures[key] = _structure_at_nodes(tooth, reached, material, options)
+        own_gap, contact = side.contact(tooth, options)
+        compliance[row] = structures[key] + contact
+        gap[row] = own_gap + corner
     return GearTable(
         compliance=compliance,
         compliance_slope=np.gradient(compliance, position, axis=1),
-        gap=total_gap,
-        gap_slope=np.gradient(total_gap, position, axis=1),
+        gap=gap,
+        gap_slope=np.gradient(gap, position, axis=1),
         present=np.array([tooth.present for tooth in distinct]),
         kind=kind,
     )
+
+
+def _structure_key(tooth: Tooth) -> tuple[int, ...]:
+    """Teeth whose sections are the same objects bend alike, wherever their flanks stand."""
+    return id(tooth.material_loss), id(tooth.slice_edges), id(tooth.cracks)
 
 
 def pair_compliance(table: PairTable, position: Array, pinion_kind: int = 0, wheel_kind: int = 0) -> Array:

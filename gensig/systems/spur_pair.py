@@ -20,9 +20,8 @@ from gensig.material import Material
 from gensig.mesh.body import body_compliance
 from gensig.mesh.compliance import tooth_compliance
 from gensig.mesh.load_distribution import loaded_pair_table, pair_states, static_mesh
-from gensig.mesh.local_contact import contact_compliance
 from gensig.mesh.options import MeshOptions
-from gensig.mesh.pair_table import PairTable
+from gensig.mesh.pair_table import PairTable, flank_sides
 from gensig.operating import Operating
 from gensig.sensing.chain import Sensing
 from gensig.sensing.decimation import decimator
@@ -172,26 +171,20 @@ class SpurPair:
         """
         odd = faulty_teeth(self.pair, faults)
         structure = self.material.in_plane(self.mesh.elasticity)
-        load = np.full_like(position, self.mesh_force)
-
-        def contact(width: Array) -> Array:
-            return contact_compliance(self.pair, position, width, load, self.material, self.mesh)
-
-        sound = contact(np.full_like(position, self.pair.pinion.face_width))
+        sides = flank_sides(self.pair, position, self.material, self.mesh, self.mesh_force, pinion_share=0.5)
         terms = {}
-        for gear, curvature in (
-            (self.pair.pinion, np.asarray(self.pair.pinion_curvature(position))),
-            (self.pair.wheel, np.asarray(self.pair.wheel_curvature(position))),
-        ):
-            tooth: Tooth = next((tooth for (name, _), tooth in odd.items() if name == gear.name), healthy_tooth(gear))
-            parts = tooth_compliance(tooth, curvature, structure, reach=self.mesh.tooth)
-            terms[gear.name] = {
+        for name, side in sides.items():
+            tooth: Tooth = next((tooth for (gear, _), tooth in odd.items() if gear == name), healthy_tooth(side.gear))
+            curvature = np.minimum(side.curvature, tooth.tip_curvature_radius)
+            parts = tooth_compliance(
+                tooth, curvature, structure, reach=self.mesh.tooth, papers_crack=self.mesh.crack == "paper"
+            )
+            terms[name] = {
                 "bending": parts.bending,
                 "shear": parts.shear,
                 "axial": parts.axial,
-                "foundation": body_compliance(gear, load_angle(gear, curvature), structure, self.mesh),
-                "contact": contact(np.interp(curvature, tooth.profile.curvature_radius, tooth.contact_width))
-                - 0.5 * sound,
+                "foundation": body_compliance(side.gear, load_angle(side.gear, curvature), structure, self.mesh),
+                "contact": side.contact(tooth, self.mesh)[1],
             }
         return terms
 

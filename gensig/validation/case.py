@@ -14,7 +14,7 @@ from gensig.compose import compose
 from gensig.dynamics.pair import PairDynamics
 from gensig.errors import ConfigError
 from gensig.faults.base import Fault
-from gensig.faults.registry import read_fault
+from gensig.faults.registry import read_faults
 from gensig.geometry.contact import GearPair
 from gensig.geometry.gear import Gear
 from gensig.mesh.pair_table import PairTable
@@ -52,7 +52,7 @@ class Case:
             return {}
         fault = self.faults[0]
         side = self.table.pinion if fault.gear == "pinion" else self.table.wheel
-        return {f"{fault.gear}_kind": int(side.kind[fault.tooth])}
+        return {f"{fault.gear}_kind": int(side.kind[fault.teeth(self.gear(fault.gear))[0]])}
 
     def gear(self, name: str) -> Gear:
         """The pinion or the wheel."""
@@ -99,8 +99,7 @@ def _read_faults(overrides: tuple[str, ...]) -> tuple[Fault, ...]:
     words = dict(word.split("=", 1) for word in overrides)
     option = _fault_option(words.pop("fault", "healthy"))
     typed = {key.removeprefix("fault."): yaml.safe_load(value) for key, value in words.items()}
-    fault = read_fault({**option, **typed})
-    return () if fault is None else (fault,)
+    return read_faults({**option, **typed})
 
 
 def with_fault(case: Case, *words: str) -> Case:

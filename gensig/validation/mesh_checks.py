@@ -17,7 +17,7 @@ from gensig.mesh.body_coupling import cross_compliance
 from gensig.mesh.compliance import tooth_compliance
 from gensig.mesh.fillet_foundation import body_coefficients, fillet_foundation_compliance
 from gensig.mesh.load_distribution import pair_states, static_mesh
-from gensig.mesh.local_contact import linear_contact_compliance
+from gensig.mesh.local_contact import linear_contact
 from gensig.mesh.pair_table import pair_compliance, structural_compliance
 from gensig.validation.case import Array, Case, read_case, with_fault
 from gensig.validation.geometry_checks import Check
@@ -67,7 +67,8 @@ def _body_coefficient(side: str, case: Case, at: str) -> float:
 
 
 def _contact(case: Case, at: str) -> float:
-    return float(linear_contact_compliance(np.array(case.pair.pinion.face_width), case.system.material))
+    law = linear_contact(np.zeros(1), case.system.material)
+    return float(law.compliance(case.pair.pinion.face_width, 1.0)[0])
 
 
 def _pair_stiffness(case: Case, position: Array) -> Array:
@@ -138,7 +139,7 @@ def _cross_at(pair: GearPair, material: Material, side: str, entering: Array) ->
 def _fault_increment(case: Case, at: str) -> float:
     """What the fault adds to the compliance of its tooth."""
     fault = case.faults[0]
-    tooth = faulty_teeth(case.pair, case.faults)[fault.gear, fault.tooth]
+    tooth = faulty_teeth(case.pair, case.faults)[fault.gear, fault.teeth(case.gear(fault.gear))[0]]
     curvature = case.curvature(fault.gear, at)
     faulty = structural_compliance(tooth, curvature, case.system.material, case.system.mesh)
     return float(faulty[0]) - _structural(fault.gear, case, at)

@@ -1,0 +1,124 @@
+"""Teeth that have lost their tip, a corner of it, or everything."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, replace
+from typing import ClassVar
+
+import numpy as np
+from numpy.typing import NDArray
+
+from gensig.errors import FaultError
+from gensig.faults.base import Fault, require, require_not_negative
+from gensig.geometry.gear import Gear
+from gensig.geometry.tooth import Tooth
+from gensig.geometry.tooth_profile import root_curve
+from gensig.units import unit
+
+Array = NDArray[np.float64]
+
+CHIP_SHAPES = ("triangular", "rectangular")
+N_STRIPS = 32  # across a triangular chip
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class MissingTooth(Fault):
+    """The whole tooth is gone: its pair never touches."""
+
+    kind: ClassVar[str] = "missing_tooth"
+
+    def severity(self, gear: Gear) -> float:
+        """Always 1."""
+        return 1.0
+
+    def apply(self, tooth: Tooth, number: int) -> Tooth:
+        """Mark the tooth as absent."""
+        return replace(tooth, present=False)
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class BrokenTooth(Fault):
+    """The tooth is broken off ``broken_height`` below its tip, over the whole face; at full height it is missing."""
+
+    kind: ClassVar[str] = "broken"
+    broken_height: float = unit("mm")
+
+    def __post_init__(self) -> None:
+        Fault.__post_init__(self)
+        require_not_negative(self, "broken_height_mm")
+
+    def severity(self, gear: Gear) -> float:
+        """Broken share of the tooth's height above the root chord."""
+        return self.broken_height / tooth_height(gear)
+
+    def apply(self, tooth: Tooth, number: int) -> Tooth:
+        """Take off what is broken; without any involute left nothing can touch."""
+        _require_height(self, "broken_height", self.broken_height, tooth.gear)
+        return _without_tip(tooth, np.array([self.broken_height]))
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class ChippedTooth(Fault):
+    """A chip off the tip: ``chip_height`` below it, over ``chip_width`` from one end of the face.
+
+    ``chip_shape`` is ``"triangular"`` (the whole height at the end, none at ``chip_width``) or ``"rectangular"``.
+    """
+
+    kind: ClassVar[str] = "chipped"
+    chip_height: float = unit("mm")
+    chip_width: float = unit("mm")
+    chip_shape: str = "triangular"
+
+    def __post_init__(self) -> None:
+        Fault.__post_init__(self)
+        require_not_negative(self, "chip_height_mm", "chip_width_mm")
+        require(self, "chip_shape", self.chip_shape in CHIP_SHAPES, f"is none of {', '.join(CHIP_SHAPES)}")
+
+    def severity(self, gear: Gear) -> float:
+        """Broken share of height times width."""
+        share = 0.5 if self.chip_shape == "triangular" else 1.0
+        return share * self.chip_height * self.chip_width / (tooth_height(gear) * gear.face_width)
+
+    def apply(self, tooth: Tooth, number: int) -> Tooth:
+        """Take the chip off."""
+        if self.chip_height * self.chip_width == 0.0:
+            return tooth
+        gear = tooth.gear
+        _require_height(self, "chip_height", self.chip_height, gear)
+        if self.chip_width > gear.face_width:
+            raise FaultError(
+                f"chip_width {self.chip_width * 1e3:.4g} mm is above the face width {gear.face_width * 1e3:.4g} mm of "
+                f"the {self.gear}; reduce fault.chip_width_mm"
+            )
+        n_strips = N_STRIPS if self.chip_shape == "triangular" else 1
+        sliced = tooth.split(np.linspace(0.0, self.chip_width, n_strips + 1))
+        middle = 0.5 * (sliced.slice_edges[1:] + sliced.slice_edges[:-1])
+        height = np.where(middle < self.chip_width, self.chip_height, 0.0)
+        if self.chip_shape == "triangular":
+            height = np.maximum(self.chip_height * (1.0 - middle / self.chip_width), 0.0)
+        return _without_tip(sliced, height)
+
+
+def tooth_height(gear: Gear) -> float:
+    """Height of the tooth on its centreline, from the root chord to the tip, m."""
+    return gear.tip_radius - float(root_curve(gear, np.array([0.5 * np.pi]))[0][0])
+
+
+def _require_height(fault: Fault, key: str, height: float, gear: Gear) -> None:
+    limit = tooth_height(gear)
+    if height > limit * (1.0 + 1e-9):
+        raise FaultError(
+            f"{key} {height * 1e3:.4g} mm is above the height {limit * 1e3:.4g} mm of the {fault.gear} tooth over its "
+            f"root chord (m = {gear.normal_module * 1e3:g} mm, z = {gear.n_teeth}); reduce fault.{key}_mm"
+        )
+
+
+def _without_tip(tooth: Tooth, height: Array) -> Tooth:
+    """The tooth less ``height`` (slice,) m from its tip, measured on the centreline."""
+    if not height.any():
+        return tooth
+    profile = tooth.profile
+    gone = profile.abscissa[profile.n_root_cells :] > tooth.gear.tip_radius - height[:, None]
+    broken = tooth.with_loss(np.where(gone, np.inf, 0.0))
+    left = np.isfinite(broken.material_loss).any()
+    return broken if left else replace(broken, present=False)

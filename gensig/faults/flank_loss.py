@@ -1,0 +1,114 @@
+"""Material that is lost from a flank in patches: what pits and spalls have in common."""
+
+from __future__ import annotations
+
+import math
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+
+from gensig.errors import FaultError
+from gensig.geometry.gear import Gear
+from gensig.geometry.tooth import Tooth
+from gensig.geometry.tooth_profile import involute_point, root_curve
+
+Array = NDArray[np.float64]
+
+SHAPES = ("rectangular", "elliptic")
+N_STRIPS = 24  # across an ellipse
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class Patch:
+    """A hole in a flank, ``length`` along the tooth height, ``width`` along the face, ``depth`` inward with a flat
+    floor; its middle at ``abscissa`` on the tooth centreline and ``face_position`` from one end of the face. In m."""
+
+    shape: str
+    length: float
+    width: float
+    depth: float
+    abscissa: float
+    face_position: float
+
+    def height_at(self, face_position: Array) -> Array:
+        """Extent along the tooth height at places across the face, m."""
+        across = np.abs(face_position - self.face_position) / (0.5 * self.width)
+        if self.shape == "rectangular":
+            return np.where(across < 1.0, self.length, 0.0)
+        return self.length * np.sqrt(np.maximum(1.0 - across**2, 0.0))
+
+
+def flank_ends(gear: Gear) -> tuple[float, float]:
+    """Abscissae of the lower and upper end of the involute on the tooth centreline, m."""
+    tip = math.sqrt(gear.tip_radius**2 - gear.base_radius**2)
+    x, _ = involute_point(gear, np.array([gear.junction_curvature_radius, tip]))
+    return float(x[0]), float(x[1])
+
+
+def flank_area(gear: Gear) -> float:
+    """Height of the involute on the tooth centreline times the face width, m2."""
+    low, high = flank_ends(gear)
+    return (high - low) * gear.face_width
+
+
+def root_chord_abscissa(gear: Gear) -> float:
+    """Abscissa of the root chord, from which positions on the tooth are measured, m."""
+    return float(root_curve(gear, np.array([0.5 * np.pi]))[0][0])
+
+
+def pitch_abscissa(gear: Gear) -> float:
+    """Abscissa of the flank's point on the pitch circle, m."""
+    return gear.pitch_radius * math.cos(gear.half_tooth_angle_at(gear.pitch_radius))
+
+
+def remove_patch(tooth: Tooth, patch: Patch, name: str) -> Tooth:
+    """The tooth with one more hole; nothing happens for a patch without extent.
+
+    Raises
+    ------
+    FaultError    for a patch that leaves the flank or the face, or reaches the centreline; ``name`` is the prefix of
+        the fault's keys
+    """
+    if patch.length * patch.width * patch.depth == 0.0:
+        return tooth
+    _require_on_flank(tooth, patch, name)
+    begin, end = patch.face_position - 0.5 * patch.width, patch.face_position + 0.5 * patch.width
+    n_strips = 1 if patch.shape == "rectangular" else N_STRIPS
+    sliced = tooth.split(np.linspace(begin, end, n_strips + 1))
+    return sliced.with_loss(patch_loss(sliced, patch))
+
+
+def patch_loss(tooth: Tooth, patch: Patch) -> Array:
+    """Depth of a patch on the nodes of the flank, (slice, profile) m."""
+    flank = tooth.profile.abscissa[tooth.profile.n_root_cells :]
+    middle = 0.5 * (tooth.slice_edges[1:] + tooth.slice_edges[:-1])
+    reach = 0.5 * patch.height_at(middle)[:, None]
+    inside = np.abs(flank - patch.abscissa) <= reach
+    return np.where(inside & (reach > 0.0), patch.depth, 0.0)
+
+
+def _require_on_flank(tooth: Tooth, patch: Patch, name: str) -> None:
+    gear, profile = tooth.gear, tooth.profile
+    flank, root = profile.abscissa[profile.n_root_cells :], float(profile.abscissa[0])
+    low, high = patch.abscissa - 0.5 * patch.length, patch.abscissa + 0.5 * patch.length
+    if low < flank[0] - 1e-9 or high > flank[-1] + 1e-9:
+        raise FaultError(
+            f"the {name} from {(low - root) * 1e3:.4g} to {(high - root) * 1e3:.4g} mm above the root chord leaves the "
+            f"flank of the {gear.name} tooth, which reaches from {(flank[0] - root) * 1e3:.4g} to "
+            f"{(flank[-1] - root) * 1e3:.4g} mm; change fault.{name}_position_mm or fault.{name}_length_mm"
+        )
+    begin, end = patch.face_position - 0.5 * patch.width, patch.face_position + 0.5 * patch.width
+    if begin < -1e-9 or end > gear.face_width + 1e-9:
+        raise FaultError(
+            f"the {name} from {begin * 1e3:.4g} to {end * 1e3:.4g} mm across the face leaves the {gear.name} tooth, "
+            f"which is {gear.face_width * 1e3:.4g} mm wide; change fault.{name}_width_mm or "
+            f"fault.{name}_face_position_mm"
+        )
+    inside = (flank >= low) & (flank <= high)
+    half = profile.half_thickness[profile.n_root_cells :][inside]
+    if len(half) and patch.depth >= half.min():
+        raise FaultError(
+            f"{name}_depth {patch.depth * 1e3:.4g} mm reaches the centreline of the {gear.name} tooth (half thickness "
+            f"{float(half.min()) * 1e3:.4g} mm there); reduce fault.{name}_depth_mm"
+        )

@@ -1,0 +1,84 @@
+"""Contact over the face: which slices of a faulty flank bear, how far they stand back, how much softer they make it."""
+
+from __future__ import annotations
+
+import numpy as np
+from numpy.typing import NDArray
+
+from gensig.errors import FaultError
+from gensig.geometry.tooth import Tooth
+from gensig.mesh._kernels import lower_envelope, share_over_slices
+from gensig.mesh.local_contact import ContactLaw
+
+Array = NDArray[np.float64]
+
+# law=paper knows no gap: flank deeper than this share of the module below the rest of its tooth does not bear
+LOST_DEPTH = 0.01
+
+
+def is_nominal(tooth: Tooth) -> bool:
+    """True for a flank that is whole and stands where it should."""
+    return not (tooth.material_loss.any() or tooth.flank_deviation.any())
+
+
+def slice_gaps(tooth: Tooth, curvature_radius: Array, relative_radius: Array) -> Array:
+    """How much later than a sound flank each slice touches its mate, (slice, phase) m.
+
+    The mate rides on the edges of what is short: the gap is the lower envelope of both flanks along the common
+    tangent, not the material removed. Where the flank has lost its tip its new corner touches.
+
+    Parameters
+    ----------
+    curvature_radius : (phase,) m    of the nominal contact; beyond the tip it means contact of the tip's corner
+    relative_radius : (phase,) m     of both flanks there
+    """
+    base = tooth.gear.base_radius
+    arc = tooth.profile.curvature_radius**2 / (2.0 * base)
+    center = curvature_radius**2 / (2.0 * base)
+    standing_back = tooth.material_loss + tooth.flank_deviation
+
+    def envelope(rows: Array) -> Array:
+        gap = np.empty((len(rows), len(center)))
+        lower_envelope(np.ascontiguousarray(rows), arc, center, relative_radius, gap)
+        return gap
+
+    level = standing_back[:, :1]
+    even = np.all(standing_back == level, axis=1)
+    gap = np.repeat(level, len(center), axis=1)
+    if not even.all():
+        gap[~even] = envelope(standing_back[~even]) - envelope(np.zeros((1, len(arc))))
+    return gap
+
+
+def face_contact(
+    tooth: Tooth, curvature_radius: Array, relative_radius: Array, law: ContactLaw, load: Array
+) -> tuple[Array, Array]:
+    """Gap of the slice that touches first and the contact compliance from there, (phase,) m and m/N.
+
+    Parameters
+    ----------
+    curvature_radius, relative_radius : see ``slice_gaps``
+    load : (phase,) N    at which the secant is taken
+    """
+    gaps = slice_gaps(tooth, curvature_radius, relative_radius)
+    gap, compliance = np.empty_like(load), np.empty_like(load)
+    share_over_slices(gaps, tooth.slice_width, load, law.factor, law.constant, law.log_weight, gap, compliance)
+    return gap, compliance
+
+
+def bearing_width(tooth: Tooth, curvature_radius: Array) -> Array:
+    """Width in contact by the paper's law, which knows no gaps: the face less what is lost, (phase,) m.
+
+    Raises
+    ------
+    FaultError    where nothing is left: only gaps can tell what touches instead
+    """
+    loss = tooth.material_loss
+    whole = loss <= loss.min() + LOST_DEPTH * tooth.gear.normal_module
+    width = tooth.slice_width @ whole
+    if np.any(width <= 0.0):
+        raise FaultError(
+            f"a {tooth.gear.name} tooth has lost its flank over the whole face width: mesh.law=paper knows no gaps, "
+            f"take mesh.law=one_sided"
+        )
+    return np.interp(curvature_radius, tooth.profile.curvature_radius, width)
