@@ -17,7 +17,7 @@ matplotlib.use("Agg")
 from matplotlib import pyplot
 
 SOUND, FAULTY, THIRD, FOURTH, GREY = "#0072B2", "#D55E00", "#009E73", "#CC79A7", "#777777"
-COLOURS = (SOUND, FAULTY, THIRD, FOURTH, GREY)
+COLOURS = (SOUND, FAULTY, THIRD, FOURTH, "#56B4E9", GREY)
 # above the mesh line, below the highest usable frequency: where teeth ring and faults modulate
 ENVELOPE_BAND_HZ = (5000.0, 19000.0)
 
@@ -87,6 +87,8 @@ def _terms(axes: Any, curves: StiffnessCurves) -> None:
     styles = {"pinion": "-", "wheel": "--"}
     for gear, terms in curves.compliance.items():
         for colour, (name, values) in zip(COLOURS, terms.items(), strict=True):
+            if not values.any():
+                continue
             axes.plot(curves.contact_position, values * 1e12, styles[gear], color=colour, label=f"{gear} {name}")
     axes.set(
         title="Compliance terms",

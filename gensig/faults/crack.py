@@ -13,7 +13,7 @@ from gensig.errors import FaultError
 from gensig.faults.base import Fault, require, require_not_negative
 from gensig.geometry.gear import Gear
 from gensig.geometry.tooth import RootCrack, Tooth
-from gensig.geometry.tooth_profile import root_curve_point
+from gensig.geometry.tooth_profile import root_curve_point, root_curve_slope
 from gensig.units import unit
 
 Array = NDArray[np.float64]
@@ -82,6 +82,7 @@ class Crack(Fault):
             depth=depth,
             mouth_abscissa=abscissa,
             mouth_half_thickness=half,
+            mouth_slope=root_curve_slope(gear, self.crack_start),
             angle=self.crack_angle,
             side=self.crack_side,
             breathing=self.crack_faces == "breathing",

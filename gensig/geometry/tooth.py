@@ -19,7 +19,8 @@ class RootCrack:
     """A crack into the root, straight in every strip across the face.
 
     ``depth`` (strip,) m in strips of equal width, 0 where there is none; the mouth lies at ``mouth_abscissa`` and
-    ``mouth_half_thickness`` of the outline; ``angle`` to the tooth centreline, inward and towards the root. ``side`` is
+    ``mouth_half_thickness`` of the outline, which makes ``mouth_slope`` with the tooth centreline there; the crack goes
+    at ``angle`` to the centreline, inward and towards the root. ``side`` is
     ``"tension"`` (under the loaded flank) or ``"compression"``; the faces of a ``breathing`` crack bear on each other
     when pressed together, those of an open one never touch.
     """
@@ -27,6 +28,7 @@ class RootCrack:
     depth: Array
     mouth_abscissa: float
     mouth_half_thickness: float
+    mouth_slope: float
     angle: float
     side: str
     breathing: bool

@@ -84,19 +84,33 @@ def tooth_profile(gear: Gear, *, n_root_cells: int = N_ROOT_CELLS, n_flank_cells
     )
 
 
-def root_curve_point(gear: Gear, where: str) -> tuple[float, float]:
-    """Middle of the root transition curve, X and Y in m.
+def root_curve_middle(gear: Gear, where: str) -> float:
+    """Parameter gamma of the middle of the root transition curve, rad.
 
     Parameters
     ----------
     where : ``"gamma_mid"`` halves the range of gamma, ``"arc_mid"`` the arc length
     """
     if where == "gamma_mid":
-        x, y = root_curve(gear, np.array([0.5 * (0.5 * np.pi + gear.pressure_angle)]))
-        return float(x[0]), float(y[0])
+        return 0.5 * (0.5 * np.pi + gear.pressure_angle)
     gamma = np.linspace(0.5 * np.pi, gear.pressure_angle, 4001)
     x, y = root_curve(gear, gamma)
     arc = np.concatenate([[0.0], np.cumsum(np.hypot(np.diff(x), np.diff(y)))])
-    middle = np.interp(0.5 * arc[-1], arc, gamma)
-    x, y = root_curve(gear, np.array([middle]))
+    return float(np.interp(0.5 * arc[-1], arc, gamma))
+
+
+def root_curve_point(gear: Gear, where: str) -> tuple[float, float]:
+    """Middle of the root transition curve, X and Y in m; ``where`` as in ``root_curve_middle``."""
+    x, y = root_curve(gear, np.array([root_curve_middle(gear, where)]))
     return float(x[0]), float(y[0])
+
+
+def root_curve_slope(gear: Gear, where: str) -> float:
+    """Angle of the root curve to the tooth centreline at its middle, rad.
+
+    The rack's rounding rolls on the pitch circle: the normal of what it cuts passes through the pitch point, at
+    gamma - phi to the tooth's thickness direction.
+    """
+    gamma = root_curve_middle(gear, where)
+    phi = (gear.rounding_center_depth / np.tan(gamma) + gear.rounding_center_offset) / gear.pitch_radius
+    return float(gamma - phi)

@@ -16,14 +16,14 @@ CHOICES = {
     "elasticity": ("plane_stress", "plane_strain"),
     "body": ("ring", "sainsot"),
     "tooth": ("to_centreline", "to_contact"),
-    "crack": ("paper",),
+    "crack": ("calibrated", "paper"),
     "roll_torque": ("consistent", "classical"),
 }
 
 # what null stands for: the paper's law comes with the paper's conventions
 CONVENTIONS = {
-    "paper": {"elasticity": "plane_stress", "body": "sainsot", "tooth": "to_contact"},
-    "one_sided": {"elasticity": "plane_strain", "body": "ring", "tooth": "to_centreline"},
+    "paper": {"elasticity": "plane_stress", "body": "sainsot", "tooth": "to_contact", "crack": "paper"},
+    "one_sided": {"elasticity": "plane_strain", "body": "ring", "tooth": "to_centreline", "crack": "calibrated"},
 }
 
 
@@ -39,7 +39,7 @@ class MeshOptions:
     body : ``ring`` solves the elastic ring clamped at the bore, ``sainsot`` is the fit that the paper uses
     tooth : ``to_centreline`` integrates up to where the load crosses the tooth centreline, from where the local contact
         term counts; ``to_contact`` up to the contact abscissa, as the paper does
-    crack : the paper's equations, the one choice so far
+    crack : ``calibrated`` to finite elements, the body weakened too, or ``paper``, eqs. (11) and (12)
     roll_torque : ``consistent`` keeps the energy balance where compliance and gap change with roll angle,
         ``classical`` leaves that torque out
     damping_ratio : of the mesh mode at the mean mesh stiffness

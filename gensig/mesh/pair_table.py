@@ -22,6 +22,7 @@ from gensig.mesh.compliance import tooth_compliance
 from gensig.mesh.face import bearing_width, face_contact, is_nominal
 from gensig.mesh.local_contact import ContactLaw, contact_law, relative_radius
 from gensig.mesh.options import MeshOptions
+from gensig.mesh.root_crack import crack_compliance
 
 Array = NDArray[np.float64]
 
@@ -135,9 +136,23 @@ def _structure_at_nodes(tooth: Tooth, curvature: Array, material: Material, opti
 
 def structural_compliance(tooth: Tooth, curvature: Array, material: Material, options: MeshOptions) -> Array:
     """Tooth and body compliance of one loaded tooth, (phase,) m/N; the material as ``Material.in_plane`` gives it."""
-    gear = tooth.gear
-    own = tooth_compliance(tooth, curvature, material, reach=options.tooth, papers_crack=options.crack == "paper").total
-    return own + body_compliance(gear, load_angle(gear, curvature), material, options)
+    return np.sum(list(structural_terms(tooth, curvature, material, options).values()), axis=0)
+
+
+def structural_terms(tooth: Tooth, curvature: Array, material: Material, options: MeshOptions) -> dict[str, Array]:
+    """The same by its parts: bending, shear, axial, foundation, and what cracks add where they do not cut sections."""
+    gear, papers_crack = tooth.gear, options.crack == "paper"
+    parts = tooth_compliance(tooth, curvature, material, reach=options.tooth, papers_crack=papers_crack)
+    opened = np.zeros_like(curvature)
+    if tooth.cracks and not papers_crack:
+        opened = crack_compliance(tooth, curvature, material, allow_extrapolation=options.allow_extrapolation)
+    return {
+        "bending": parts.bending,
+        "shear": parts.shear,
+        "axial": parts.axial,
+        "foundation": body_compliance(gear, load_angle(gear, curvature), material, options),
+        "crack": opened,
+    }
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)

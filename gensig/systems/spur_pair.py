@@ -15,13 +15,10 @@ from gensig.errors import FaultError
 from gensig.faults.base import Fault, faulty_teeth
 from gensig.geometry.contact import GearPair
 from gensig.geometry.tooth import Tooth, healthy_tooth
-from gensig.geometry.tooth_profile import load_angle
 from gensig.material import Material
-from gensig.mesh.body import body_compliance
-from gensig.mesh.compliance import tooth_compliance
 from gensig.mesh.load_distribution import loaded_pair_table, pair_states, static_mesh
 from gensig.mesh.options import MeshOptions
-from gensig.mesh.pair_table import PairTable, flank_sides
+from gensig.mesh.pair_table import PairTable, flank_sides, structural_terms
 from gensig.operating import Operating
 from gensig.sensing.chain import Sensing
 from gensig.sensing.decimation import decimator
@@ -176,14 +173,8 @@ class SpurPair:
         for name, side in sides.items():
             tooth: Tooth = next((tooth for (gear, _), tooth in odd.items() if gear == name), healthy_tooth(side.gear))
             curvature = np.minimum(side.curvature, tooth.tip_curvature_radius)
-            parts = tooth_compliance(
-                tooth, curvature, structure, reach=self.mesh.tooth, papers_crack=self.mesh.crack == "paper"
-            )
             terms[name] = {
-                "bending": parts.bending,
-                "shear": parts.shear,
-                "axial": parts.axial,
-                "foundation": body_compliance(side.gear, load_angle(side.gear, curvature), structure, self.mesh),
+                **structural_terms(tooth, curvature, structure, self.mesh),
                 "contact": side.contact(tooth, self.mesh)[1],
             }
         return terms

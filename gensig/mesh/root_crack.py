@@ -1,0 +1,113 @@
+"""Compliance that a root crack adds to its tooth, body included, calibrated to finite elements."""
+
+from __future__ import annotations
+
+import math
+
+import numpy as np
+from numpy.typing import NDArray
+
+from gensig.errors import ExtrapolationError
+from gensig.geometry.gear import Gear
+from gensig.geometry.tooth import RootCrack, Tooth
+from gensig.geometry.tooth_profile import load_angle
+from gensig.material import Material
+from gensig.mesh.compliance import tooth_compliance
+from gensig.mesh.root_crack_coefficients import COEFFICIENTS
+
+Array = NDArray[np.float64]
+
+# where finite elements were compared: depth over root chord, angle to the centreline
+DEEPEST = 0.7
+ANGLES = (math.radians(30.0), math.radians(75.0))
+POWERS = (0.75, 1.0, 1.5)
+MIDDLE_ANGLE, MIDDLE_SLOPE = math.radians(45.0), math.radians(40.0)
+
+
+def crack_compliance(
+    tooth: Tooth, curvature_radius: Array, material: Material, *, allow_extrapolation: bool = False
+) -> Array:
+    """What the cracks of a tooth add to its compliance along the line of action, (phase,) m/N.
+
+    Parameters
+    ----------
+    curvature_radius : (phase,) m    of the tooth's own flank at the contact
+    material : as ``Material.in_plane`` gives it
+
+    Source: Irwin's relation between energy release and compliance. The stress intensity at the tip is linear in moment,
+    shear and normal force at the root, so a unit load adds [k_m M / h + k_v cos(alpha) - k_n sin(alpha)]^2 / (E' W):
+    M about the middle of the root chord h through the mouth, each k a function of depth over h, crack angle and the
+    slope of the root curve at the mouth. The coefficients of that function are fitted to two-dimensional finite
+    elements of whole gears (``tests/reference``), so the body behind the crack gives way too.
+    """
+    return sum(
+        (_one(tooth, crack, curvature_radius, material, allow_extrapolation) for crack in tooth.cracks),
+        start=np.zeros_like(curvature_radius),
+    )
+
+
+def _one(
+    tooth: Tooth, crack: RootCrack, curvature_radius: Array, material: Material, allow_extrapolation: bool
+) -> Array:
+    gear = tooth.gear
+    if crack.side == "compression" and crack.breathing:
+        return np.zeros_like(curvature_radius)
+    depth = crack.depth / (2.0 * crack.mouth_half_thickness)
+    _require_checked(tooth, crack, float(depth.max()), allow_extrapolation)
+    angle = load_angle(gear, curvature_radius)
+    factors = basis(depth, crack.angle, crack.mouth_slope) @ np.array(COEFFICIENTS).T
+    intensity = np.maximum(factors @ root_loads(gear, crack, angle), 0.0)
+    through = intensity**2 / (material.youngs_modulus * gear.face_width)
+    if len(depth) == 1:
+        return through[0]
+    return _side_by_side(tooth_compliance(tooth, curvature_radius, material, papers_crack=False).total, through)
+
+
+def basis(depth: Array, angle: float, slope: float) -> Array:
+    """Functions of depth over root chord, crack angle and slope at the mouth that the factors are made of.
+
+    Powers of the depth times low-order terms of the two angles about the middle of what was calibrated,
+    (depth, function); 0 at no depth.
+    """
+    tilt, fillet = angle - MIDDLE_ANGLE, slope - MIDDLE_SLOPE
+    angles = np.array([1.0, tilt, tilt**2, fillet, tilt * fillet])
+    return (np.power(depth[:, None], np.array(POWERS))[:, :, None] * angles).reshape(len(depth), -1)
+
+
+def root_loads(gear: Gear, crack: RootCrack, load_angle: Array) -> Array:
+    """Moment over chord, shear and normal force at the crack's root chord under a unit load, (3, phase).
+
+    Their sense is that in which they open the crack.
+    """
+    chord = 2.0 * crack.mouth_half_thickness
+    moment = (gear.base_radius - crack.mouth_abscissa * np.cos(load_angle)) / chord
+    normal = np.sin(load_angle) * (-1.0 if crack.side == "tension" else 1.0)
+    return np.stack([moment, np.cos(load_angle), normal])
+
+
+def _require_checked(tooth: Tooth, crack: RootCrack, depth: float, allow_extrapolation: bool) -> None:
+    if allow_extrapolation:
+        return
+    chord = 2.0 * crack.mouth_half_thickness
+    if depth > DEEPEST:
+        raise ExtrapolationError(
+            f"crack_depth {depth * chord * 1e3:.4g} mm is {depth:.2f} of the root chord {chord * 1e3:.4g} mm of the "
+            f"{tooth.gear.name} tooth; the calibrated crack was checked up to {DEEPEST:g}, {DEEPEST * chord * 1e3:.4g} "
+            f"mm: reduce fault.crack_depth_mm, take mesh.crack=paper, or set mesh.allow_extrapolation=true"
+        )
+    if not ANGLES[0] - 1e-9 <= crack.angle <= ANGLES[1] + 1e-9:
+        raise ExtrapolationError(
+            f"fault.crack_angle_deg = {math.degrees(crack.angle):g}: the calibrated crack was checked from "
+            f"{math.degrees(ANGLES[0]):g} to {math.degrees(ANGLES[1]):g}; take mesh.crack=paper or set "
+            f"mesh.allow_extrapolation=true"
+        )
+
+
+def _side_by_side(own: Array, through: Array) -> Array:
+    """Strips side by side, each the tooth's own compliance in series with its crack, less the sound tooth, (phase,).
+
+    Source: the slices of the tooth share their deflection at the load, as stiff as the sound tooth lets them; that a
+    crack over a quarter of the face then costs little less than a quarter is the three-dimensional result
+    (``tests/reference``).
+    """
+    return 1.0 / np.mean(1.0 / (own + through), axis=0) - own
