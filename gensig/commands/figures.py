@@ -47,6 +47,10 @@ def _single_pair(axes: Any, curves: StiffnessCurves, faults: Sequence[Fault]) ->
             color=FAULTY,
             label=f"{faults[0].kind} pair",
         )
+    if curves.faulty_pair_gap is not None and np.any(np.abs(curves.faulty_pair_gap) > 1e-9):
+        late = axes.twinx()
+        late.plot(curves.contact_position, curves.faulty_pair_gap * 1e6, ":", color=GREY)
+        late.set_ylabel("touches later by (dotted), um")
     axes.set(
         title="One pair carrying the whole load",
         xlabel="contact position from the start of contact, base pitches",

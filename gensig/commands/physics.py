@@ -75,8 +75,9 @@ def stiffness_content(system: SpurPair, curves: StiffnessCurves) -> dict[str, An
         },
         "shared_body_compliance_m_per_n": system.mesh_table().shared_compliance,
     }
-    if curves.faulty_pair_stiffness is not None:
+    if curves.faulty_pair_stiffness is not None and curves.faulty_pair_gap is not None:
         content["faulty_pair_stiffness_n_per_m"] = curves.faulty_pair_stiffness.tolist()
+        content["faulty_pair_gap_um"] = (curves.faulty_pair_gap * 1e6).tolist()
     return content
 
 
@@ -87,8 +88,16 @@ def _print_stiffness(content: dict[str, Any], curves: StiffnessCurves) -> None:
     print(f"mesh stiffness, range      {curves.mesh_stiffness.min():.4e} .. {curves.mesh_stiffness.max():.4e} N/m")
     print(f"single pair, highest       {curves.single_pair_stiffness.max():.4e} N/m")
     if curves.faulty_pair_stiffness is not None:
-        ratio = curves.faulty_pair_stiffness / curves.single_pair_stiffness
-        print(f"faulty pair loses          {100 * (1 - ratio.max()):.2f} .. {100 * (1 - ratio.min()):.2f} %")
+        loss = 1e2 * (1.0 - curves.faulty_pair_stiffness / curves.single_pair_stiffness)
+        gap = np.array(content["faulty_pair_gap_um"])
+        print(f"faulty pair loses          {_range(loss, '.2f')} %")
+        print(f"faulty pair touches later  {_range(gap, '.3g')} um")
+
+
+def _range(values: Array, form: str) -> str:
+    """Least and greatest value; what is 0 up to rounding has no sign."""
+    low, high = (0.0 if abs(value) < 1e-9 else value for value in (values.min(), values.max()))
+    return f"{low:{form}} .. {high:{form}}"
 
 
 def simulate(arguments: Namespace) -> int:

@@ -14,7 +14,8 @@ from gensig.mesh.sections import sections
 
 Array = NDArray[np.float64]
 
-SHEAR_FACTOR = 1.2  # rectangular section, spur paper eq. (4)
+# parabolic shear of a long prismatic beam, spur paper eq. (4), against even shear: see tooth_compliance
+SHEAR_FACTORS = {"to_contact": 1.2, "to_centreline": 1.0}
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -44,8 +45,10 @@ def tooth_compliance(
     Parameters
     ----------
     curvature_radius : (phase,) m    of the tooth's own flank at the contact
-    reach : ``"to_contact"`` integrates up to the contact abscissa as the paper does, ``"to_centreline"`` up to where
-        the load crosses the centreline: what lies between is the local contact's
+    reach : ``"to_contact"`` integrates up to the contact abscissa with the shear factor 1.2, as the paper does;
+        ``"to_centreline"`` up to where the load crosses the centreline, with 1: what lies between is the local
+        contact's, and a tooth as short as it is thick, held at its root and tapered, has no room for the parabolic
+        shear of a long beam (finite elements of teeth held at their root chord, ``tests/reference``)
     papers_crack : a crack reduces the sections that it cuts, as eqs. (11) and (12) have it
 
     Returns
@@ -78,6 +81,6 @@ def tooth_compliance(
             - 2.0 * cos * sin * h_load * (arm * zeroth - first)
             + sin**2 * h_load**2 * zeroth
         ),
-        shear=cos**2 * up_to_load(SHEAR_FACTOR * step / (material.shear_modulus * area)),
+        shear=cos**2 * up_to_load(SHEAR_FACTORS[reach] * step / (material.shear_modulus * area)),
         axial=sin**2 * up_to_load(step / (material.youngs_modulus * area)),
     )

@@ -50,17 +50,33 @@ class StiffnessCurves:
     """Quasi-static mesh of one pair.
 
     Per contact position (from A, base pitches): stiffness of a single pair that carries the whole load, sound and
-    (where a tooth is faulty) faulty, and the compliance terms by gear. Per roll angle of the faulted gear (pinion
-    when sound): mesh stiffness as the tangent dF/d(approach) under the set torque. SI units, angles in rad.
+    (where a tooth is faulty) faulty, how much later the faulty one touches, and the compliance terms by gear. The
+    faulty pair is that of the first faulty tooth of either gear. Per roll angle of the faulted gear (pinion when
+    sound): mesh stiffness as the tangent dF/d(approach) under the set torque. SI units, angles in rad.
     """
 
     contact_position: Array
     single_pair_stiffness: Array
     faulty_pair_stiffness: Array | None
+    faulty_pair_gap: Array | None
     compliance: dict[str, dict[str, Array]]
     roll_angle: Array
     mesh_stiffness: Array
     load_share: Array
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class _SinglePair:
+    """One pair under the whole load: compliance terms by gear in m/N, gap in m, 1 where it has flank to touch."""
+
+    terms: dict[str, dict[str, Array]]
+    gap: Array
+    touches: Array
+
+    @property
+    def stiffness(self) -> Array:
+        """Force over deflection from first touch, 0 where nothing touches, (phase,) N/m."""
+        return self.touches / np.sum([values for gear in self.terms.values() for values in gear.values()], axis=0)
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -146,38 +162,39 @@ class SpurPair:
         pair = self.pair
         table = self.mesh_table(faults)
         position = np.linspace(0.0, pair.path_of_contact, n_positions)
-        sound, terms = self._terms(position, ()), self._terms(position, faults)
-        gone = any(not tooth.present for tooth in faulty_teeth(pair, faults).values())
+        sound, faulty = self._single_pair(position, ()), self._single_pair(position, faults)
         gear = pair.wheel if faults and faults[0].gear == "wheel" else pair.pinion
         roll = pair.base_pitch * (np.arange(gear.n_teeth * points_per_tooth) + 0.5) / points_per_tooth
         static = static_mesh(table, pair_states(table, roll), self.mesh_force)
         return StiffnessCurves(
             contact_position=position / pair.base_pitch,
-            single_pair_stiffness=_stiffness(sound),
-            faulty_pair_stiffness=(0.0 if gone else 1.0) * _stiffness(terms) if faults else None,
-            compliance=terms,
+            single_pair_stiffness=sound.stiffness,
+            faulty_pair_stiffness=faulty.stiffness if faults else None,
+            faulty_pair_gap=faulty.gap if faults else None,
+            compliance=faulty.terms,
             roll_angle=roll / gear.base_radius,
             mesh_stiffness=static.stiffness,
             load_share=static.load / np.maximum(static.load.sum(axis=1, keepdims=True), 1e-30),
         )
 
-    def _terms(self, position: Array, faults: Sequence[Fault]) -> dict[str, dict[str, Array]]:
-        """Compliance terms in m/N of each gear's faulty tooth, else of a sound one; they add up to the pair's.
+    def _single_pair(self, position: Array, faults: Sequence[Fault]) -> _SinglePair:
+        """The pair of each gear's first faulty tooth, sound where there is none, under the whole load.
 
         Half of the contact term of sound flanks belongs to either gear, what a fault adds to it to the faulty one.
         """
         odd = faulty_teeth(self.pair, faults)
         structure = self.material.in_plane(self.mesh.elasticity)
         sides = flank_sides(self.pair, position, self.material, self.mesh, self.mesh_force, pinion_share=0.5)
-        terms = {}
+        terms, gap, touches = {}, np.zeros_like(position), np.ones_like(position)
         for name, side in sides.items():
             tooth: Tooth = next((tooth for (gear, _), tooth in odd.items() if gear == name), healthy_tooth(side.gear))
-            curvature = np.minimum(side.curvature, tooth.tip_curvature_radius)
-            terms[name] = {
-                **structural_terms(tooth, curvature, structure, self.mesh),
-                "contact": side.contact(tooth, self.mesh)[1],
-            }
-        return terms
+            tip = tooth.tip_curvature_radius
+            own_gap, contact = side.contact(tooth, self.mesh)
+            curvature = np.minimum(side.curvature, tip)
+            terms[name] = {**structural_terms(tooth, curvature, structure, self.mesh), "contact": contact}
+            gap += own_gap
+            touches[(side.curvature > tip + 1e-12) | (not tooth.present)] = 0.0
+        return _SinglePair(terms=terms, gap=gap, touches=touches)
 
 
 def severity(faults: Sequence[Fault], pair: GearPair) -> float:
@@ -187,11 +204,6 @@ def severity(faults: Sequence[Fault], pair: GearPair) -> float:
     if value > 1.0:
         raise FaultError(f"the fault's severity is {value:.3g}, above 1: it is larger than its tooth")
     return value
-
-
-def _stiffness(terms: dict[str, dict[str, Array]]) -> Array:
-    """Stiffness of a single pair from its compliance terms, (phase,) N/m."""
-    return 1.0 / np.sum([values for gear in terms.values() for values in gear.values()], axis=0)
 
 
 @lru_cache(maxsize=32)
