@@ -14,7 +14,7 @@ from numpy.typing import NDArray
 from gensig.commands.console import replaced_file
 from gensig.config import read_request
 from gensig.errors import ConfigError
-from gensig.faults.registry import read_faults
+from gensig.faults.registry import read_faults, without_vary
 from gensig.systems.registry import read_system
 from gensig.systems.spur_pair import SpurPair, StiffnessCurves
 
@@ -111,7 +111,7 @@ def simulate(arguments: Namespace) -> int:
     config = request.config
     name = config["fault"]["kind"]
     config["plan"] = {**config["plan"], "classes": [name], "n_records": 1, "n_units": 1, "n_gearboxes": 1, "vary": {}}
-    config["classes"] = {name: {**config["fault"], "vary": {}}}
+    config["classes"] = {name: without_vary(config["fault"])}
     row = make_plan(config).record(0)
     record = simulate_record(config, row)
     if record.values.get("status") == "failed":

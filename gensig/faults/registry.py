@@ -47,6 +47,14 @@ def read_faults(values: Mapping[str, Any], where: str = "fault") -> tuple[Fault,
     return tuple(_read_fault(part, f"{where}.parts.{place}") for place, part in enumerate(parts))
 
 
+def without_vary(values: Mapping[str, Any]) -> dict[str, Any]:
+    """The same fault with nothing left to draw."""
+    fixed = {**values, "vary": {}}
+    if values.get("kind") == COMPOUND:
+        fixed["parts"] = [{**part, "vary": {}} for part in fault_parts(values)]
+    return fixed
+
+
 def _read_fault(values: Mapping[str, Any], where: str) -> Fault:
     keys = {key: value for key, value in values.items() if key not in ("kind", "vary")}
     kind = values.get("kind")

@@ -18,7 +18,7 @@ from gensig.mesh.root_crack_coefficients import COEFFICIENTS
 Array = NDArray[np.float64]
 
 # where finite elements were compared: depth over root chord, angle to the centreline
-DEEPEST = 0.7
+DEEPEST = 0.8
 ANGLES = (math.radians(30.0), math.radians(75.0))
 POWERS = (0.75, 1.0, 1.5)
 MIDDLE_ANGLE, MIDDLE_SLOPE = math.radians(45.0), math.radians(40.0)
@@ -89,7 +89,7 @@ def _require_checked(tooth: Tooth, crack: RootCrack, depth: float, allow_extrapo
     if allow_extrapolation:
         return
     chord = 2.0 * crack.mouth_half_thickness
-    if depth > DEEPEST:
+    if depth > DEEPEST * (1.0 + 1e-6):
         raise ExtrapolationError(
             f"crack_depth {depth * chord * 1e3:.4g} mm is {depth:.2f} of the root chord {chord * 1e3:.4g} mm of the "
             f"{tooth.gear.name} tooth; the calibrated crack was checked up to {DEEPEST:g}, {DEEPEST * chord * 1e3:.4g} "

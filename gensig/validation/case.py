@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from copy import deepcopy
 from dataclasses import dataclass, replace
 from functools import lru_cache
 from typing import Any
@@ -13,11 +14,12 @@ from numpy.typing import NDArray
 from gensig.compose import compose
 from gensig.dynamics.pair import PairDynamics
 from gensig.errors import ConfigError
-from gensig.faults.base import Fault
+from gensig.faults.base import Fault, faulty_teeth
 from gensig.faults.registry import read_faults
 from gensig.geometry.contact import GearPair
 from gensig.geometry.gear import Gear
-from gensig.mesh.pair_table import PairTable
+from gensig.material import Material
+from gensig.mesh.pair_table import PairTable, pair_table
 from gensig.systems.registry import read_system
 from gensig.systems.spur_pair import SpurPair
 
@@ -44,6 +46,16 @@ class Case:
     def table(self) -> PairTable:
         """Compliance and gap tables, with the faults."""
         return self.system.mesh_table(self.faults)
+
+    @property
+    def whole_load_table(self) -> PairTable:
+        """The same where one pair carries the whole load."""
+        return _whole_load_table(self)
+
+    @property
+    def structure_material(self) -> Material:
+        """The material as bending, axial and body terms take it."""
+        return self.system.material.in_plane(self.system.mesh.elasticity)
 
     @property
     def faulty_kinds(self) -> dict[str, int]:
@@ -74,7 +86,7 @@ class Case:
         )
 
 
-@lru_cache(maxsize=256)
+@lru_cache(maxsize=512)
 def read_case(overrides: tuple[str, ...]) -> Case:
     """Compose the machine and the selected fault; overrides that begin with ``fault`` are the fault's."""
     machine = tuple(word for word in overrides if not word.startswith("fault"))
@@ -82,10 +94,36 @@ def read_case(overrides: tuple[str, ...]) -> Case:
     return Case(overrides=overrides, system=_read_machine(machine), faults=fault)
 
 
-# composed apart and once for each option, as composing takes longer than all that a row computes
-@lru_cache(maxsize=64)
+# composing takes longer than all that a row computes: values are typed into one composed machine
+@lru_cache(maxsize=128)
 def _read_machine(overrides: tuple[str, ...]) -> SpurPair:
-    return read_system(compose("generate", overrides))
+    keys = [word.partition("=")[0] for word in overrides]
+    if not all("." in key and not key.startswith("gear.rated_") for key in keys):
+        return read_system(compose("generate", overrides))  # groups, and values that others are made of
+    values = deepcopy(_default_machine())
+    for key, word in zip(keys, overrides, strict=True):
+        *groups, last = key.split(".")
+        place: dict[str, Any] = values
+        for group in groups:
+            place = place.get(group, {})
+        if last not in place:
+            raise ConfigError(f"'{word}': the machine has no key '{key}'")
+        place[last] = yaml.safe_load(word.partition("=")[2])
+    return read_system(values)
+
+
+@lru_cache(maxsize=1)
+def _default_machine() -> dict[str, Any]:
+    return compose("generate")
+
+
+@lru_cache(maxsize=64)
+def _whole_load_table(case: Case) -> PairTable:
+    system = case.system
+    if system.mesh.contact == "linear":
+        return case.table
+    teeth = faulty_teeth(case.pair, case.faults)
+    return pair_table(case.pair, system.material, system.mesh, teeth, load=system.mesh_force)
 
 
 @lru_cache(maxsize=8)

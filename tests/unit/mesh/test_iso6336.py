@@ -1,0 +1,117 @@
+"""ISO 6336-1 Method B against the values worked out by hand in the spur reference (docs/validation.md), section 4."""
+
+import math
+from dataclasses import replace
+
+import pytest
+from numpy.testing import assert_allclose
+
+from gensig.errors import ConfigError, ExtrapolationError
+from gensig.geometry.contact import GearPair
+from gensig.mesh import iso6336
+
+N_PER_MM_UM = 1e9  # in N/m/m
+LOW_LOAD = 20.0 / 23e-3 / 20e-3  # 20 N m on the pinion: 43.5 N/mm
+
+
+@pytest.fixture(scope="module")
+def pair(xiamen) -> GearPair:
+    return xiamen.pair
+
+
+def shifted(pair: GearPair, pinion: float, wheel: float) -> GearPair:
+    return GearPair(
+        pinion=replace(pair.pinion, profile_shift=pinion),
+        wheel=replace(pair.wheel, profile_shift=wheel),
+        backlash=pair.backlash,
+    )
+
+
+def test_flexibility_and_theoretical_stiffness(pair):
+    assert_allclose(iso6336.flexibility(pair) * N_PER_MM_UM, 0.057062, rtol=1e-5, atol=0)
+    assert_allclose(1 / iso6336.flexibility(pair) / N_PER_MM_UM, 17.525, rtol=3e-5, atol=0)
+    assert_allclose(iso6336.basic_rack_factor(pair.pinion), 0.975, rtol=1e-12, atol=0)
+
+
+@pytest.mark.parametrize(
+    ("function", "line_load", "per_width", "at_20_mm"),
+    [
+        (iso6336.single_stiffness, None, 13.669, 2.734e8),
+        (iso6336.mesh_stiffness, None, 20.967, 4.193e8),
+        (iso6336.single_stiffness, LOW_LOAD, None, 2.220e8),
+        (iso6336.mesh_stiffness, LOW_LOAD, None, 3.405e8),
+    ],
+)
+def test_values_of_the_reference(pair, function, line_load, per_width, at_20_mm):
+    found = function(pair, line_load=line_load)
+    assert_allclose(found * pair.pinion.face_width, at_20_mm, rtol=2e-4, atol=0)
+    if per_width is not None:
+        assert_allclose(found / N_PER_MM_UM, per_width, rtol=4e-5, atol=0)
+
+
+def test_without_the_correction_factor(pair):
+    theoretical = iso6336.mesh_stiffness(pair, correction_factor=1.0) * pair.pinion.face_width
+    assert_allclose(theoretical, 5.24e8, rtol=5e-4, atol=0)
+
+
+def test_load_matters_below_100_n_per_mm_only(pair):
+    stiff = iso6336.single_stiffness(pair)
+    loads = (1e3, 5e4, 0.999e5, 1e5, 5e5)
+    found = [iso6336.single_stiffness(pair, line_load=load) / stiff for load in loads]
+    assert found == sorted(found)
+    assert found[2] < 1.0
+    assert_allclose(found[3:], 1.0, rtol=1e-12, atol=0)
+    assert_allclose(found[1], 0.5**0.25, rtol=1e-12, atol=0)
+
+
+def test_profile_shift_follows_the_series(pair):
+    """q' of x1 = 0.4, x2 = -0.2 term by term; the wheel's coefficients on the wheel's shift, not the pinion's."""
+    expected = 0.04723 + (0.15551 - 0.11654 * 0.4) / 23 + (0.25791 + 0.24188 * 0.2) / 84
+    expected += -0.00635 * 0.4 + 0.00193 * 0.2 + 0.00529 * 0.16 + 0.00182 * 0.04
+    found = iso6336.flexibility(shifted(pair, 0.4, -0.2)) * N_PER_MM_UM
+    assert_allclose(found, expected, rtol=1e-12, atol=0)
+    assert abs(found / 0.057062 - 1.0) > 0.02
+
+
+def test_basic_rack_factor_is_the_mean_of_both_gears(pair):
+    flat = replace(pair.wheel, clearance_coefficient=0.2, cutter_tip_radius_coefficient=0.3)
+    mixed = GearPair(pinion=pair.pinion, wheel=flat, backlash=0.0)
+    ratio = iso6336.single_stiffness(mixed) / iso6336.single_stiffness(pair)
+    assert_allclose(ratio, 0.5 * (0.975 + 1.0) / 0.975, rtol=1e-12, atol=0)
+
+
+def test_a_larger_pressure_angle_stiffens_by_2_percent_a_degree(pair):
+    steep = replace(pair.pinion, pressure_angle=math.radians(25.0), cutter_tip_radius_coefficient=0.3)
+    assert_allclose(iso6336.basic_rack_factor(steep), 0.975 * 1.1, rtol=1e-12, atol=0)
+
+
+def test_stiffness_scales_with_the_modulus(pair):
+    soft = iso6336.single_stiffness(pair, youngs_modulus=103e9)
+    assert_allclose(soft, 0.5 * iso6336.single_stiffness(pair), rtol=1e-12, atol=0)
+
+
+@pytest.mark.parametrize(("pinion", "wheel"), [(0.0, 0.1), (-0.25, -0.3), (1.2, 0.9)])
+def test_shifts_outside_the_series_are_refused(pair, pinion, wheel):
+    # many teeth and a low wheel, so that such shifts exist without interference
+    low = replace(pair.wheel, addendum_coefficient=0.9, clearance_coefficient=0.35)
+    teeth = replace(pair, pinion=replace(pair.pinion, n_teeth=80), wheel=low)
+    outside = shifted(teeth, pinion, wheel)
+    with pytest.raises(ExtrapolationError, match="x1 >= x2"):
+        iso6336.single_stiffness(outside)
+    assert iso6336.single_stiffness(outside, allow_extrapolation=True) > 0.0
+
+
+def test_small_contact_ratio_is_refused(pair):
+    short = [replace(gear, addendum_coefficient=0.6) for gear in (pair.pinion, pair.wheel)]
+    few = GearPair(pinion=short[0], wheel=short[1], backlash=0.0)
+    assert few.transverse_contact_ratio < 1.2
+    with pytest.raises(ExtrapolationError, match="contact ratio"):
+        iso6336.mesh_stiffness(few)
+    assert iso6336.single_stiffness(few) > 0.0
+    assert iso6336.mesh_stiffness(few, allow_extrapolation=True) > 0.0
+
+
+@pytest.mark.parametrize("argument", ["line_load", "correction_factor", "youngs_modulus"])
+def test_what_is_not_positive_is_refused(pair, argument):
+    with pytest.raises(ConfigError, match=argument):
+        iso6336.single_stiffness(pair, **{argument: 0.0})
