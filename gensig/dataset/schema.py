@@ -112,7 +112,7 @@ SIGNALS: dict[str, Column] = {
         Column(name="shaft_angle", dtype="float64", unit="rad", role="result", axes=("sample",),
                description="angle of the driving shaft (optional)"),
         Column(name="fault_multihot", dtype="int8", unit="1", role="label", axes=("class",),
-               description="1 for the record's class and those of a compound fault's parts, as in class_names (optional)"),
+               description="1 for the record's class and those of a compound fault's parts, by class_names (optional)"),
         Column(name="signal_power", dtype="float64", unit="(m/s^2)^2", role="result", axes=("channel",),
                description="mean square of the signal without noise (optional)"),
         Column(name="noise_power", dtype="float64", unit="(m/s^2)^2", role="noise", axes=("channel",),
