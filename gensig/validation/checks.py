@@ -5,13 +5,16 @@ from __future__ import annotations
 from collections.abc import Callable, Sequence
 
 from gensig.errors import ConfigError
+from gensig.validation.body_checks import BODY
 from gensig.validation.case import read_case
 from gensig.validation.dynamics_checks import DYNAMICS
+from gensig.validation.fault_checks import FAULT
 from gensig.validation.geometry_checks import GEOMETRY, Check
 from gensig.validation.mesh_checks import MESH
 from gensig.validation.rows import SOURCES, Result, Row, judge, read_rows
+from gensig.validation.standard_checks import STANDARD
 
-QUANTITIES: dict[str, Check] = {**GEOMETRY, **MESH, **DYNAMICS}
+QUANTITIES: dict[str, Check] = {**GEOMETRY, **BODY, **MESH, **FAULT, **STANDARD, **DYNAMICS}
 
 
 def evaluate(row: Row) -> Result:

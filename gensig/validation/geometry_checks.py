@@ -8,7 +8,13 @@ import numpy as np
 
 from gensig.geometry.contact import corner_gap
 from gensig.geometry.gear import Gear
-from gensig.geometry.tooth_profile import involute_point, root_curve_point, tooth_profile
+from gensig.geometry.tooth_profile import (
+    involute_point,
+    root_curve,
+    root_curve_middle,
+    root_curve_point,
+    tooth_profile,
+)
 from gensig.validation.case import Case, pair_dynamics
 
 Check = Callable[[Case, str], float]
@@ -25,6 +31,27 @@ def _of_gear(value: Callable[[Gear], float]) -> Check:
 
 def _junction(gear: Gear, axis: int) -> float:
     return float(involute_point(gear, np.array([gear.junction_curvature_radius]))[axis][0])
+
+
+def _junction_gap(gear: Gear) -> float:
+    """Distance from the end of the root curve to the beginning of the involute."""
+    x, y = root_curve(gear, np.array([gear.pressure_angle]))
+    return float(np.hypot(x[0] - _junction(gear, 0), y[0] - _junction(gear, 1)))
+
+
+def _junction_slope_step(gear: Gear) -> float:
+    """Angle between root curve and involute where they join, by central differences of their points."""
+    shift = 1e-5
+    root = root_curve(gear, gear.pressure_angle + shift * np.array([1.0, -1.0]))
+    flank = involute_point(gear, gear.junction_curvature_radius * (1.0 + shift * np.array([-1.0, 1.0])))
+    slopes = [np.arctan2(np.diff(y)[0], np.diff(x)[0]) for x, y in (root, flank)]
+    return float(abs(slopes[0] - slopes[1]))
+
+
+def _zone_share(case: Case, at: str) -> float:
+    """Share of the mesh cycle with one (``single``) or two (``double``) pairs in contact."""
+    double = case.pair.transverse_contact_ratio - 1.0
+    return double if at == "double" else 1.0 - double
 
 
 def _corner_gap(case: Case, at: str) -> float:
@@ -54,11 +81,16 @@ GEOMETRY: dict[str, Check] = {
     "root_half_angle": _of_gear(lambda gear: gear.root_half_angle),
     "rounding_center_depth": _of_gear(lambda gear: gear.rounding_center_depth),
     "rounding_center_offset": _of_gear(lambda gear: gear.rounding_center_offset),
+    "half_pitch_angle": _of_gear(lambda gear: float(np.pi / gear.n_teeth)),
     "junction_curvature_radius": _of_gear(lambda gear: gear.junction_curvature_radius),
     "root_chord_abscissa": _of_gear(lambda gear: float(tooth_profile(gear).abscissa[0])),
     "junction_radius": _of_gear(lambda gear: float(np.hypot(gear.base_radius, gear.junction_curvature_radius))),
     "junction_abscissa": _of_gear(lambda gear: _junction(gear, 0)),
     "junction_half_thickness": _of_gear(lambda gear: _junction(gear, 1)),
+    "junction_gap": _of_gear(_junction_gap),
+    "junction_slope_step": _of_gear(_junction_slope_step),
+    "gamma_mid_angle": _of_gear(lambda gear: root_curve_middle(gear, "gamma_mid")),
+    "arc_mid_angle": _of_gear(lambda gear: root_curve_middle(gear, "arc_mid")),
     "gamma_mid_abscissa": _of_gear(lambda gear: root_curve_point(gear, "gamma_mid")[0]),
     "gamma_mid_half_thickness": _of_gear(lambda gear: root_curve_point(gear, "gamma_mid")[1]),
     "arc_mid_abscissa": _of_gear(lambda gear: root_curve_point(gear, "arc_mid")[0]),
@@ -66,6 +98,8 @@ GEOMETRY: dict[str, Check] = {
     "tangent_length": lambda case, at: case.pair.tangent_length,
     "base_pitch": lambda case, at: case.pair.base_pitch,
     "transverse_contact_ratio": lambda case, at: case.pair.transverse_contact_ratio,
+    "single_zone_length": lambda case, at: 2.0 * case.pair.base_pitch - case.pair.path_of_contact,
+    "zone_share": _zone_share,
     "pinion_curvature": lambda case, at: float(case.curvature("pinion", at)[0]),
     "corner_gap": _corner_gap,
     "smaller_corner_gap": _smaller_corner_gap,

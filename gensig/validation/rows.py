@@ -34,6 +34,9 @@ UNITS = {
     "deg": 0.017453292519943295,
     "1e8 N/m": 1e8,
     "1e-12 m/N": 1e-12,
+    "N/mm": 1e3,
+    "N/(mm um)": 1e9,  # per face width
+    "mm um/N": 1e-9,
     "kg": 1.0,
     "kg m2": 1.0,
     "Hz": 1.0,

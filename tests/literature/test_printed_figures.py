@@ -59,6 +59,16 @@ def test_every_quantity_is_used():
         ("fe_coupled.double_zone.3_of_7", "mesh.pair_coupling=sum"),
         ("corner_gap.missing_tooth.peak", "gear.addendum_coefficient=0.98"),
         ("record_healthy_lin.RMS", "mesh.law=one_sided"),
+        ("ours_structure_strain.pinion.C", "mesh.elasticity=plane_stress"),
+        ("ours_tooth.pinion.C", "mesh.tooth=to_contact"),
+        ("ours_body_bores.pinion_E.5mm", "mesh.body=sainsot"),
+        ("ours_local.both_flanks.C", "operating.torque_nm=2"),
+        ("ours_pair_strain.stiffness.C", "mesh.contact=linear"),
+        ("ours_double_zone.coupled.2_101mm", "mesh.pair_coupling=sum"),
+        ("ours_load_share.hertz.3_502mm", "mesh.pair_coupling=sum"),
+        ("ours_crack.gamma_1_0mm.C", "mesh.crack=paper"),
+        ("ours_pit.full_width_gap.1mm", "fault.pit_length_mm=1.2"),
+        ("iso6336.single.c", "gear.clearance_coefficient=0.3"),
     ],
 )
 def test_a_wrong_input_differs(row_id, word):
