@@ -61,12 +61,11 @@ def _between(back, arc, j, center, radius):
 
 
 @_compiled
-def share_over_slices(slice_gap, width, load, factor, constant, log_weight, gap, compliance):
+def share_over_slices(slice_gap, width, load, factor, constant, log_weight, bending, gap, compliance):
     """Gap of the slice that touches first, and the secant compliance from there under the load.
 
-    Every slice carries width x (approach - its gap) / (unit compliance), the unit compliance being
-    factor x (constant - log_weight x ln(load per loaded width)): the teeth bend as a whole, only the contact
-    is the slice's own.
+    Every slice carries width x (approach - its gap) / (unit compliance), the unit compliance being that of the contact,
+    factor x (constant - log_weight x ln(load per loaded width)), and of what bends with the slice alone.
 
     Parameters
     ----------
@@ -74,6 +73,7 @@ def share_over_slices(slice_gap, width, load, factor, constant, log_weight, gap,
     width : (slice,) m
     load : (node,) N
     factor : m2/N, constant : (node,), log_weight : 0 (linear) or 1 (Weber)
+    bending : (node,) m2/N    compliance of unit width that is the slice's own; left out of what is returned
     gap, compliance : (node,) m, m/N, written
     """
     n_slices = width.shape[0]
@@ -84,7 +84,7 @@ def share_over_slices(slice_gap, width, load, factor, constant, log_weight, gap,
         gap[k] = first
         loaded_width = width.sum()
         for _ in range(ROUNDS):
-            unit = factor * (constant[k] - log_weight * np.log(load[k] / loaded_width))
+            unit = factor * (constant[k] - log_weight * np.log(load[k] / loaded_width)) + bending[k]
             loaded_width, moment, approach = 0.0, 0.0, first
             for position in range(n_slices):
                 i = order[position]
@@ -93,4 +93,4 @@ def share_over_slices(slice_gap, width, load, factor, constant, log_weight, gap,
                 loaded_width += width[i]
                 moment += width[i] * (slice_gap[i, k] - first)
                 approach = first + (load[k] * unit + moment) / loaded_width
-        compliance[k] = (approach - first) / load[k]
+        compliance[k] = (approach - first) / load[k] - bending[k] / width.sum()

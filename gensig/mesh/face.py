@@ -51,18 +51,20 @@ def slice_gaps(tooth: Tooth, curvature_radius: Array, relative_radius: Array) ->
 
 
 def face_contact(
-    tooth: Tooth, curvature_radius: Array, relative_radius: Array, law: ContactLaw, load: Array
+    tooth: Tooth, curvature_radius: Array, relative_radius: Array, law: ContactLaw, load: Array, bending: Array
 ) -> tuple[Array, Array]:
-    """Gap of the slice that touches first and the contact compliance from there, (phase,) m and m/N.
+    """Gap of the slice that touches first; from there, contact compliance and what partial width adds to bending.
 
     Parameters
     ----------
     curvature_radius, relative_radius : see ``slice_gaps``
     load : (phase,) N    at which the secant is taken
+    bending : (phase,) m/N    of both teeth over the whole face, where every slice bends by itself, else 0
     """
     gaps = slice_gaps(tooth, curvature_radius, relative_radius)
     gap, compliance = np.empty_like(load), np.empty_like(load)
-    share_over_slices(gaps, tooth.slice_width, load, law.factor, law.constant, law.log_weight, gap, compliance)
+    unit = bending * tooth.gear.face_width
+    share_over_slices(gaps, tooth.slice_width, load, law.factor, law.constant, law.log_weight, unit, gap, compliance)
     return gap, compliance
 
 

@@ -17,13 +17,26 @@ CHOICES = {
     "body": ("ring", "sainsot"),
     "tooth": ("to_centreline", "to_contact"),
     "crack": ("calibrated", "paper"),
+    "bending": ("by_slice", "whole"),
     "roll_torque": ("consistent", "classical"),
 }
 
 # what null stands for: the paper's law comes with the paper's conventions
 CONVENTIONS = {
-    "paper": {"elasticity": "plane_stress", "body": "sainsot", "tooth": "to_contact", "crack": "paper"},
-    "one_sided": {"elasticity": "plane_strain", "body": "ring", "tooth": "to_centreline", "crack": "calibrated"},
+    "paper": {
+        "elasticity": "plane_stress",
+        "body": "sainsot",
+        "tooth": "to_contact",
+        "crack": "paper",
+        "bending": "whole",
+    },
+    "one_sided": {
+        "elasticity": "plane_strain",
+        "body": "ring",
+        "tooth": "to_centreline",
+        "crack": "calibrated",
+        "bending": "by_slice",
+    },
 }
 
 
@@ -40,6 +53,8 @@ class MeshOptions:
     tooth : ``to_centreline`` integrates up to where the load crosses the tooth centreline, from where the local contact
         term counts; ``to_contact`` up to the contact abscissa, as the paper does
     crack : ``calibrated`` to finite elements, the body weakened too, or ``paper``, eqs. (11) and (12)
+    bending : where only part of the face bears, ``by_slice`` lets every slice bend by itself on the shared body,
+        ``whole`` bends the tooth as one piece
     roll_torque : ``consistent`` keeps the energy balance where compliance and gap change with roll angle,
         ``classical`` leaves that torque out
     damping_ratio : of the mesh mode at the mean mesh stiffness
@@ -54,6 +69,7 @@ class MeshOptions:
     body: str
     tooth: str
     crack: str
+    bending: str
     roll_torque: str
     damping_ratio: float
     friction_coefficient: float

@@ -18,7 +18,7 @@ from gensig.geometry.tooth import Tooth, healthy_tooth
 from gensig.material import Material
 from gensig.mesh.load_distribution import loaded_pair_table, pair_states, static_mesh
 from gensig.mesh.options import MeshOptions
-from gensig.mesh.pair_table import PairTable, flank_sides, structural_terms
+from gensig.mesh.pair_table import PairTable, flank_sides, slice_bending, structural_terms
 from gensig.operating import Operating
 from gensig.sensing.chain import Sensing
 from gensig.sensing.decimation import decimator
@@ -185,11 +185,12 @@ class SpurPair:
         odd = faulty_teeth(self.pair, faults)
         structure = self.material.in_plane(self.mesh.elasticity)
         sides = flank_sides(self.pair, position, self.material, self.mesh, self.mesh_force, pinion_share=0.5)
+        bending = slice_bending(self.pair, position, self.material, self.mesh)
         terms, gap, touches = {}, np.zeros_like(position), np.ones_like(position)
         for name, side in sides.items():
             tooth: Tooth = next((tooth for (gear, _), tooth in odd.items() if gear == name), healthy_tooth(side.gear))
             tip = tooth.tip_curvature_radius
-            own_gap, contact = side.contact(tooth, self.mesh)
+            own_gap, contact = side.contact(tooth, bending, self.mesh)
             curvature = np.minimum(side.curvature, tip)
             terms[name] = {**structural_terms(tooth, curvature, structure, self.mesh), "contact": contact}
             gap += own_gap

@@ -257,8 +257,18 @@ def triangulate(loops: Sequence[Polyline], inner: Sequence[Array], inside_size: 
     inside_size : edge length at ``INSIDE_DISTANCE`` from the lines, modules
     """
     _start_gmsh()
+    try:
+        _describe(loops, inner, inside_size)
+        gmsh.model.mesh.generate(2)
+        return _read_triangles()
+    finally:
+        gmsh.finalize()
+
+
+def _describe(loops: Sequence[Polyline], inner: Sequence[Array], inside_size: float) -> None:
+    """Geometry and wanted edge lengths as gmsh takes them."""
     geo = gmsh.model.geo
-    tags = {}
+    tags: dict[tuple[float, float], int] = {}
 
     def place(line: Polyline) -> list[int]:
         nodes = []
@@ -286,15 +296,11 @@ def triangulate(loops: Sequence[Polyline], inner: Sequence[Array], inside_size: 
     gmsh.model.mesh.embed(1, edges, 2, surface)
     gmsh.model.mesh.embed(0, [nodes[0] for nodes in embedded if len(nodes) == 1], 2, surface)
     _grow_inwards(inside_size)
-    gmsh.model.mesh.generate(2)
-    mesh = _read_triangles()
-    gmsh.model.remove()
-    return mesh
 
 
 def _start_gmsh() -> None:
-    if not gmsh.isInitialized():
-        gmsh.initialize(interruptible=False)
+    """A fresh gmsh for every mesh: otherwise a mesh would depend on those made before it."""
+    gmsh.initialize(interruptible=False)
     for key, value in (
         ("General.Terminal", 0),
         ("General.NumThreads", 1),
