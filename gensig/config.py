@@ -122,7 +122,7 @@ def _check_shape(config: Mapping[str, Any]) -> None:
 def _no_such_fault_key(key: str, selected: Mapping[str, Any]) -> str:
     leaf = key.removeprefix("fault.")
     known = [name for name in selected if name not in ("kind", "vary")]
-    close = difflib.get_close_matches(leaf, known, n=1)
+    close = difflib.get_close_matches(leaf, known, n=1, cutoff=0.8)  # a slip, not another fault's key
     if close:
         return f"unknown key '{key}'; did you mean 'fault.{close[0]}'?"
     has = f"it has {', '.join(known)}" if known else "it has no keys"

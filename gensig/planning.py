@@ -15,6 +15,7 @@ from gensig.dataset.plan import Plan, record_ids, shard_places
 from gensig.errors import ConfigError
 from gensig.faults.base import faulty_teeth
 from gensig.faults.registry import COMPOUND, fault_parts, read_faults
+from gensig.mesh.pair_table import check_teeth
 from gensig.records import MISSING, Stream, read_seed, record_system, replace_key, stream, whole_number
 from gensig.systems.registry import read_system
 from gensig.systems.spur_pair import severity
@@ -80,7 +81,7 @@ def _row(
     system = record_system(config, values)
     system.pair.require_continuous_drive()
     applied = read_faults(fault)
-    faulty_teeth(system.pair, applied)
+    check_teeth(system.pair, system.material, system.mesh, faulty_teeth(system.pair, applied))
     rng = stream(seed, Stream.START, index)
     parts = fault_parts(fault)
     return {

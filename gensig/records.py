@@ -97,10 +97,11 @@ def simulate_record(config: Mapping[str, Any], row: Mapping[str, Any]) -> Record
     faults = [] if config["plan"]["sham"] else row_faults(row)
     columns = {key: value for key, value in row.items() if key not in ("shard", "row")}
     n_channels = len(system.sensing.channels)
-    kinds = {fault["kind"] for fault in json.loads(str(row["faults_json"]))}
+    parts = json.loads(str(row["faults_json"]))
+    kinds = {part["kind"] for part in parts} if len(parts) > 1 else set()
     multihot = np.array(
         [
-            place == int(row["label"]) or (len(kinds) > 1 and config["classes"][name]["kind"] in kinds)
+            place == int(row["label"]) or config["classes"][name]["kind"] in kinds
             for place, name in enumerate(config["plan"]["classes"])
         ],
         dtype=np.int8,

@@ -142,6 +142,26 @@ def structural_compliance(tooth: Tooth, curvature: Array, material: Material, op
     return np.sum(list(structural_terms(tooth, curvature, material, options).values()), axis=0)
 
 
+def check_teeth(
+    pair: GearPair, material: Material, options: MeshOptions, teeth: Mapping[tuple[str, int], Tooth]
+) -> None:
+    """Raise what ``pair_table`` would raise about faulty teeth, at the cost of one contact point a tooth.
+
+    Raises
+    ------
+    FaultError, ExtrapolationError    for what the chosen conventions cannot take
+    """
+    structure, known = material.in_plane(options.elasticity), set()
+    for (name, _), tooth in teeth.items():
+        if id(tooth) in known or not tooth.present:
+            continue
+        known.add(id(tooth))
+        side = flank_sides(pair, np.array([pair.pitch_point]), material, options, 1.0)[name]
+        structural_terms(tooth, np.minimum(side.curvature, tooth.tip_curvature_radius), structure, options)
+        if options.law == "paper" and not is_nominal(tooth):
+            bearing_width(tooth, side.curvature)
+
+
 def structural_terms(tooth: Tooth, curvature: Array, material: Material, options: MeshOptions) -> dict[str, Array]:
     """The same by its parts: bending, shear, axial, foundation, and what cracks add where they do not cut sections."""
     gear, papers_crack = tooth.gear, options.crack == "paper"
