@@ -8,6 +8,7 @@ from __future__ import annotations
 
 import dataclasses
 import difflib
+import functools
 import math
 import types
 import typing
@@ -77,7 +78,7 @@ def read(cls: type[T], values: Mapping[str, Any], where: str, **given: Any) -> T
     """
     fields = {field.name: field for field in dataclasses.fields(cls) if field.name not in given}  # type: ignore[arg-type]
     names = {_boundary_name(field): field for field in fields.values()}
-    hints = typing.get_type_hints(cls)
+    hints = _hints(cls)
     if not isinstance(values, Mapping):
         raise ConfigError(f"{where} = {values!r} must be a group of keys, not one value")
     result = dict(given)
@@ -96,6 +97,12 @@ def read(cls: type[T], values: Mapping[str, Any], where: str, **given: Any) -> T
     if missing:
         raise ConfigError(f"{where}: missing {', '.join(missing)}")
     return cls(**result)
+
+
+@functools.lru_cache(maxsize=64)
+def _hints(cls: type) -> dict[str, Any]:
+    """Types of a dataclass's fields; looking them up costs more than all else in reading one."""
+    return typing.get_type_hints(cls)
 
 
 def unit(suffix: str, *, default: Any = dataclasses.MISSING) -> Any:
