@@ -78,7 +78,7 @@ def read(cls: type[T], values: Mapping[str, Any], where: str, **given: Any) -> T
     """
     fields = {field.name: field for field in dataclasses.fields(cls) if field.name not in given}  # type: ignore[arg-type]
     names = {_boundary_name(field): field for field in fields.values()}
-    hints = _hints(cls)
+    hints = _hints(cls)  # type: ignore[arg-type]
     if not isinstance(values, Mapping):
         raise ConfigError(f"{where} = {values!r} must be a group of keys, not one value")
     result = dict(given)
