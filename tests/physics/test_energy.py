@@ -4,17 +4,19 @@ from typing import NamedTuple
 
 import numpy as np
 import pytest
+from fault_cases import one
 from numpy.testing import assert_allclose
 
 from gensig.dynamics import _kernels
-from gensig.faults.missing_tooth import MissingTooth
+from gensig.faults.broken import MissingTooth
 
 SAMPLING_RATE = 51200.0
 OVERSAMPLING = 32
 DURATION = 0.008
 # the missing tooth would enter at roll 2, about 2.5 ms from the start: its whole passage lies in the record
 FAULTS = {"healthy": (), "missing_pinion": (MissingTooth(gear="pinion", tooth=2),),
-          "missing_wheel": (MissingTooth(gear="wheel", tooth=2),)}  # fmt: skip
+          "missing_wheel": (MissingTooth(gear="wheel", tooth=2),),
+          "flanks": (one("chipped", tooth=2, chip_width_mm=15), one("pitch_error", gear="wheel", tooth=2))}  # fmt: skip
 
 
 class Balance(NamedTuple):

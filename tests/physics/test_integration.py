@@ -6,8 +6,8 @@ import numpy as np
 import pytest
 from numpy.testing import assert_allclose
 
+from gensig.faults.broken import MissingTooth
 from gensig.faults.crack import Crack
-from gensig.faults.missing_tooth import MissingTooth
 
 SAMPLING_RATE = 51200.0
 MISSING = MissingTooth(gear="pinion", tooth=3)

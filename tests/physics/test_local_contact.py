@@ -5,7 +5,7 @@ import pytest
 from numpy.testing import assert_allclose
 
 from gensig.mesh.load_distribution import pair_states, static_mesh
-from gensig.mesh.local_contact import linear_contact_compliance, weber_contact_compliance
+from gensig.mesh.local_contact import linear_contact, weber_contact
 
 # spur reference, section 3.4: named points by pinion curvature radius (mm), pair in plane strain at 20 N m (1e8 N/m)
 CURVATURE_MM = (2.45827, 4.55954, 6.66082, 7.51168, 7.86646, 8.36253, 10.46381, 12.56508)
@@ -29,23 +29,25 @@ def single_pair(system):
 
 
 def test_single_pair_against_finite_elements(physical):
-    ratio = single_pair(physical) / (np.array(FINITE_ELEMENTS) * 1e8)
-    assert_allclose(ratio[1:7], 1.0, rtol=0.05, atol=0)
-    assert_allclose(ratio[[0, 7]], 1.0, rtol=0.08, atol=0)
+    assert_allclose(single_pair(physical), np.array(FINITE_ELEMENTS) * 1e8, rtol=0.015, atol=0)
 
 
-@pytest.mark.parametrize("other", [{"mesh.contact": "linear"}, {"mesh.elasticity": "plane_stress"}], ids=str)
-def test_the_papers_choice_of_either_misses_them(machine, other):
+@pytest.mark.parametrize(
+    "other",
+    [{"mesh.contact": "linear"}, {"mesh.elasticity": "plane_stress"}, {"mesh.tooth": "to_contact"}],
+    ids=str,
+)
+def test_the_papers_choice_of_any_misses_them(machine, other):
     ratio = single_pair(machine(other)) / (np.array(FINITE_ELEMENTS) * 1e8)
-    assert np.abs(ratio - 1.0)[1:7].max() > 0.05
+    assert np.abs(ratio - 1.0)[1:7].min() > 0.025
 
 
 def test_local_part_against_finite_elements(physical):
     at = positions(physical)
-    width, load = (np.full_like(at, value) for value in (physical.pair.pinion.face_width, physical.mesh_force))
-    found = weber_contact_compliance(physical.pair, at, width, load, physical.material)
+    width, load = physical.pair.pinion.face_width, physical.mesh_force
+    found = weber_contact(physical.pair, at, physical.material).compliance(width, load)
     assert np.all((found / (np.array(LOCAL_PART) * 1e-12) > 0.90) & (found / (np.array(LOCAL_PART) * 1e-12) < 0.95))
-    assert linear_contact_compliance(width, physical.material)[0] < 0.3 * found.min()
+    assert linear_contact(at, physical.material).compliance(width, load)[0] < 0.3 * found.min()
 
 
 def test_coupled_double_zone_against_finite_elements(physical):
@@ -54,16 +56,14 @@ def test_coupled_double_zone_against_finite_elements(physical):
     expected = np.array([2.355, 2.386, 2.403, 2.408, 2.401, 2.381, 2.347]) * 1e8 * 1.04
     table = physical.mesh_table()
     found = static_mesh(table, pair_states(table, along_mm * 1e-3), physical.mesh_force).stiffness
-    assert_allclose(found, expected, rtol=0.05, atol=0)
+    assert_allclose(found, expected, rtol=0.01, atol=0)
 
 
 def test_local_compliance_falls_with_load_and_width(physical):
-    at = np.full(4, physical.pair.pitch_point)
-    width = np.full(4, physical.pair.pinion.face_width)
-    loads = np.array([50.0, 200.0, 900.0, 4000.0])
-    assert np.all(np.diff(weber_contact_compliance(physical.pair, at, width, loads, physical.material)) < 0)
-    widths, load = width * np.array([0.25, 0.5, 0.75, 1.0]), np.full(4, 900.0)
-    assert np.all(np.diff(weber_contact_compliance(physical.pair, at, widths, load, physical.material)) < 0)
+    law = weber_contact(physical.pair, np.full(4, physical.pair.pitch_point), physical.material)
+    width = physical.pair.pinion.face_width
+    assert np.all(np.diff(law.compliance(width, np.array([50.0, 200.0, 900.0, 4000.0]))) < 0)
+    assert np.all(np.diff(law.compliance(width * np.array([0.25, 0.5, 0.75, 1.0]), 900.0)) < 0)
 
 
 def test_load_sharing_and_compliance_agree(physical):
@@ -73,10 +73,10 @@ def test_load_sharing_and_compliance_agree(physical):
     states = pair_states(table, roll)
     load = static_mesh(table, states, force).load
     inside = (states.position > 0) & (states.position < physical.pair.path_of_contact) & (load > 0.1 * force)
-    at, width = states.position[inside], np.full(inside.sum(), physical.pair.pinion.face_width)
+    at, width = states.position[inside], physical.pair.pinion.face_width
     own = states.compliance[inside] + table.shared_compliance
-    contact = weber_contact_compliance(physical.pair, at, width, load[inside], physical.material)
-    full = weber_contact_compliance(physical.pair, at, width, np.full_like(at, force), physical.material)
+    law = weber_contact(physical.pair, at, physical.material)
+    contact, full = law.compliance(width, load[inside]), law.compliance(width, force)
     curves = physical.stiffness_curves()
     alone = 1.0 / np.interp(at / physical.pair.base_pitch, curves.contact_position, curves.single_pair_stiffness)
     assert_allclose(own - contact, alone - full, rtol=2e-3, atol=0)

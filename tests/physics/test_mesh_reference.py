@@ -4,16 +4,21 @@ from itertools import chain, combinations
 
 import numpy as np
 import pytest
+from fault_cases import one
 from numpy.testing import assert_allclose
 from scipy.integrate import solve_ivp
 
 from gensig.dynamics import _kernels
+from gensig.faults.broken import MissingTooth
 from gensig.faults.crack import Crack
-from gensig.faults.missing_tooth import MissingTooth
 
 CRACK = Crack(gear="pinion", tooth=2, crack_depth=2e-3, crack_angle=0.8, crack_start="arc_mid")
 FAULTS = {"healthy": (), "crack": (CRACK,), "missing": (MissingTooth(gear="wheel", tooth=1),),
-          "both": (CRACK, MissingTooth(gear="pinion", tooth=4))}  # fmt: skip
+          "both": (CRACK, MissingTooth(gear="pinion", tooth=4)),
+          # gaps of both signs that vary along the path, one tooth without its tip
+          "flanks": (one("pitch_error", tooth=2, pitch_error_um=-15), one("broken", tooth=4),
+                     one("runout", gear="wheel", tooth=3, eccentricity_um=8),
+                     one("wear", gear="wheel", tooth="all", wear_depth_um=4))}  # fmt: skip
 
 
 class Reference:

@@ -4,23 +4,18 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
+from fault_cases import GEARS, KINDS, one
 from numpy.testing import assert_allclose
 
-from gensig.faults.crack import Crack
-from gensig.faults.missing_tooth import MissingTooth
-from gensig.faults.pitting import Pitting
 from gensig.mesh.load_distribution import PairStates, pair_states, static_mesh
 
 
 def fault(kind, gear="pinion", tooth=5):
-    if kind == "crack":
-        return Crack(gear=gear, tooth=tooth, crack_depth=2e-3, crack_angle=np.pi / 4, crack_start="arc_mid")
-    if kind == "pitting":
-        return Pitting(gear=gear, tooth=tooth, pit_length=1e-3, pit_width=10e-3, pit_depth=0.5e-3, pit_position=None)
-    return MissingTooth(gear=gear, tooth=tooth)
+    return one(kind, gear=gear, tooth=tooth, **({"crack_depth_mm": 2.0} if kind == "crack" else {}))
 
 
-FAULTS = ("crack", "pitting", "missing_tooth")
+# runout is on every tooth
+FAULTS = tuple(kind for kind in KINDS if kind != "runout")
 COUPLINGS = ("coupled", "sum")
 
 
@@ -74,6 +69,23 @@ class TestComplementarity:
         assert violation(states, static, table.shared_compliance + 1e-9, force) > 1e-6
         wrong = replace(static, load=static.load[:, ::-1])
         assert violation(states, wrong, table.shared_compliance, force) > 1e-3
+
+
+@pytest.mark.parametrize("gear", GEARS)
+@pytest.mark.parametrize("kind", KINDS)
+def test_equilibrium_with_every_fault_over_a_turn(xiamen, kind, gear):
+    """C F = approach - gap where a pair carries, none pulls, none that could carry is left, all force is borne."""
+    faulty, force = xiamen.mesh_table((one(kind, gear=gear, tooth=3),)), xiamen.mesh_force
+    roll = xiamen.pair.base_pitch * np.linspace(0, 23, 23 * 20, endpoint=False)
+    states = pair_states(faulty, roll)
+    static = static_mesh(faulty, states, force)
+    assert violation(states, static, faulty.shared_compliance, force) < 1e-11
+    share = static.load / static.load.sum(axis=1, keepdims=True)
+    assert_allclose(share.sum(axis=1), 1.0, rtol=1e-12, atol=0)
+    assert share.min() >= 0
+    sound = static_mesh(xiamen.mesh_table(), pair_states(xiamen.mesh_table(), roll), force)
+    assert np.abs(static.load - sound.load).max() > 1e-3 * force
+    assert violation(states, replace(static, load=sound.load), faulty.shared_compliance, force) > 1e-6
 
 
 def test_approach_rises_with_force_and_stiffness_is_its_slope(table):

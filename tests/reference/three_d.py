@@ -124,7 +124,8 @@ def extrude(gear: Gear, radii: Array, *, sizes: Resolution = SECTION, layers: Se
     section = triangulate([Polyline.closed(outline), Polyline.closed(bore)], [slit, pit_line, *crossings], sizes.inside)
     centre = section.p[:, section.t].mean(axis=1)
     between = (wall[0, 0] < centre[0]) & (centre[0] < wall[0, 1])
-    pit = between & (centre[1] > np.interp(centre[0], floor[0], floor[1]))
+    on_tooth = np.arctan2(centre[1], centre[0]) < math.pi / gear.n_teeth
+    pit = on_tooth & between & (centre[1] > np.interp(centre[0], floor[0], floor[1]))
     width = gear.face_width / module
     edges = np.linspace(0.0, width, N_STRIPS + 1)
     heights = np.concatenate([_graded(edges, index, count) for index, count in enumerate(layers)] + [[width]])

@@ -5,11 +5,15 @@ import re
 import warnings
 
 import pytest
+from fault_cases import option
 
 from gensig.compose import compose, options, override_keys, sweep
 from gensig.config import DerivedValueWarning, read_request
 from gensig.errors import ConfigError, GensigError
+from gensig.faults.base import faulty_teeth
+from gensig.faults.registry import read_faults
 from gensig.systems.registry import read_system
+from gensig.systems.spur_pair import severity
 
 FOUR = "plan.classes=[healthy,crack,pitting,missing_tooth]"
 
@@ -55,7 +59,10 @@ class TestMistakes:
             (["experiment=quik"], ["quik", "quickstart", "paper"]),
             (["plan.classes=[healthy,crak]"], ["crak", "crack"]),
             (["fault=crack", "fault.crack_dept_mm=1"], ["fault.crack_dept_mm", "fault.crack_depth_mm"]),
-            (["fault=crack", "fault.pit_width_mm=1"], ["fault.pit_width_mm", "fault=crack", "crack_depth_mm"]),
+            (
+                ["fault=crack", "fault.pit_width_mm=1"],
+                ["fault.pit_width_mm", "fault=crack", "crack_depth_mm", "pitting"],
+            ),
             (["fault.crack_depth_mm=1"], ["fault.crack_depth_mm", "fault=healthy", "crack"]),
             (["fault=crack,healthy"], ["fault=crack,healthy", "-m"]),
             (["plan.classes=[crack,crack]"], ["plan.classes", "different fault options"]),
@@ -133,6 +140,114 @@ class TestFaultKeys:
         assert config["plan"]["classes"] == ["crack"]
         assert list(config["classes"]) == ["crack"]
         assert config["fault"]["kind"] == "crack"
+
+
+EVERY = ",".join(options("fault"))
+
+
+class TestEveryFaultOption:
+    @pytest.fixture(scope="class")
+    @classmethod
+    def classes(cls):
+        return read_request([f"plan.classes=[{EVERY}]"]).config["classes"]
+
+    @pytest.mark.parametrize("name", options("fault"))
+    def test_it_reads_and_applies(self, classes, name, xiamen):
+        faults = read_faults(classes[name])
+        assert len(faults) == {"healthy": 0, "compound": 2}.get(name, 1)
+        for gear in ("pinion", "wheel"):
+            moved = read_faults(with_keys(classes[name], gear=gear))
+            teeth = faulty_teeth(xiamen.pair, moved)
+            assert bool(teeth) == (name != "healthy")
+            assert {found for found, _ in teeth} <= {gear}
+            assert 0 <= severity(moved, xiamen.pair) <= 1
+
+    @pytest.mark.parametrize("name", options("fault"))
+    def test_every_draw_that_it_offers_fits(self, classes, name, xiamen):
+        """The ends of what plans vary, on either gear: nothing leaves its tooth, nothing is above its limit."""
+        for gear in ("pinion", "wheel"):
+            for end in ("low", "high"):
+                faults = read_faults(at_end(with_keys(classes[name], gear=gear), end))
+                assert 0 <= severity(faults, xiamen.pair) <= 1
+                xiamen.mesh_table([fault for fault in faults if fault.alike or fault.kind == "runout"])
+
+    @pytest.mark.parametrize(
+        ("name", "word", "teeth"), [("crack", "all", "all"), ("crack", "[1,2]", (1, 2)), ("misalignment", "7", 7)]
+    )
+    def test_tooth_takes_all_and_lists(self, name, word, teeth):
+        fault = read_request([f"fault={name}", f"fault.tooth={word}"]).config["fault"]
+        assert "tooth" not in fault["vary"]
+        assert [own.tooth for own in read_faults(fault)] == [teeth]
+
+
+def with_keys(fault, **changes):
+    """A fault with keys replaced, those of all parts of a compound one."""
+    if "parts" in fault:
+        return {**fault, "parts": [{**part, **changes} for part in fault["parts"]]}
+    return {**fault, **{key: value for key, value in changes.items() if key in fault}}
+
+
+def at_end(fault, end):
+    """A fault with everything that plans vary at one end of its range; teeth are left where they are."""
+    if "parts" in fault:
+        return {**fault, "parts": [at_end(part, end) for part in fault["parts"]]}
+    return {**fault, **{key: spec[end] for key, spec in fault["vary"].items() if end in spec}}
+
+
+class TestCompound:
+    CRACK = "fault.parts=[{kind: crack, gear: pinion, tooth: 3, crack_depth_mm: 1.0}]"
+
+    def test_a_part_takes_the_rest_from_its_option(self):
+        config = read_request(["fault=compound", self.CRACK]).config
+        (part,) = config["fault"]["parts"]
+        assert part == {**option("crack"), "tooth": 3, "vary": {}}
+        assert config["fault"] == config["classes"]["compound"]
+        assert plain(config)
+
+    def test_what_is_not_typed_is_varied_and_a_part_can_say_what(self):
+        own = "{kind: wear, vary: {limit_um: {distribution: uniform, low: 90, high: 99}}}"
+        parts = f"fault.parts=[{{kind: crack, tooth: 3}}, {{kind: spalling, spall_width_mm: 4}}, {own}]"
+        parts = read_request(["fault=compound", parts]).config["fault"]["parts"]
+        assert [set(part["vary"]) for part in parts] == [{"crack_depth_mm"}, {"tooth", "spall_length_mm"}, {"limit_um"}]
+        assert parts[1]["spall_width_mm"] == 4
+
+    def test_one_key_of_one_part(self):
+        parts = read_request(["fault=compound", "fault.parts.1.tooth=4"]).config["fault"]["parts"]
+        assert [part["tooth"] for part in parts] == [0, 4]
+
+    def test_typed_keys_of_single_faults_leave_it_alone(self):
+        classes = read_request(["plan.classes=[crack,compound]", "fault.crack_depth_mm=1.5"]).config["classes"]
+        assert classes["crack"]["crack_depth_mm"] == pytest.approx(1.5)
+        assert classes["compound"]["parts"][0]["crack_depth_mm"] == pytest.approx(1.0)
+
+    @pytest.mark.parametrize(
+        ("parts", "needles"),
+        [
+            ("[{kind: crak}]", ["crak", "crack", "pitting"]),
+            ("[{gear: pinion}]", ["fault.parts", "kind = None"]),
+            ("[{kind: healthy}]", ["fault.parts", "'healthy'", "single fault"]),
+            ("[{kind: compound}]", ["fault.parts", "'compound'", "single fault"]),
+            ("[]", ["fault.parts = []", "list of faults"]),
+            ("[crack]", ["fault.parts = ['crack']", "list of faults"]),
+            ("3", ["fault.parts = 3", "list of faults"]),
+        ],
+    )
+    def test_mistakes(self, parts, needles):
+        with pytest.raises(GensigError) as caught:
+            read_request(["fault=compound", f"fault.parts={parts}"])
+        assert "\n" not in str(caught.value)
+        assert all(needle in str(caught.value) for needle in needles), caught.value
+
+    def test_an_unknown_key_in_a_part_is_named_with_its_place(self):
+        parts = "fault.parts=[{kind: pitting}, {kind: crack, crack_dept_mm: 1}]"
+        fault = read_request(["fault=compound", parts]).config["fault"]
+        with pytest.raises(ConfigError, match=re.escape("fault.parts.1: unknown key 'crack_dept_mm'; did you mean")):
+            read_faults(fault)
+
+    @pytest.mark.parametrize("word", ["fault.gear=wheel", "fault.vary={tooth: {distribution: tooth}}"])
+    def test_it_has_no_keys_of_its_own(self, word):
+        with pytest.raises(ConfigError, match="for fault=compound, it has parts"):
+            read_request(["fault=compound", word])
 
 
 class TestPinnedKeys:
@@ -216,9 +331,9 @@ class TestSweeps:
 def test_paper_experiment_means_every_convention_of_the_paper():
     config = read_request(["experiment=paper"]).config
     mesh = read_system(config).mesh
-    keys = ("law", "pair_coupling", "contact", "elasticity", "body", "tooth", "crack")
+    keys = ("law", "pair_coupling", "contact", "elasticity", "body", "tooth", "crack", "bending")
     assert [getattr(mesh, key) for key in keys] == [
-        "paper", "sum", "linear", "plane_stress", "sainsot", "to_contact", "paper"]  # fmt: skip
+        "paper", "sum", "linear", "plane_stress", "sainsot", "to_contact", "paper", "whole"]  # fmt: skip
 
 
 def test_three_keys_mean_the_papers_conventions_for_ever():

@@ -23,6 +23,9 @@ class Shaft:
     hollow: bool
     share: float
     labels: tuple[str, ...] = field(default=())
+    seats: tuple[float, ...] | None = unit("mm", default=None)
+    places: int | str | tuple[int, ...] = 0
+    width: float | None = unit("mm", default=None)
 
 
 GOOD = {"length_mm": 12.5, "inertia_kg_m2": 2, "angle_deg": 90, "n_keys": 2, "hollow": True, "share": 0.5}
@@ -87,6 +90,26 @@ def test_read_converts_and_fills():
 
 
 @pytest.mark.parametrize(
+    ("value", "expected"), [(3, 3), ("all", "all"), ([3], (3,)), ([1, 5], (1, 5)), ((1, 5), (1, 5)), ([], ())]
+)
+def test_a_number_a_word_or_a_list(value, expected):
+    found = shaft(places=value).places
+    assert found == expected
+    assert type(found) is type(expected)
+
+
+def test_lists_of_numbers_take_the_unit():
+    assert_allclose(shaft(seats_mm=[1, 2.5]).seats, (1e-3, 2.5e-3), rtol=1e-14, atol=0)
+    assert shaft(seats_mm=None).seats is None
+    assert shaft().seats is None
+
+
+def test_a_unit_with_a_default():
+    assert shaft().width is None
+    assert shaft(width_mm=4).width == pytest.approx(4e-3)
+
+
+@pytest.mark.parametrize(
     ("key", "value", "text"),
     [
         ("lenght_mm", 1, "gear.shaft: unknown key 'lenght_mm'; did you mean 'length_mm'?"),
@@ -107,6 +130,19 @@ def test_read_converts_and_fills():
         ("hollow", "yes", "gear.shaft.hollow = 'yes' is not true or false"),
         ("labels", "ab", "gear.shaft.labels = 'ab' is not a list of names"),
         ("labels", [1], "gear.shaft.labels = [1] is not a list of names"),
+        ("labels", ["a", 1], "gear.shaft.labels = ['a', 1] is not a list of names"),
+        ("labels", None, "gear.shaft.labels is null; give a value"),
+        ("seats_mm", [1, "x"], "gear.shaft.seats_mm = [1, 'x'] is not a list of numbers or null"),
+        ("seats_mm", [1, math.nan], "gear.shaft.seats_mm = [1, nan] is not a list of numbers or null"),
+        ("seats_mm", 3, "gear.shaft.seats_mm = 3 is not a list of numbers or null"),
+        ("seats", [1], "gear.shaft: 'seats' has the wrong unit; write it as 'seats_mm'"),
+        ("angle_deg", "x", "gear.shaft.angle_deg = 'x' is not a number or null"),
+        ("angle_deg", math.inf, "gear.shaft.angle_deg = inf is not finite"),
+        ("places", 1.5, "gear.shaft.places = 1.5 is not a whole number or text or a list of whole numbers"),
+        ("places", True, "gear.shaft.places = True is not a whole number or text or a list of whole numbers"),
+        ("places", [1, True], "gear.shaft.places = [1, True] is not a whole number or text or a list"),
+        ("places", ["all"], "gear.shaft.places = ['all'] is not a whole number or text or a list of whole numbers"),
+        ("places", {"a": 1}, "gear.shaft.places = {'a': 1} is not a whole number or text or a list of whole numbers"),
     ],
 )
 def test_mistakes_are_answered(key, value, text):

@@ -12,7 +12,7 @@ from gensig.dynamics import _kernels
 from gensig.dynamics.integrator import Solver, integrate, settling_time
 from gensig.dynamics.pair import Support, solid_disc
 from gensig.errors import ConfigError, SimulationError
-from gensig.faults.missing_tooth import MissingTooth
+from gensig.faults.broken import MissingTooth
 from gensig.systems.spur_pair import Start
 
 

@@ -14,7 +14,7 @@ from gensig.geometry.tooth import healthy_tooth
 from gensig.geometry.tooth_profile import involute_point, load_angle, tooth_profile
 from gensig.mesh.compliance import tooth_compliance
 from gensig.mesh.fillet_foundation import ExtrapolationWarning, body_coefficients, fillet_foundation_compliance
-from gensig.mesh.local_contact import linear_contact_compliance
+from gensig.mesh.local_contact import linear_contact
 
 # pinion at B, C and E, 1e-12 m/N (spur reference (docs/validation.md), table 2.2)
 CURVATURE = np.array([6.66082e-3, 7.86646e-3, 12.56508e-3])
@@ -82,7 +82,7 @@ def test_compliance_scales_with_modulus_and_width(xiamen, factor):
 
 def test_contact_term(xiamen):
     # spur reference (docs/validation.md), section 2: 281.23e-12 m/N at 20 mm
-    found = linear_contact_compliance(np.array([20e-3, 10e-3]), xiamen.material)
+    found = linear_contact(np.zeros(2), xiamen.material).compliance(np.array([20e-3, 10e-3]), 1.0)
     assert_allclose(found, [281.23e-12, 2 * 281.23e-12], rtol=2e-5, atol=0)
 
 

@@ -4,13 +4,18 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
+from fault_cases import GEARS, KINDS, on_path, one, side_of
 from numpy.testing import assert_allclose
 
 from gensig.errors import ConfigError, ExtrapolationError
+from gensig.faults.base import faulty_teeth
 from gensig.faults.crack import Crack
 from gensig.geometry.contact import corner_gap_by_pinion
+from gensig.geometry.tooth import healthy_tooth
+from gensig.mesh import pair_table as module
 from gensig.mesh.fillet_foundation import ExtrapolationWarning
-from gensig.mesh.pair_table import pair_compliance, pair_table
+from gensig.mesh.local_contact import contact_law
+from gensig.mesh.pair_table import flank_sides, pair_compliance, pair_table, slice_bending
 
 # single pairs of the reference pair at A, B, C, D, E, 1e8 N/m (spur reference (docs/validation.md), table 2.2)
 RC_MM = np.array([2.45827, 6.66082, 7.86646, 8.36253, 12.56508])
@@ -50,6 +55,89 @@ def test_only_the_faulty_tooth_has_its_own_row(xiamen):
     assert len(table.wheel.compliance) == 2
 
 
+class TestFlankSides:
+    """The contact term of a pair is counted once, however it is split between the gears."""
+
+    @staticmethod
+    def contact(system, share, **faults):
+        """Contact compliance of the pair at places on the path, (phase,) m/N, with a fault on either gear."""
+        at = np.linspace(0.0, system.pair.path_of_contact, 9)
+        sides = flank_sides(system.pair, at, system.material, system.mesh, system.mesh_force, pinion_share=share)
+        bending = slice_bending(system.pair, at, system.material, system.mesh)
+        total = 0.0
+        for name, side in sides.items():
+            own = [faults[name]] if name in faults else []
+            tooth = faulty_teeth(system.pair, own).get((name, 0), healthy_tooth(side.gear))
+            total = total + side.contact(tooth, bending, system.mesh)[1]
+        return total, contact_law(system.pair, at, system.material, system.mesh)
+
+    @pytest.mark.parametrize("contact", ["linear", "weber"])
+    @pytest.mark.parametrize("share", [0.0, 0.5, 1.0])
+    def test_sound_flanks_make_the_law(self, machine, contact, share):
+        system = machine({"mesh.contact": contact})
+        total, law = self.contact(system, share)
+        assert_allclose(total, law.compliance(20e-3, system.mesh_force), rtol=1e-12, atol=0)
+
+    @pytest.mark.parametrize("gear", GEARS)
+    @pytest.mark.parametrize("bending", ["whole", "by_slice"])
+    def test_the_split_is_nothing_for_faulty_ones(self, machine, gear, bending):
+        system = machine({"mesh.bending": bending})
+        fault = {gear: one("chipped", gear=gear, chip_width_mm=10, chip_shape="rectangular", chip_height_mm=3)}
+        totals = [self.contact(system, share, **fault)[0] for share in (0.0, 0.5, 1.0)]
+        for total in totals[1:]:
+            assert_allclose(total, totals[0], rtol=1e-12, atol=0)
+        sound, _ = self.contact(system, 0.5)
+        # half of the face at most: the law at half the width, and there the slices' own bending once more
+        at = np.linspace(0.0, system.pair.path_of_contact, 9)
+        more = slice_bending(system.pair, at, system.material, system.mesh)
+        most = contact_law(system.pair, at, system.material, system.mesh).compliance(10e-3, system.mesh_force) + more
+        assert np.all(totals[0] <= most * (1 + 1e-4))
+        assert_allclose((totals[0] / most).max(), 1.0, rtol=1e-3, atol=0)
+        assert_allclose((totals[0] / sound).min(), 1.0, rtol=1e-9, atol=0)
+
+    def test_the_flank_goes_on_beyond_its_tip(self, xiamen):
+        at = xiamen.pair.path_of_contact * np.array([-0.2, 0.5, 1.2])
+        sides = flank_sides(xiamen.pair, at, xiamen.material, xiamen.mesh, 900.0)
+        for name, low, high in (("pinion", 0, 2), ("wheel", 2, 0)):
+            side, tip = sides[name], healthy_tooth(sides[name].gear).profile.curvature_radius[-1]
+            assert side.curvature.max() == pytest.approx(tip, rel=1e-9)
+            assert side.flank_curvature[high] > tip * 1.05
+            assert_allclose(side.flank_curvature[[low, 1]], side.curvature[[low, 1]], rtol=1e-12, atol=0)
+
+
+class TestRows:
+    def test_equal_structures_are_computed_once(self, xiamen, monkeypatch):
+        """Flanks that only stand elsewhere bend as the sound one does, and teeth that are one object are one row."""
+        computed, original = [], module.structural_compliance
+        monkeypatch.setattr(module, "structural_compliance", lambda *own: computed.append(1) or original(*own))
+        for faults, n_rows, n_structures in (
+            ((one("runout", gear="wheel"),), 85, 0),
+            ((one("wear", gear="wheel", tooth="all"),), 2, 1),
+            ((one("crack", gear="wheel", tooth=[1, 2]), one("pitch_error", gear="wheel", tooth=[2, 3])), 4, 1),
+            ((one("misalignment", gear="wheel", tooth="all"),), 2, 1),
+        ):
+            xiamen.mesh_table()  # the sound gears' own structures
+            computed.clear()
+            teeth = faulty_teeth(xiamen.pair, faults)
+            table = pair_table(xiamen.pair, xiamen.material, xiamen.mesh, teeth, load=xiamen.mesh_force)
+            assert (len(table.wheel.compliance), len(computed)) == (n_rows, n_structures)
+            assert len(table.wheel.present) == n_rows
+
+    @pytest.mark.parametrize("gear", GEARS)
+    @pytest.mark.parametrize("kind", KINDS)
+    def test_curves_and_tables_agree(self, xiamen, kind, gear):
+        """The gap of the faulty pair by ``stiffness_curves`` and by the table."""
+        fault = one(kind, gear=gear, tooth=0)
+        table, curves = xiamen.mesh_table((fault,)), xiamen.stiffness_curves((fault,), points_per_tooth=1)
+        side, at = side_of(table, gear), curves.contact_position * xiamen.pair.base_pitch
+        expected = np.interp(at, table.position, side.gap[side.kind[0]] - side.gap[0])
+        # straight between nodes against the value itself
+        assert_allclose(curves.faulty_pair_gap, expected, rtol=0, atol=2e-9 + 1e-3 * np.abs(expected).max())
+        assert np.all(np.isfinite(side.compliance))
+        assert side.compliance.min() > 0
+        assert np.isfinite(side.gap[:, on_path(table)]).all()
+
+
 def test_the_bodies_cannot_share_more_than_a_pair_has(xiamen):
     small = replace(xiamen.pair, pinion=replace(xiamen.pair.pinion, bore_radius=1e-3))
     options = replace(xiamen.mesh, body="sainsot", allow_extrapolation=True)
@@ -70,6 +158,8 @@ def test_shared_compliance_only_when_coupled(xiamen, paper_machine):
     [
         ("law", "papr", "mesh.law = 'papr'; allowed: one_sided, paper"),
         ("pair_coupling", "x", "mesh.pair_coupling = 'x'; allowed: coupled, sum"),
+        ("crack", "x", "mesh.crack = 'x'; allowed: calibrated, paper"),
+        ("bending", "x", "mesh.bending = 'x'; allowed: by_slice, whole"),
         ("roll_torque", "", "mesh.roll_torque = ''; allowed: consistent, classical"),
         ("damping_ratio", -0.1, "mesh.damping_ratio = -0.1 must lie in 0..1"),
         ("friction_coefficient", 0.9, "mesh.friction_coefficient = 0.9 must lie in 0..0.5"),

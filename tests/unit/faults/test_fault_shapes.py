@@ -1,0 +1,337 @@
+"""What each fault changes on its tooth, and that it changes nothing else."""
+
+from itertools import pairwise
+
+import numpy as np
+import pytest
+from fault_cases import FULL, GEARS, KINDS, one
+from numpy.testing import assert_allclose
+
+from gensig.faults.base import faulty_teeth
+from gensig.faults.broken import tooth_height
+from gensig.faults.flank_loss import flank_area
+from gensig.geometry.tooth import healthy_tooth
+from gensig.mesh.face import bearing_width
+from gensig.mesh.sections import sections
+
+HOLES, FORM = {"slice_edges", "material_loss"}, {"flank_deviation"}
+CHANGES = {
+    "crack": {"cracks"},
+    "pitting": HOLES,
+    "spalling": HOLES,
+    "distributed_pitting": HOLES,
+    "chipped": HOLES,
+    "broken": {"material_loss"},
+    "missing_tooth": {"present"},
+    "wear": {"material_loss"},
+    "pitch_error": FORM,
+    "profile_error": FORM,
+    "runout": FORM,
+    "misalignment": FORM | {"slice_edges"},
+    "tip_relief": FORM,
+}
+
+
+@pytest.fixture(scope="module")
+def tooth_of(xiamen):
+    """The pinion's tooth 3 with the given faults on it, one after the other."""
+
+    def make(*faults):
+        tooth = healthy_tooth(xiamen.pair.pinion)
+        for fault in faults:
+            tooth = fault.apply(tooth, 3)
+        return tooth
+
+    return make
+
+
+def across(tooth):
+    """Middle of the slices, (slice,) m."""
+    return 0.5 * (tooth.slice_edges[1:] + tooth.slice_edges[:-1])
+
+
+def on_flank(tooth):
+    """Abscissae of the nodes of the involute, (profile,) m."""
+    return tooth.profile.abscissa[tooth.profile.n_root_cells :]
+
+
+def lost_area(tooth):
+    """Flank that is gone deeper than wear, by height on the centreline and face, m2."""
+    cell = np.outer(tooth.slice_width, np.gradient(on_flank(tooth)))
+    return float(cell[tooth.material_loss > 0].sum())
+
+
+class TestWhatChanges:
+    @pytest.mark.parametrize("kind", KINDS)
+    def test_that_and_nothing_else(self, tooth_of, kind):
+        sound, tooth = tooth_of(), tooth_of(one(kind, tooth=3))
+        # of an array, what counts is what it says: more slices alone are more rows of nothing
+        changed = {
+            name
+            for name, differs in (
+                ("cracks", tooth.cracks != sound.cracks),
+                ("present", tooth.present != sound.present),
+                ("slice_edges", len(tooth.slice_edges) != len(sound.slice_edges)),
+                ("material_loss", tooth.material_loss.any()),
+                ("flank_deviation", tooth.flank_deviation.any()),
+                ("profile", tooth.profile is not sound.profile),
+            )
+            if differs
+        }
+        assert changed == CHANGES[kind]
+
+    @pytest.mark.parametrize("kind", KINDS)
+    def test_the_sound_tooth_stays_sound(self, tooth_of, kind):
+        before = tooth_of()
+        copies = before.material_loss.copy(), before.flank_deviation.copy(), before.slice_edges.copy()
+        tooth_of(one(kind, tooth=3), one("wear", tooth=3), one("misalignment", tooth=3))
+        for found, copy in zip((before.material_loss, before.flank_deviation, before.slice_edges), copies, strict=True):
+            assert_allclose(found, copy, rtol=0, atol=0)
+        assert before.present
+        assert before.cracks == ()
+
+    @pytest.mark.parametrize("kind", KINDS)
+    def test_slices_cover_the_face(self, tooth_of, kind):
+        tooth = tooth_of(one(kind, tooth=3))
+        assert_allclose(tooth.slice_edges[[0, -1]], [0.0, 20e-3], rtol=0, atol=0)
+        assert tooth.slice_width.min() > 0
+        assert_allclose(tooth.slice_width.sum(), 20e-3, rtol=1e-12, atol=0)
+        shape = (len(tooth.slice_width), len(tooth.profile.curvature_radius))
+        for values in (tooth.material_loss, tooth.flank_deviation):
+            assert np.broadcast_shapes(values.shape, shape) == shape
+        assert tooth.material_loss.min() >= 0
+
+    def test_neighbors_stay_sound(self, xiamen):
+        assert set(faulty_teeth(xiamen.pair, [one("crack", tooth=3)])) == {("pinion", 3)}
+        assert set(faulty_teeth(xiamen.pair, [one("runout", tooth=3)])) == {("pinion", k) for k in range(23)}
+
+
+class TestThePapersSections:
+    def test_a_crack_changes_sections_only(self, tooth_of):
+        sound, tooth = tooth_of(), tooth_of(one("crack"))
+        (area, moment), (sound_area, sound_moment) = (sections(t, papers_crack=True) for t in (tooth, sound))
+        assert np.all(area <= sound_area)
+        assert area.min() > 0
+        assert (moment < sound_moment).any()
+        rc = tooth.profile.curvature_radius
+        assert_allclose(bearing_width(tooth, rc), bearing_width(sound, rc), rtol=0, atol=0)
+        for found, expected in zip(sections(tooth, papers_crack=False), (sound_area, sound_moment), strict=True):
+            assert_allclose(found, expected, rtol=0, atol=0)
+
+    def test_a_crack_keeps_half_plus_h_q(self, tooth_of):
+        """Spur paper eqs. (11) and (12): sections thicker than h_q keep h_x + h_q, the others all."""
+        tooth = tooth_of(one("crack"))
+        half, width = tooth.cell_half_thickness, tooth.gear.face_width
+        h_q = 1.28475e-3  # spur reference (docs/validation.md), section 2.3, arc mid
+        height = np.where(half > h_q, half + h_q, 2 * half)
+        area, moment = sections(tooth, papers_crack=True)
+        assert_allclose(area, height * width, rtol=1e-5, atol=0)
+        assert_allclose(moment, height**3 * width / 12, rtol=2e-5, atol=0)
+
+    def test_a_pit_takes_an_eccentric_rectangle(self, tooth_of):
+        """Eq. (15) as the parallel-axis theorem, section by section."""
+        tooth, (sound_area, _) = tooth_of(one("pitting")), sections(tooth_of(), papers_crack=True)
+        area, moment = sections(tooth, papers_crack=True)
+        touched = np.flatnonzero(area < (1 - 1e-9) * sound_area)
+        inside = touched[2:-2]
+        half = tooth.cell_half_thickness[inside]
+        width, pit_width, depth = tooth.gear.face_width, 10e-3, 0.5e-3
+        expected = 2 * half * width - pit_width * depth
+        centroid = -pit_width * depth * (half - depth / 2) / expected
+        about_middle = (
+            (2 * half) ** 3 * width / 12 - pit_width * depth**3 / 12 - pit_width * depth * (half - depth / 2) ** 2
+        )
+        assert_allclose(area[inside], expected, rtol=1e-12, atol=0)
+        assert_allclose(moment[inside], about_middle - expected * centroid**2, rtol=1e-9, atol=0)
+        x = tooth.cell_abscissa[touched]
+        middle = 0.5 * (x.min() + x.max()) - tooth.profile.abscissa[0]
+        assert_allclose([np.ptp(x), middle], [1e-3, 2.6220e-3], rtol=0, atol=2e-5)
+
+    def test_a_pit_narrows_the_contact_where_it_lies(self, tooth_of):
+        tooth = tooth_of(one("pitting"))
+        rc = tooth.profile.curvature_radius
+        width = bearing_width(tooth, rc)
+        assert_allclose(np.unique(width), [10e-3, 20e-3], rtol=1e-12, atol=0)
+        # spur reference (docs/validation.md), section 2.3: rc 6.2928 to 9.1975 mm
+        narrow = rc[width < 20e-3]
+        assert_allclose([narrow[0], narrow[-1]], [6.2928e-3, 9.1975e-3], rtol=0, atol=0.03e-3)
+
+    def test_even_wear_narrows_nothing(self, tooth_of):
+        worn = tooth_of(one("wear", wear_profile=None, wear_depth_um=100))
+        assert_allclose(bearing_width(worn, worn.profile.curvature_radius), 20e-3, rtol=1e-12, atol=0)
+        both = tooth_of(one("pitting"), one("wear", wear_profile=None, wear_depth_um=100))
+        assert_allclose(bearing_width(both, both.profile.curvature_radius).min(), 10e-3, rtol=1e-12, atol=0)
+
+    def test_loss_makes_sections_smaller(self, tooth_of):
+        """Parallel axes over slices that differ: never more than what was there, by any fault."""
+        sound = sections(tooth_of(), papers_crack=False)
+        for kind in ("pitting", "spalling", "distributed_pitting", "chipped", "broken", "wear"):
+            for found, whole in zip(sections(tooth_of(one(kind)), papers_crack=False), sound, strict=True):
+                assert np.all(found > 0)
+                assert np.all(found <= whole * (1 + 1e-12))
+                assert (found < whole).any()
+
+
+class TestCrackFront:
+    WIDTHS = (20.0, 13.7, 5.0)
+
+    @staticmethod
+    def depth(tooth_of, front, width):
+        (crack,) = tooth_of(one("crack", crack_depth_mm=2.0, crack_front=front, crack_width_mm=width)).cracks
+        return crack.depth
+
+    @pytest.mark.parametrize("width", WIDTHS)
+    @pytest.mark.parametrize(("front", "mean"), [("straight", 1.0), ("parabolic", 2 / 3), ("linear", 1 / 2)])
+    def test_mean_depth_in_closed_form(self, xiamen, tooth_of, front, mean, width):
+        depth = self.depth(tooth_of, front, width)
+        assert_allclose(depth.mean(), 2e-3 * mean * width / FULL, rtol=1e-12, atol=0)
+        fault = one("crack", crack_depth_mm=2.0, crack_front=front, crack_width_mm=width)
+        chord = fault.root_chord(xiamen.pair.pinion)
+        assert_allclose(fault.severity(xiamen.pair.pinion), depth.mean() / chord, rtol=1e-12, atol=0)
+
+    @pytest.mark.parametrize("width", WIDTHS)
+    @pytest.mark.parametrize(
+        ("front", "shape"),
+        [
+            ("straight", lambda z: np.ones_like(z)),
+            ("parabolic", lambda z: np.sqrt(1 - z)),
+            ("linear", lambda z: 1 - z),
+        ],
+    )
+    def test_it_falls_off_as_it_says_and_ends(self, tooth_of, front, shape, width):
+        depth = self.depth(tooth_of, front, width)
+        edges = np.linspace(0.0, FULL, len(depth) + 1)
+        middle = 0.5 * (edges[1:] + edges[:-1])
+        assert np.all(depth[edges[:-1] >= width] <= 0)
+        # strips that lie in the crack whole; the very end of a parabola is too steep for the middle of its strip
+        whole = edges[1:] <= 0.95 * width
+        assert_allclose(depth[whole], 2e-3 * shape(middle[whole] / width), rtol=0.01, atol=0)
+        assert depth.max() <= 2e-3 * (1 + 1e-12)
+
+    def test_null_is_the_whole_face(self, tooth_of):
+        for front in ("straight", "parabolic", "linear"):
+            assert_allclose(self.depth(tooth_of, front, None), self.depth(tooth_of, front, FULL), rtol=1e-12, atol=0)
+        assert len(self.depth(tooth_of, "straight", None)) == 1
+
+    def test_without_width_or_depth_there_is_none(self, tooth_of):
+        for size in ({"crack_width_mm": 0.0}, {"crack_depth_mm": 0.0}):
+            assert tooth_of(one("crack", **size)) is tooth_of()
+
+
+class TestHoles:
+    def test_a_pit_lies_where_it_is_put(self, tooth_of):
+        tooth = tooth_of(one("pitting", pit_face_position_mm=7, pit_position_mm=2, pit_width_mm=6, pit_length_mm=1))
+        deep = tooth.material_loss > 0
+        assert_allclose(np.unique(tooth.material_loss), [0, 0.5e-3], rtol=1e-12, atol=0)
+        assert_allclose(tooth.slice_edges, [0, 4e-3, 10e-3, 20e-3], rtol=1e-12, atol=0)
+        assert deep.any(axis=1).tolist() == [False, True, False]
+        height = on_flank(tooth)[deep.any(axis=0)] - tooth.profile.abscissa[0]
+        assert_allclose([height[0], height[-1]], [1.5e-3, 2.5e-3], rtol=0, atol=2e-5)
+
+    def test_an_elliptic_spall_has_its_area(self, tooth_of):
+        tooth = tooth_of(one("spalling"))
+        assert_allclose(lost_area(tooth), 0.25 * np.pi * 1.5e-3 * 8e-3, rtol=0.02, atol=0)
+        longest = (tooth.material_loss > 0).sum(axis=1)
+        assert longest.argmax() == pytest.approx(len(longest) // 2, abs=1)
+        assert_allclose(longest, longest[::-1], rtol=0, atol=1)
+
+    def test_holes_do_not_add_up_where_they_overlap(self, tooth_of):
+        """What is gone is gone: the deeper one counts, so that order is nothing."""
+        pit, spall = one("pitting"), one("spalling", spall_shape="rectangular")
+        one_way, other = tooth_of(pit, spall), tooth_of(spall, pit)
+        assert_allclose(one_way.slice_edges, other.slice_edges, rtol=0, atol=1e-15)
+        assert_allclose(one_way.material_loss, other.material_loss, rtol=0, atol=0)
+        assert one_way.material_loss.max() == pytest.approx(0.5e-3)
+
+    def test_wear_takes_what_is_left_of_the_flank(self, tooth_of):
+        worn = tooth_of(one("wear", wear_depth_um=30, wear_profile=[0, 1, 0.5]))
+        share = np.linspace(0, 1, worn.material_loss.shape[1])
+        assert_allclose(
+            worn.material_loss[0], 30e-6 * np.interp(share, [0, 0.5, 1], [0, 1, 0.5]), rtol=1e-9, atol=1e-18
+        )
+        twice = tooth_of(*[one("wear", wear_depth_um=30)] * 2)
+        assert_allclose(twice.material_loss, 2 * tooth_of(one("wear", wear_depth_um=30)).material_loss, rtol=1e-12)
+
+
+@pytest.mark.parametrize("gear", GEARS)
+class TestTips:
+    def test_a_broken_tooth_ends_below_its_tip(self, xiamen, gear):
+        body = getattr(xiamen.pair, gear)
+        tooth = one("broken", gear=gear, broken_height_mm=1.5).apply(healthy_tooth(body), 0)
+        gone = np.isinf(tooth.material_loss[0])
+        cell = np.diff(on_flank(tooth)).max()
+        assert_allclose(on_flank(tooth)[gone].min(), body.tip_radius - 1.5e-3, rtol=0, atol=cell)
+        assert not gone[on_flank(tooth) < body.tip_radius - 1.5e-3].any()
+        assert tooth.tip_curvature_radius == tooth.profile.curvature_radius[~gone].max()
+        assert tooth.present
+
+    def test_without_involute_there_is_no_tooth(self, xiamen, gear):
+        body = getattr(xiamen.pair, gear)
+        low = body.tip_radius - on_flank(healthy_tooth(body))[0]
+        for height, present in ((low - 1e-4, True), (low + 1e-5, False), (tooth_height(body), False)):
+            tooth = one("broken", gear=gear, broken_height_mm=1e3 * height).apply(healthy_tooth(body), 0)
+            assert tooth.present == present
+
+    def test_a_triangular_chip_falls_off_along_the_face(self, xiamen, gear):
+        body = getattr(xiamen.pair, gear)
+        chip = one("chipped", gear=gear, chip_height_mm=2, chip_width_mm=8)
+        tooth = chip.apply(healthy_tooth(body), 0)
+        gone = np.isinf(tooth.material_loss)
+        height = np.array([body.tip_radius - on_flank(tooth)[row].min() if row.any() else 0.0 for row in gone])
+        expected = 2e-3 * np.maximum(1 - across(tooth) / 8e-3, 0)
+        # a node of the flank, and the arc of the tip, which is lower beside the centreline
+        atol = np.diff(on_flank(tooth)).max() + body.tip_radius - on_flank(tooth)[-1]
+        assert_allclose(height, expected, rtol=0, atol=atol)
+        assert tooth.tip_curvature_radius == tooth.profile.curvature_radius[-1]
+
+    def test_a_rectangular_chip_does_not(self, xiamen, gear):
+        tooth = one("chipped", gear=gear, chip_shape="rectangular").apply(healthy_tooth(getattr(xiamen.pair, gear)), 0)
+        assert_allclose(tooth.slice_edges, [0, 8e-3, 20e-3], rtol=1e-12, atol=0)
+        assert np.isinf(tooth.material_loss).any(axis=1).tolist() == [True, False]
+
+
+class TestDistributedPitting:
+    @staticmethod
+    def pits(xiamen, number=0, **changes):
+        return one("distributed_pitting", **changes).apply(healthy_tooth(xiamen.pair.pinion), number)
+
+    def test_the_seed_and_the_tooth_decide(self, xiamen):
+        first, again, other_seed, other_tooth = (
+            self.pits(xiamen, **own).material_loss for own in ({}, {}, {"pit_seed": 1}, {"number": 1})
+        )
+        assert_allclose(first, again, rtol=0, atol=0)
+        assert not np.array_equal(first, other_seed)
+        assert not np.array_equal(first, other_tooth)
+        assert not np.array_equal(other_seed, other_tooth)
+
+    def test_a_larger_share_has_all_pits_of_a_smaller(self, xiamen):
+        series = [self.pits(xiamen, pitted_share=share).material_loss for share in (0.02, 0.05, 0.1, 0.3)]
+        for less, more in pairwise(series):
+            assert np.all(more >= less)
+            assert (more > less).any()
+
+    @pytest.mark.parametrize("share", [0.02, 0.1, 0.3])
+    @pytest.mark.parametrize("number", [0, 7])
+    def test_the_share_is_reached_within_one_pit(self, xiamen, share, number):
+        tooth = self.pits(xiamen, number, pitted_share=share, diameter_scatter=0.2)
+        pitted = lost_area(tooth) / flank_area(xiamen.pair.pinion)
+        largest = tooth.material_loss.max() / 0.2  # diameters by the depth ratio
+        a_pit = (largest + tooth.slice_width.max()) * (largest + np.diff(on_flank(tooth)).max())
+        assert share <= pitted < share + a_pit / flank_area(xiamen.pair.pinion)
+
+    def test_pits_lie_in_their_region(self, xiamen):
+        tooth = self.pits(xiamen, region_low=0.3, region_high=0.7, pitted_share=0.2)
+        flank = on_flank(tooth)
+        place = (flank - flank[0]) / np.ptp(flank)
+        pitted = place[(tooth.material_loss > 0).any(axis=0)]
+        reach = 0.5 * tooth.material_loss.max() / 0.2 / np.ptp(flank)
+        assert 0.3 - reach <= pitted.min() < 0.4
+        assert 0.6 < pitted.max() <= 0.7 + reach
+
+    def test_sizes_are_log_normal_about_the_median(self, xiamen):
+        even = self.pits(xiamen, diameter_scatter=0.0).material_loss
+        assert_allclose(np.unique(even), [0, 0.1e-3], rtol=1e-12, atol=0)
+        depths = np.unique(np.concatenate([np.unique(self.pits(xiamen, k).material_loss) for k in range(12)]))[1:]
+        # deep pits cover shallow ones, so that the median seen lies a little above the one drawn
+        assert 0.1e-3 < np.median(depths) < 0.13e-3
+        assert 0.3 < np.log(depths).std() < 0.45
