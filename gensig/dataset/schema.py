@@ -66,7 +66,7 @@ COLUMNS: dict[str, Column] = _table(
     ("record_id", "str32", "", "id", "name of the record, unique in the data set"),
     ("label", "int16", "1", "label", "class number, index into the attribute class_names"),
     ("label_name", "str64", "", "label", "class name"),
-    ("faults_json", "str1024", "", "fault", "JSON list, one object a fault: kind, gear, tooth, sizes in millimetres"),
+    ("faults_json", "str4096", "", "fault", "JSON list, one object a fault: kind, gear, tooth, sizes in millimetres"),
     ("severity", "float64", "1", "fault", "0 healthy to 1: relative size of the fault, the largest when compound"),
     ("fault_gear", "str16", "", "fault", "gear that carries the (first) fault; empty when healthy"),
     ("fault_tooth", "int32", "1", "fault", "lowest tooth with the (first) fault, counted from 0; -1: all or none"),

@@ -195,8 +195,8 @@ class TipRelief(FlankForm):
         require(self, "relief_curve", self.relief_curve in RELIEF_CURVES, f"is none of {', '.join(RELIEF_CURVES)}")
 
     def size(self) -> float:
-        """The relief at the tip."""
-        return self.relief
+        """The relief at the tip, none without length."""
+        return self.relief if self.relief_length > 0.0 else 0.0
 
     def apply(self, tooth: Tooth, number: int) -> Tooth:
         """Relieve the tip."""

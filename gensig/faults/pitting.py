@@ -139,7 +139,10 @@ class DistributedPitting(Fault):
 
     def __post_init__(self) -> None:
         Fault.__post_init__(self)
-        require(self, "region_low", 0.0 <= self.region_low < self.region_high <= 1.0, "must lie below region_high")
+        require(self, "region_low", self.region_low >= 0.0, "must not be negative")
+        require(self, "region_high", self.region_high <= 1.0, "must not be above 1, the tip")
+        rule = f"must lie below region_high = {self.region_high:g}"
+        require(self, "region_low", self.region_low < self.region_high, rule)
         require(self, "pit_diameter_mm", self.pit_diameter > 0.0, "must be positive")
         require(self, "depth_ratio", 0.0 < self.depth_ratio <= 0.5, "must lie in 0..0.5")
         require(self, "diameter_scatter", 0.0 <= self.diameter_scatter <= 1.0, "must lie in 0..1")

@@ -59,5 +59,6 @@ def _read_fault(values: Mapping[str, Any], where: str) -> Fault:
     keys = {key: value for key, value in values.items() if key not in ("kind", "vary")}
     kind = values.get("kind")
     if kind not in FAULTS:
-        raise FaultError(f"{where}.kind = {kind!r}; allowed: healthy, {COMPOUND}, {', '.join(FAULTS)}")
+        alone = "" if ".parts." in where else f"healthy, {COMPOUND}, "
+        raise FaultError(f"{where}.kind = {kind!r}; allowed: {alone}{', '.join(FAULTS)}")
     return read(FAULTS[kind], keys, where)

@@ -13,7 +13,7 @@ from gensig.mesh.local_contact import ContactLaw
 Array = NDArray[np.float64]
 
 # law=paper knows no gap: flank deeper than this share of the module below the rest of its tooth does not bear
-LOST_DEPTH = 0.01
+LOST_DEPTH = 0.04
 
 
 def is_nominal(tooth: Tooth) -> bool:
@@ -34,7 +34,8 @@ def slice_gaps(tooth: Tooth, curvature_radius: Array, relative_radius: Array) ->
     """
     base = tooth.gear.base_radius
     arc = tooth.profile.curvature_radius**2 / (2.0 * base)
-    center = curvature_radius**2 / (2.0 * base)
+    different, first, place = np.unique(curvature_radius, return_index=True, return_inverse=True)
+    center, relative_radius = different**2 / (2.0 * base), relative_radius[first]
     standing_back = tooth.material_loss + tooth.flank_deviation
 
     def envelope(rows: Array) -> Array:
@@ -47,7 +48,7 @@ def slice_gaps(tooth: Tooth, curvature_radius: Array, relative_radius: Array) ->
     gap = np.repeat(level, len(center), axis=1)
     if not even.all():
         gap[~even] = envelope(standing_back[~even]) - envelope(np.zeros((1, len(arc))))
-    return gap
+    return gap[:, place]
 
 
 def face_contact(

@@ -14,7 +14,7 @@ from gensig.dynamics.pair import Body, PairDynamics, Support
 from gensig.errors import FaultError
 from gensig.faults.base import Fault, faulty_teeth
 from gensig.geometry.contact import GearPair
-from gensig.geometry.tooth import Tooth, healthy_tooth
+from gensig.geometry.tooth import healthy_tooth
 from gensig.material import Material
 from gensig.mesh.load_distribution import loaded_pair_table, pair_states, static_mesh
 from gensig.mesh.options import MeshOptions
@@ -188,7 +188,9 @@ class SpurPair:
         bending = slice_bending(self.pair, position, self.material, self.mesh)
         terms, gap, touches = {}, np.zeros_like(position), np.ones_like(position)
         for name, side in sides.items():
-            tooth: Tooth = next((tooth for (gear, _), tooth in odd.items() if gear == name), healthy_tooth(side.gear))
+            mine = {number: tooth for (gear, number), tooth in odd.items() if gear == name}
+            named = [fault.first_tooth for fault in faults if fault.gear == name and fault.first_tooth in mine]
+            tooth = mine[named[0] if named else min(mine)] if mine else healthy_tooth(side.gear)
             tip = tooth.tip_curvature_radius
             own_gap, contact = side.contact(tooth, bending, self.mesh)
             curvature = np.minimum(side.curvature, tip)
