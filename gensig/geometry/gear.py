@@ -39,6 +39,12 @@ class Gear:
                 f"{self.name}: {self.n_teeth} teeth with profile shift {self.profile_shift:g} are undercut; use at "
                 f"least {limit} teeth or a larger profile_shift"
             )
+        if self.root_half_angle >= math.pi / self.n_teeth:
+            raise GeometryError(
+                f"{self.name}: a rack tip rounded by cutter_tip_radius_coefficient = "
+                f"{self.cutter_tip_radius_coefficient:g} is wider than the space between two teeth at "
+                f"{math.degrees(self.pressure_angle):g} degrees; reduce it"
+            )
         if self.half_tooth_angle_at(self.tip_radius) <= 0.0:
             raise GeometryError(
                 f"{self.name}: the teeth are pointed below the tip radius {self.tip_radius * 1e3:.4g} mm; reduce "

@@ -144,7 +144,7 @@ class TestCornerGap:
 class TestPairsThatCannotMesh:
     def test_interference(self, pair):
         with pytest.raises(GeometryError, match=r"pinion: contact would reach curvature radius .* \(interference\)"):
-            replace(pair, wheel=replace(pair.wheel, addendum_coefficient=1.2))
+            replace(pair, wheel=replace(pair.wheel, addendum_coefficient=1.2, cutter_tip_radius_coefficient=0.3))
         assert replace(pair, wheel=replace(pair.wheel, addendum_coefficient=1.02))
 
     def test_tip_in_the_root(self, pair):

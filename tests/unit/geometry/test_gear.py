@@ -103,3 +103,9 @@ def test_a_large_shift_makes_the_tooth_pointed(gear_with):
 def test_sizes_that_cannot_be(xiamen, changes, text):
     with pytest.raises(GeometryError, match=f"pinion: {re.escape(text)}"):
         replace(xiamen.pair.pinion, **changes)
+
+
+def test_a_rack_tip_wider_than_the_space_is_refused(gear_with):
+    with pytest.raises(GeometryError, match=r"cutter_tip_radius_coefficient = 0\.38 is wider than the space"):
+        gear_with(n_teeth=40, pressure_angle=math.radians(25.0))
+    assert gear_with(n_teeth=40, pressure_angle=math.radians(25.0), cutter_tip_radius_coefficient=0.3)
