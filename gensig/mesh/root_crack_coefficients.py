@@ -1,5 +1,7 @@
-"""Written by ``python -m tests.reference.calibrate_crack``: for moment, shear and normal force, one number a
-function of ``gensig.mesh.root_crack.basis``."""
+"""Written by ``python -m tests.reference.calibrate_crack``.
+
+For moment, shear and normal force, one number a function of ``gensig.mesh.root_crack.basis``.
+"""
 
 COEFFICIENTS = (
     (

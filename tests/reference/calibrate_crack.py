@@ -1,4 +1,4 @@
-"""Fit the crack's intensity factors to the stored finite-element increments: ``python -m tests.reference.calibrate_crack``.
+"""Fit the crack's intensity factors to stored finite elements: ``python -m tests.reference.calibrate_crack``.
 
 Writes ``gensig/mesh/root_crack_coefficients.py`` and prints how well the fit holds, gear by gear, and how well it
 holds for gears that were left out of it.
@@ -126,8 +126,8 @@ def main() -> None:
     coefficients = fit(used)
     lines = ",\n".join("    (" + ", ".join(f"{value:.6g}" for value in row) + ")" for row in coefficients)
     TARGET.write_text(
-        '"""Written by ``python -m tests.reference.calibrate_crack``: for moment, shear and normal force, one number a\n'
-        'function of ``gensig.mesh.root_crack.basis``."""\n\n'
+        '"""Written by ``python -m tests.reference.calibrate_crack``.\n\n'
+        'For moment, shear and normal force, one number a function of ``gensig.mesh.root_crack.basis``.\n"""\n\n'
         f"COEFFICIENTS = (\n{lines},\n)\n",
         encoding="utf-8",
     )
