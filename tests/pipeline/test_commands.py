@@ -24,7 +24,7 @@ def test_stiffness_json_has_the_promised_keys(tmp_path: Path) -> None:
     assert position[-1] == pytest.approx(content["transverse_contact_ratio"], rel=1e-12)
     assert np.all(faulty < sound)
     terms = [values for gear in content["compliance_m_per_n"].values() for values in gear.values()]
-    assert len(terms) == 10
+    assert len(terms) == 12
     np.testing.assert_allclose(1.0 / np.sum(terms, axis=0), faulty, rtol=1e-4, atol=0.0)
     roll, mesh = np.array(content["roll_angle_deg"]), np.array(content["mesh_stiffness_n_per_m"])
     assert 0.0 < roll[0] < roll[-1] < 360.0
@@ -110,7 +110,7 @@ BAD = {
     "negative depth": (["generate", "fault=crack", "fault.crack_depth_mm=-1", "out=@/x"], "crack_depth_mm"),
     "crack through the tooth": (["stiffness", "fault=crack", "fault.crack_depth_mm=4.2"], "root chord"),
     "pit off the flank": (["stiffness", "fault=pitting", "fault.pit_position_mm=9"], "pit_position_mm"),
-    "pit over the face": (["stiffness", "fault=pitting", "fault.pit_width_mm=20"], "face width"),
+    "pit over the face": (["stiffness", "fault=pitting", "fault.pit_width_mm=21"], "20 mm wide"),
     "pit through the tooth": (["stiffness", "fault=pitting", "fault.pit_depth_mm=3"], "pit_depth_mm"),
     "tooth not on the gear": (["stiffness", "fault=crack", "fault.tooth=23"], "0..22"),
     "fault key of another fault": (["stiffness", "fault=crack", "fault.pit_width_mm=3"], "pit_width_mm"),
