@@ -2,6 +2,7 @@
 
 >>> import gensig
 >>> data = gensig.open_dataset("runs/quickstart")            # doctest: +SKIP
+>>> stream = gensig.stream("experiment=quickstart")             # doctest: +SKIP
 >>> system = gensig.load_system("gear=xiamen_23_84", "operating.torque_nm=40")
 >>> float(system.pair.transverse_contact_ratio)              # doctest: +ELLIPSIS
 1.7117...
@@ -18,9 +19,10 @@ from gensig.version import __version__
 
 if TYPE_CHECKING:
     from gensig.dataset.reader import Dataset
+    from gensig.streaming import RecordStream
     from gensig.systems.spur_pair import SpurPair
 
-__all__ = ["__version__", "generate", "load_system", "open_dataset"]
+__all__ = ["__version__", "generate", "load_system", "open_dataset", "stream"]
 
 
 def open_dataset(path: str | Path, *, allow_incomplete: bool = False) -> Dataset:
@@ -57,3 +59,25 @@ def generate(*overrides: str, out: str | Path, config_dir: str | Path | None = N
     if problems:
         raise SimulationError(f"{out} is incomplete: {problems[0]}")
     return open_dataset(out)
+
+
+def stream(*overrides: str, epoch: int = 0, config_dir: str | Path | None = None) -> RecordStream:
+    """The records that ``generate`` would write, made while one iterates and never stored.
+
+    Parameters
+    ----------
+    overrides : as for ``gensig generate``; ``out`` and ``executor`` change nothing
+    epoch : 0 gives the bits of ``generate``, any other number as many records with new draws, units included
+
+    Raises
+    ------
+    gensig.errors.GensigError    for anything that cannot be used
+    """
+    from gensig.compose import sweep
+    from gensig.config import read_request
+    from gensig.errors import ConfigError
+    from gensig.streaming import open_stream
+
+    if len(sweep(overrides)) > 1:
+        raise ConfigError("a stream is one data set: give one value a key, and make a stream for each")
+    return open_stream(read_request(overrides, config_dir=config_dir).config, epoch=epoch)

@@ -133,6 +133,9 @@ class _hydra:
 
 
 def _parse(overrides: Sequence[str]) -> list[Any]:
+    for word in overrides:
+        if not isinstance(word, str):
+            raise ConfigError(f"an override is a text such as 'seed=1', not {word!r}; give each as its own argument")
     try:
         return list(OverridesParser.create().parse_overrides(overrides=list(overrides)))
     except HydraException as error:

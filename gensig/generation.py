@@ -23,7 +23,7 @@ from gensig.dataset.shard import COMPRESSIONS, ShardWriter
 from gensig.errors import ConfigError, DatasetError
 from gensig.execution.local import ShardFailure, n_workers, run_shards
 from gensig.planning import make_plan
-from gensig.records import read_seed, simulate_record
+from gensig.records import read_seed, simulate_records
 from gensig.sensing.decimation import usable_band
 from gensig.systems.registry import read_system
 from gensig.systems.spur_pair import SpurPair
@@ -102,6 +102,9 @@ def run_folder(out: Path, *, workers: int, on_shard: Callable[[Progress], None])
     return n_failed, problems
 
 
+BLOCK = 16  # records simulated and written at a time
+
+
 @dataclass(frozen=True, slots=True, kw_only=True)
 class WrittenShard:
     """Digest, size and number of failed records of a shard on disk."""
@@ -118,9 +121,10 @@ def write_shard(out: Path, shard_index: int) -> WrittenShard:
     params = [name.removeprefix("params/") for name in plan.columns if name.startswith("params/")]
     writer = open_shard(shard_path(out, shard_index), config, len(indices), params)
     with writer:
-        for row, index in enumerate(indices):
-            record = simulate_record(config, plan.record(int(index)))
-            writer.write(row, record.signals, record.values)
+        for first in range(0, len(indices), BLOCK):
+            rows = [plan.record(int(index)) for index in indices[first : first + BLOCK]]
+            for row, record in enumerate(simulate_records(config, rows), start=first):
+                writer.write(row, record.signals, record.values)
     return WrittenShard(sha256=writer.sha256, n_bytes=writer.n_bytes, n_failed=writer.n_failed)
 
 

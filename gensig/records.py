@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import copy
 import json
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from enum import IntEnum
 from typing import Any
@@ -19,7 +19,7 @@ from gensig.faults.registry import read_faults
 from gensig.sensing.chain import add_noise, power
 from gensig.sensing.manufacturing import Gearbox, Specimen, draw_gearbox, draw_specimen
 from gensig.systems.registry import read_system
-from gensig.systems.spur_pair import SpurPair, Start
+from gensig.systems.spur_pair import CleanRecord, Run, SpurPair, Start, simulate_together
 from gensig.units import from_si
 from gensig.version import __version__
 
@@ -86,42 +86,95 @@ class Record:
 
 
 def simulate_record(config: Mapping[str, Any], row: Mapping[str, Any]) -> Record:
-    """Simulate one row of a plan; a motion that does not stay finite becomes a record marked as failed."""
-    seed, index = read_seed(config), int(str(row["record_id"]).lstrip("r"))
-    values = {
-        key.removeprefix("params/"): float(value)
-        for key, value in row.items()
-        if key.startswith("params/") and not key.startswith("params/fault.")
-    }
-    system = record_system(config, values)
-    faults = [] if config["plan"]["sham"] else row_faults(row)
-    columns = {key: value for key, value in row.items() if key not in ("shard", "row")}
-    n_channels = len(system.sensing.channels)
-    parts = json.loads(str(row["faults_json"]))
-    kinds = {part["kind"] for part in parts} if len(parts) > 1 else set()
-    multihot = np.array(
-        [
-            place == int(row["label"]) or config["classes"][name]["kind"] in kinds
-            for place, name in enumerate(config["plan"]["classes"])
-        ],
-        dtype=np.int8,
+    """Simulate one row of a plan; see ``simulate_records``."""
+    return simulate_records(config, [row])[0]
+
+
+def simulate_records(config: Mapping[str, Any], rows: Sequence[Mapping[str, Any]]) -> list[Record]:
+    """Simulate rows of a plan side by side, with the healthy twins that their noise is set by.
+
+    A record's bits do not depend on what it is simulated beside. A motion that does not stay finite becomes a record
+    marked as failed.
+    """
+    machines = [record_system(config, _row_values(row)) for row in rows]
+    runs = [_row_run(config, system, row) for system, row in zip(machines, rows, strict=True)]
+    wanted: dict[TwinKey, Run] = {}
+    for system, row in zip(machines, rows, strict=True):
+        key = _twin_key(config, row)
+        if system.sensing.snr is not None and system.sensing.snr_reference == "healthy_twin" and key not in _TWINS:
+            wanted.setdefault(key, _twin_run(config, system, row))
+    results = simulate_together([*runs, *wanted.values()])
+    fresh = dict(zip(wanted, results[len(rows) :], strict=True))
+    kept = {key: found for row in rows if (found := _TWINS.get(key := _twin_key(config, row))) is not None}
+    _TWINS.clear()
+    _TWINS.update(kept)
+    _TWINS.update(
+        {key: twin if isinstance(twin, SimulationError) else power(twin.acceleration) for key, twin in fresh.items()}
     )
-    try:
-        clean, noise_power, result = _simulate_clean(config, system, faults, row)
-    except SimulationError as error:
+    return [
+        _finish(config, system, row, result)
+        for system, row, result in zip(machines, rows, results[: len(rows)], strict=True)
+    ]
+
+
+def _finish(
+    config: Mapping[str, Any], system: SpurPair, row: Mapping[str, Any], result: CleanRecord | SimulationError
+) -> Record:
+    """Noise, labels and result columns of one simulated row."""
+    seed, index = read_seed(config), int(str(row["record_id"]).lstrip("r"))
+    n_channels = len(system.sensing.channels)
+    noise_power: Array | SimulationError = np.zeros(n_channels)
+    if system.sensing.snr is not None and not isinstance(result, SimulationError):
+        reference = (
+            _TWINS[_twin_key(config, row)]
+            if system.sensing.snr_reference == "healthy_twin"
+            else power(result.acceleration)
+        )
+        factor = 10.0 ** (-system.sensing.snr / 10.0)
+        noise_power = reference if isinstance(reference, SimulationError) else reference * factor
+    problem = next((one for one in (result, noise_power) if isinstance(one, SimulationError)), None)
+    if isinstance(result, SimulationError) or isinstance(noise_power, SimulationError):
         n_samples = round(system.operating.duration * system.sensing.sampling_rate)
         clean, noise_power = np.full((n_channels, n_samples), MISSING), np.full(n_channels, MISSING)
-        result = {"status": "failed", "status_reason": str(error), "speed_rpm": MISSING, "mesh_frequency_hz": MISSING}
+        told = {"status": "failed", "status_reason": str(problem), "speed_rpm": MISSING, "mesh_frequency_hz": MISSING}
+    else:
+        clean, speed_rpm = result.acceleration, from_si("speed_rpm", result.mean_speed)
+        told = {
+            "speed_rpm": speed_rpm,
+            "mesh_frequency_hz": speed_rpm / 60.0 * system.pair.pinion.n_teeth,
+            "contact_loss_fraction": result.contact_loss_fraction,
+        }
     noisy = add_noise(clean, noise_power, stream(seed, Stream.NOISE, index))
     signals: dict[str, NDArray[Any]] = {
         "acceleration": noisy.astype(np.float32),
-        "fault_multihot": multihot,
+        "fault_multihot": _multihot(config, row),
         "signal_power": power(clean),
         "noise_power": noise_power,
     }
     if config["dataset"]["store_clean"]:
         signals["acceleration_clean"] = clean.astype(np.float32)
-    return Record(signals=signals, values={**columns, **result})
+    columns = {key: value for key, value in row.items() if key not in ("shard", "row")}
+    return Record(signals=signals, values={**columns, **told})
+
+
+def _multihot(config: Mapping[str, Any], row: Mapping[str, Any]) -> NDArray[np.int8]:
+    """1 for the record's class and, where its fault is compound, for the classes of its parts."""
+    parts = json.loads(str(row["faults_json"]))
+    kinds = {part["kind"] for part in parts} if len(parts) > 1 else set()
+    present = [
+        place == int(row["label"]) or config["classes"][name]["kind"] in kinds
+        for place, name in enumerate(config["plan"]["classes"])
+    ]
+    return np.array(present, dtype=np.int8)
+
+
+def _row_values(row: Mapping[str, Any]) -> dict[str, float]:
+    """The drawn values of the machine, by configuration key."""
+    return {
+        key.removeprefix("params/"): float(value)
+        for key, value in row.items()
+        if key.startswith("params/") and not key.startswith("params/fault.")
+    }
 
 
 def row_faults(row: Mapping[str, Any]) -> list[Fault]:
@@ -129,38 +182,19 @@ def row_faults(row: Mapping[str, Any]) -> list[Fault]:
     return [fault for part in json.loads(str(row["faults_json"])) for fault in read_faults(part, "faults_json")]
 
 
-def _simulate_clean(
-    config: Mapping[str, Any], system: SpurPair, faults: list[Fault], row: Mapping[str, Any]
-) -> tuple[Array, Array, dict[str, Any]]:
-    """Clean accelerations, noise power by channel, and the result columns."""
+def _row_run(config: Mapping[str, Any], system: SpurPair, row: Mapping[str, Any]) -> Run:
     specimen, gearbox = _unit(config, system, row)
     start = Start(
         tooth_pinion=int(row["start_tooth_pinion"]),
         tooth_wheel=int(row["start_tooth_wheel"]),
         phase=float(row["start_phase"]),
     )
-    record = system.simulate(faults, start=start, specimen=specimen, gearbox=gearbox)
-    if system.sensing.snr is None:
-        noise_power = np.zeros(len(system.sensing.channels))
-    else:
-        if system.sensing.snr_reference == "healthy_twin":
-            reference = _twin_power(config, system, row)
-        else:
-            reference = power(record.acceleration)
-        noise_power = reference * 10.0 ** (-system.sensing.snr / 10.0)
-    speed_rpm = from_si("speed_rpm", record.mean_speed)
-    return (
-        record.acceleration,
-        noise_power,
-        {
-            "speed_rpm": speed_rpm,
-            "mesh_frequency_hz": speed_rpm / 60.0 * system.pair.pinion.n_teeth,
-            "contact_loss_fraction": record.contact_loss_fraction,
-        },
-    )
+    faults = () if config["plan"]["sham"] else tuple(row_faults(row))
+    return Run(system=system, faults=faults, start=start, specimen=specimen, gearbox=gearbox)
 
 
-_TWINS: dict[tuple[str, str], Array] = {}
+TwinKey = tuple[str, str]
+_TWINS: dict[TwinKey, Array | SimulationError] = {}
 
 
 def forget_twins() -> None:
@@ -168,22 +202,20 @@ def forget_twins() -> None:
     _TWINS.clear()
 
 
-def _twin_power(config: Mapping[str, Any], system: SpurPair, row: Mapping[str, Any]) -> Array:
-    """Power by channel of the healthy twin of a unit at a condition, from a start of its own; the last one is kept."""
-    key = (identity_hash(dict(config), __version__), str(row["condition_id"]))
-    if key not in _TWINS:
-        rng = stream(read_seed(config), Stream.TWIN, int(str(row["condition_id"]).rpartition("-")[2]))
-        pair = system.pair
-        start = Start(
-            tooth_pinion=int(rng.integers(pair.pinion.n_teeth)),
-            tooth_wheel=int(rng.integers(pair.wheel.n_teeth)),
-            phase=float(rng.random()),
-        )
-        specimen, gearbox = _unit(config, system, row)
-        twin = system.simulate(start=start, specimen=specimen, gearbox=gearbox)
-        _TWINS.clear()
-        _TWINS[key] = power(twin.acceleration)
-    return _TWINS[key]
+def _twin_key(config: Mapping[str, Any], row: Mapping[str, Any]) -> TwinKey:
+    return identity_hash(dict(config), __version__), str(row["condition_id"])
+
+
+def _twin_run(config: Mapping[str, Any], system: SpurPair, row: Mapping[str, Any]) -> Run:
+    """The healthy twin of a unit at a condition, from a start of its own."""
+    rng = stream(read_seed(config), Stream.TWIN, int(str(row["condition_id"]).rpartition("-")[2]))
+    start = Start(
+        tooth_pinion=int(rng.integers(system.pair.pinion.n_teeth)),
+        tooth_wheel=int(rng.integers(system.pair.wheel.n_teeth)),
+        phase=float(rng.random()),
+    )
+    specimen, gearbox = _unit(config, system, row)
+    return Run(system=system, faults=(), start=start, specimen=specimen, gearbox=gearbox)
 
 
 def _unit(config: Mapping[str, Any], system: SpurPair, row: Mapping[str, Any]) -> tuple[Specimen, Gearbox]:

@@ -37,6 +37,7 @@ def test_house_rule(command: tuple[str, ...]) -> None:
         ("import gensig", ("numpy", "h5py", "hydra", "numba", "torch", "scipy")),
         ("import gensig.cli", ("numpy", "h5py", "hydra", "numba", "torch", "scipy")),
         ("import gensig.generation", ("torch", "sklearn", "hydra", "matplotlib")),
+        ("import gensig.streaming", ("torch", "sklearn", "hydra", "matplotlib")),
         ("import diagnose.data", ("numba", "gensig.systems", "gensig.mesh")),
     ],
 )

@@ -1,378 +1,208 @@
-"""Compiled core: the mesh law and a fixed-step fourth-order Runge-Kutta integrator.
+"""Compiled core: a fixed-step fourth-order Runge-Kutta integrator, four records side by side.
 
-Scalar code without reassociation, one record a call, so that a record's bits depend on nothing but its own numbers.
-The symbols are those of ``docs/theory/spur_dynamics.md``.
+Every number of a record lies in its own lane of a vector, and no instruction mixes lanes or reorders sums: a record's
+bits depend on nothing but its own numbers. Arrays are flat; a row is ``LANES`` numbers.
 """
 
 from __future__ import annotations
 
-import functools
-from typing import Any, NamedTuple
-
 import numpy as np
-from numba import njit
 
-from gensig.mesh.pair_table import FIRST_PITCH, N_PAIRS
+from gensig.dynamics import _mesh_kernels as mesh
+from gensig.dynamics._mesh_kernels import N_SLOTS, ROLL, SLOT_ROWS, WANTED, at_row, gather, mesh_law
+from gensig.dynamics._vector import LANES, any_above, compiled, inlined, load, spread, store, where_above
 
 SUBSTEPS = 8
-LOADED = 6  # row of a mesh law's scratch whose first entry counts the pairs that bear load
-
-# Without Numba's reference counting (arrays are borrowed, none is made here) a step costs a third less; inlined,
-# because the numbers of a mesh would otherwise be copied at every call.
-_OPTIONS: dict[str, Any] = {"cache": True, "error_model": "numpy", "_nrt": False}
-_compiled: Any = functools.partial(njit, nogil=True, **_OPTIONS)()
-_inlined: Any = functools.partial(njit, inline="always", **_OPTIONS)()
 
 
-class MeshNumbers(NamedTuple):
-    """One gear mesh as plain numbers; no arrays, whose reference counts would cost more than the law itself."""
-
-    pinion_x: int  # degrees of freedom, -1 where a machine has none
-    pinion_y: int
-    pinion_rotation: int
-    wheel_x: int
-    wheel_y: int
-    wheel_rotation: int
-    pinion_radius: float
-    wheel_radius: float
-    pitch: float
-    nodes_per_meter: float
-    path: float
-    pitch_point: float
-    start_curvature: float
-    tangent_length: float
-    shared: float
-    one_sided: bool
-    consistent: bool
-    damping: float  # one_sided: factor d in s/m; paper: c_m in N s/m
-    friction: float
-    friction_half_width: float
-    switch_half_width: float
-    backlash: float
-    start_pinion: int
-    start_wheel: int
-    start_roll: float
-    speed: float  # nominal pinion speed, rad/s
+@inlined
+def _motion(numbers, dofs, time, q, v, work):
+    """Approach, its rate, roll and its rate at one instant, from the rows of a state."""
+    pinion_radius, wheel_radius = at_row(numbers, mesh.PINION_RADIUS), at_row(numbers, mesh.WHEEL_RADIUS)
+    pinion, wheel = dofs[2] * LANES, dofs[5] * LANES
+    turned, spun = load(work, q + pinion), load(work, v + pinion)
+    approach = pinion_radius * turned - wheel_radius * load(work, q + wheel)
+    rate = pinion_radius * spun - wheel_radius * load(work, v + wheel)
+    if dofs[1] >= 0:
+        approach = approach - load(work, q + dofs[1] * LANES)
+        rate = rate - load(work, v + dofs[1] * LANES)
+    if dofs[4] >= 0:
+        approach = approach + load(work, q + dofs[4] * LANES)
+        rate = rate + load(work, v + dofs[4] * LANES)
+    speed = at_row(numbers, mesh.SPEED)
+    roll = at_row(numbers, mesh.START_ROLL) + pinion_radius * (speed * spread(time) + turned)
+    return approach, rate, roll, pinion_radius * (speed + spun)
 
 
-class MeshArrays(NamedTuple):
-    """One gear mesh as the integrator takes it.
+@inlined
+def _accelerate(machine, numbers, dofs, law, q, v, a, work):
+    """Fill the rows ``a`` with q'' under the forces of a mesh law."""
+    inverse_mass, k_row, k_column, k_value, c_row, c_column, c_value, force = machine
+    normal, friction, moment_p, moment_w, along = law[0], law[1], law[2], law[3], law[4]
+    for i in range(0, len(force), LANES):
+        store(work, a + i, load(force, i))
+    for k in range(len(k_row)):
+        place = a + k_row[k] * LANES
+        store(work, place, load(work, place) - load(k_value, k * LANES) * load(work, q + k_column[k] * LANES))
+    for k in range(len(c_row)):
+        place = a + c_row[k] * LANES
+        store(work, place, load(work, place) - load(c_value, k * LANES) * load(work, v + c_column[k] * LANES))
+    place = a + dofs[2] * LANES
+    store(work, place, load(work, place) + at_row(numbers, mesh.PINION_RADIUS) * (along - normal) + moment_p)
+    place = a + dofs[5] * LANES
+    store(work, place, load(work, place) + at_row(numbers, mesh.WHEEL_RADIUS) * normal + moment_w)
+    if dofs[1] >= 0:
+        store(work, a + dofs[1] * LANES, load(work, a + dofs[1] * LANES) + normal)
+    if dofs[4] >= 0:
+        store(work, a + dofs[4] * LANES, load(work, a + dofs[4] * LANES) - normal)
+    if dofs[0] >= 0:
+        store(work, a + dofs[0] * LANES, load(work, a + dofs[0] * LANES) + friction)
+    if dofs[3] >= 0:
+        store(work, a + dofs[3] * LANES, load(work, a + dofs[3] * LANES) - friction)
+    for i in range(0, len(force), LANES):
+        store(work, a + i, load(work, a + i) * load(inverse_mass, i))
 
-    ``table`` (row, node, [c, c', g, g']) holds the distinct teeth of both gears, the sound pinion tooth first and the
-    sound wheel tooth at ``wheel_row``; ``pinion_row`` and ``wheel_row`` (tooth,) say which row a tooth has, -1 for a
-    missing one; the errors (tooth,) are gap offsets in m.
+
+@compiled
+def integrate(group, state, lost, step, first_step, n_steps, channels, out, work, near):
+    """Advance every lane by ``n_steps`` of classical RK4.
+
+    The tables are read once at the middle and once at the end of a step, where the next one begins; the stages differ
+    from there by a roll so small that the slope of the gap makes up for it. A step in which a pair takes up or lets go
+    of its load is taken again in ``SUBSTEPS`` parts, in the lanes where it does: the force has a kink there, which
+    would otherwise set the accuracy of everything.
+
+    Parameters
+    ----------
+    state : (2, dof, lane)    q and v, advanced in place
+    lost : (lane,)            the number of steps without contact is added
+    out : (channel, n_steps, lane)    takes the mean acceleration over each step (what the equations add to the
+        velocity, over the step: kinks then alias far less than point values would); empty stores nothing
+    work, near : ``scratch`` of the group
     """
-
-    numbers: MeshNumbers
-    table: Any
-    pinion_row: Any
-    wheel_row: Any
-    pinion_error: Any
-    wheel_error: Any
-    sound_wheel_row: int
-
-
-class SystemArrays(NamedTuple):
-    """M q'' + C q' + K q = f + mesh forces, K and C as triplets; q is the deviation from nominal rotation."""
-
-    inverse_mass: Any
-    stiffness_row: Any
-    stiffness_column: Any
-    stiffness_value: Any
-    damping_row: Any
-    damping_column: Any
-    damping_value: Any
-    force: Any
-
-
-@_inlined
-def _friction_sign(m, position):
-    """Direction of sliding, smooth through the pitch point, -1 before it and 1 after it."""
-    x = (position - m.pitch_point) / m.friction_half_width
-    if x <= -1.0:
-        return -1.0
-    if x >= 1.0:
-        return 1.0
-    return x * (1.5 - 0.5 * x * x)
-
-
-@_inlined
-def mesh_law(
-    m, table, pinion_row, wheel_row, pinion_error, wheel_error, sound_wheel, roll, approach, rate, roll_rate, work
-):
-    """Forces of all pairs at one instant.
-
-    Returns normal force, friction force, friction moments about pinion and wheel, force on the roll coordinate
-    (energy balance), stored energy, and the power lost in mesh damping. ``work`` is (7, N_PAIRS) scratch; its
-    last row begins with the number of loaded pairs, negative on the coast flank.
-    """
-    if not m.one_sided:
-        return _paper_law(m, table, pinion_row, wheel_row, roll, approach, rate, work)
-    if approach > -0.5 * m.backlash:
-        n = _gather(m, table, pinion_row, wheel_row, pinion_error, wheel_error, roll, approach, work)
-        return _flank_law(m, n, rate, roll_rate, work)
-    if -approach <= m.backlash:
-        work[LOADED, 0] = 0.0
-        return 0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0
-    mirrored = 2.0 * m.pitch_point + 0.5 * m.pitch - roll
-    n = _gather_coast(m, table, pinion_row, wheel_row, sound_wheel, mirrored, -approach - m.backlash, work)
-    back = _flank_law(m, n, -rate, -roll_rate, work)
-    work[LOADED, 0] = -work[LOADED, 0]
-    return -back[0], 0.0, 0.0, 0.0, -back[4], back[5], back[6]
-
-
-@_inlined
-def _gather(m, table, pinion_row, wheel_row, pinion_error, wheel_error, roll, approach, work):
-    """Pairs that could touch: bite, 1 / own compliance, own, gap slope, compliance slope, position; and how many."""
-    newest = int(np.floor(roll / m.pitch)) + 1
-    tooth_p = (newest + m.start_pinion) % len(pinion_row)
-    tooth_w = (newest + m.start_wheel) % len(wheel_row)
-    position = roll - newest * m.pitch
-    last_cell = table.shape[1] - 2
-    x = (position - FIRST_PITCH * m.pitch) * m.nodes_per_meter
-    nodes_per_pitch = m.pitch * m.nodes_per_meter
-    n_active = 0
-    for _ in range(N_PAIRS):
-        row_p, row_w = pinion_row[tooth_p], wheel_row[tooth_w]
-        if row_p >= 0 and row_w >= 0:
-            cell = min(max(int(x), 0), last_cell)
-            gap = _interpolate(table, row_p, row_w, cell, x - cell, 2) + pinion_error[tooth_p] + wheel_error[tooth_w]
-            if approach > gap:
-                own = _interpolate(table, row_p, row_w, cell, x - cell, 0) - m.shared
-                work[0, n_active] = approach - gap
-                work[1, n_active] = 1.0 / own
-                work[2, n_active] = own
-                work[3, n_active] = _interpolate(table, row_p, row_w, cell, x - cell, 3)
-                work[4, n_active] = _interpolate(table, row_p, row_w, cell, x - cell, 1)
-                work[5, n_active] = position
-                n_active += 1
-        position += m.pitch
-        x += nodes_per_pitch
-        tooth_p = tooth_p - 1 if tooth_p > 0 else len(pinion_row) - 1
-        tooth_w = tooth_w - 1 if tooth_w > 0 else len(wheel_row) - 1
-    return n_active
-
-
-@_inlined
-def _gather_coast(m, table, pinion_row, wheel_row, sound_wheel, mirrored, approach, work):
-    """The same for the back flanks: teeth count backwards along the mirrored roll, are sound and have no errors."""
-    newest = int(np.floor(mirrored / m.pitch)) + 1
-    n_active = 0
-    for k in range(N_PAIRS):
-        pair = newest - k
-        position = mirrored - pair * m.pitch
-        if pinion_row[(m.start_pinion - pair) % len(pinion_row)] < 0:
-            continue
-        if wheel_row[(m.start_wheel - pair) % len(wheel_row)] < 0:
-            continue
-        x = (position - FIRST_PITCH * m.pitch) * m.nodes_per_meter
-        cell = min(max(int(x), 0), table.shape[1] - 2)
-        gap = _interpolate(table, 0, sound_wheel, cell, x - cell, 2)
-        if approach > gap:
-            own = _interpolate(table, 0, sound_wheel, cell, x - cell, 0) - m.shared
-            work[0, n_active] = approach - gap
-            work[1, n_active] = 1.0 / own
-            work[2, n_active] = own
-            work[3, n_active] = _interpolate(table, 0, sound_wheel, cell, x - cell, 3)
-            work[4, n_active] = _interpolate(table, 0, sound_wheel, cell, x - cell, 1)
-            work[5, n_active] = position
-            n_active += 1
-    return n_active
-
-
-@_inlined
-def _interpolate(table, row_p, row_w, cell, f, column):
-    """Linear between nodes, sum of both gears' sides."""
-    a = table[row_p, cell, column] + table[row_w, cell, column]
-    b = table[row_p, cell + 1, column] + table[row_w, cell + 1, column]
-    return a + f * (b - a)
-
-
-@_inlined
-def _total_load(shared, n_active, work):
-    """Load of all pairs; those that the shared deflection lifts off get a bite of 0.
-
-    Each that leaves raises the total, so the loop ends after at most ``n_active`` rounds.
-    """
-    while True:
-        stiffness, force = 0.0, 0.0
-        for k in range(n_active):
-            if work[0, k] > 0.0:
-                stiffness += work[1, k]
-                force += work[0, k] * work[1, k]
-        total = force / (1.0 + shared * stiffness)
-        lifted = False
-        for k in range(n_active):
-            if 0.0 < work[0, k] <= shared * total:
-                work[0, k] = 0.0
-                lifted = True
-        if not lifted:
-            return total
-
-
-@_inlined
-def _flank_law(m, n_active, approach_rate, roll_rate, work):
-    """One-sided contact of the gathered pairs."""
-    total = _total_load(m.shared, n_active, work)
-    normal, friction, moment_p, moment_w, along, lost = 0.0, 0.0, 0.0, 0.0, 0.0, 0.0
-    stored = -0.5 * m.shared * total * total
-    work[LOADED, 0] = 0.0
-    for k in range(n_active):
-        if work[0, k] <= 0.0:
-            continue
-        elastic = (work[0, k] - m.shared * total) * work[1, k]
-        rate = approach_rate - work[3, k] * roll_rate
-        load = max(0.0, elastic * (1.0 + m.damping * rate))
-        normal += load
-        work[LOADED, 0] += load > 0.0
-        stored += elastic * (work[0, k] - 0.5 * work[2, k] * elastic)
-        lost += (load - elastic) * rate
-        along += load * work[3, k] + 0.5 * elastic * elastic * work[4, k]
-        sliding = m.friction * load * _friction_sign(m, work[5, k])
-        arm = m.start_curvature + min(max(work[5, k], 0.0), m.path)
-        friction += sliding
-        moment_p -= sliding * arm
-        moment_w += sliding * (m.tangent_length - arm)
-    if not m.consistent:
-        along = 0.0
-    return normal, friction, moment_p, moment_w, along, stored, lost
-
-
-@_inlined
-def _paper_law(m, table, pinion_row, wheel_row, roll, approach, rate, work):
-    """F = k(t) delta + c_m delta': two-sided, no gap, pairs in and out over one integration step."""
-    newest = int(np.floor(roll / m.pitch)) + 1
-    stiffness = 0.0
-    work[LOADED, 0] = 0.0
-    for k in range(N_PAIRS):
-        pair = newest - k
-        position = roll - pair * m.pitch
-        row_p = pinion_row[(pair + m.start_pinion) % len(pinion_row)]
-        row_w = wheel_row[(pair + m.start_wheel) % len(wheel_row)]
-        inside = min(position, m.path - position) / m.switch_half_width
-        share = min(max(0.5 * (1.0 + inside), 0.0), 1.0)
-        work[0, k] = 0.0
-        work[4, k] = position
-        work[LOADED, 0] += (share > 0.0) + (share == 1.0)
-        if share > 0.0 and row_p >= 0 and row_w >= 0:
-            x = (position - FIRST_PITCH * m.pitch) * m.nodes_per_meter
-            cell = min(max(int(x), 0), table.shape[1] - 2)
-            work[0, k] = share / (_interpolate(table, row_p, row_w, cell, x - cell, 0) - m.shared)
-        stiffness += work[0, k]
-    together = stiffness / (1.0 + m.shared * stiffness)
-    normal = together * approach + m.damping * rate
-    friction, moment_p, moment_w = 0.0, 0.0, 0.0
-    if stiffness > 0.0:
-        for k in range(N_PAIRS):
-            sliding = m.friction * normal * work[0, k] / stiffness * _friction_sign(m, work[4, k])
-            arm = m.start_curvature + min(max(work[4, k], 0.0), m.path)
-            friction += sliding
-            moment_p -= sliding * arm
-            moment_w += sliding * (m.tangent_length - arm)
-    return normal, friction, moment_p, moment_w, 0.0, 0.5 * together * approach**2, m.damping * rate**2
-
-
-@_inlined
-def acceleration(
-    inverse_mass, k_row, k_column, k_value, c_row, c_column, c_value, force,
-    m, table, pinion_row, wheel_row, pinion_error, wheel_error, sound_wheel, time, q, v, a, work,
-):  # fmt: skip
-    """Fill ``a`` with q'' at one instant; returns the normal mesh force."""
-    for i in range(len(q)):
-        a[i] = force[i]
-    for k in range(len(k_value)):
-        a[k_row[k]] -= k_value[k] * q[k_column[k]]
-    for k in range(len(c_value)):
-        a[c_row[k]] -= c_value[k] * v[c_column[k]]
-    pt, gt = m.pinion_rotation, m.wheel_rotation
-    approach = m.pinion_radius * q[pt] - m.wheel_radius * q[gt]
-    rate = m.pinion_radius * v[pt] - m.wheel_radius * v[gt]
-    if m.pinion_y >= 0:
-        approach -= q[m.pinion_y]
-        rate -= v[m.pinion_y]
-    if m.wheel_y >= 0:
-        approach += q[m.wheel_y]
-        rate += v[m.wheel_y]
-    roll = m.start_roll + m.pinion_radius * (m.speed * time + q[pt])
-    roll_rate = m.pinion_radius * (m.speed + v[pt])
-    normal, friction, moment_p, moment_w, along, _, _ = mesh_law(
-        m, table, pinion_row, wheel_row, pinion_error, wheel_error, sound_wheel, roll, approach, rate, roll_rate, work
-    )
-    a[pt] += m.pinion_radius * (along - normal) + moment_p
-    a[gt] += m.wheel_radius * normal + moment_w
-    if m.pinion_y >= 0:
-        a[m.pinion_y] += normal
-    if m.wheel_y >= 0:
-        a[m.wheel_y] -= normal
-    if m.pinion_x >= 0:
-        a[m.pinion_x] += friction
-    if m.wheel_x >= 0:
-        a[m.wheel_x] -= friction
-    for i in range(len(q)):
-        a[i] *= inverse_mass[i]
-    return normal
-
-
-@_compiled
-def integrate(system, mesh, q, v, step, first_step, n_steps, channels, out, scratch, work):
-    """Advance q and v in place by ``n_steps`` of classical RK4.
-
-    A step in which a pair takes up or lets go of its load is taken again in ``SUBSTEPS`` parts: the force has a kink
-    there, which would otherwise set the accuracy of everything. ``out`` (channel, n_steps) takes the mean acceleration
-    of the chosen degrees of freedom over each step (what the equations add to the velocity, over the step: kinks then
-    alias far less than point values would); with no rows nothing is stored. Returns the number of steps without
-    contact, and the step at which a value stopped being finite (-1 if none).
-    """
-    inverse_mass, k_row, k_column, k_value, c_row, c_column, c_value, force = system
-    m, table, pinion_row, wheel_row, pinion_error, wheel_error, sound_wheel = mesh
-    n_dof = len(q)
-    a, trial_q, trial_v, sum_q, sum_v = scratch[0], scratch[1], scratch[2], scratch[3], scratch[4]
-    store = out.shape[1] > 0
-    n_lost = 0
+    numbers, places, table, tooth_row, tooth_error = (
+        group.numbers, group.places, group.table, group.tooth_row, group.tooth_error,
+    )  # fmt: skip
+    one_sided, consistent, dofs = group.one_sided, group.consistent, group.dofs
+    machine = (
+        group.inverse_mass, group.stiffness_row, group.stiffness_column, group.stiffness_value, group.damping_row,
+        group.damping_column, group.damping_value, group.force,
+    )  # fmt: skip
+    zero, one = spread(0.0), spread(1.0)
+    size = len(group.force)
+    extra = N_SLOTS * SLOT_ROWS
+    rolls, within_row, flags = extra + ROLL, extra + mesh.WITHIN, (extra + mesh.CHANGED) * LANES
+    rows = (extra + mesh.LAW + mesh.N_LAW + 4) * LANES
+    now, single, parted = rows, rows + 2 * size, rows + 4 * size
+    trial, total, a = rows + 6 * size, rows + 8 * size, rows + 10 * size
+    mean, part_mean = rows + 11 * size, rows + 12 * size
+    n_channels = len(channels) if len(out) > 0 else 0
+    margin = spread(mesh.NEAR) if one_sided else spread(2.0 * mesh.FAR)
+    for i in range(0, 2 * size, LANES):
+        store(work, now + i, load(state, i))
+    for lane in range(LANES):
+        near[WANTED * LANES + lane] = 1
+    approach, rate, roll, roll_rate = _motion(numbers, dofs, first_step * step, now, now + size, work)
+    store(work, (rolls + 1) * LANES, roll)
+    store(work, within_row * LANES, approach + margin)
+    gather(numbers, places, table, tooth_row, tooth_error, rolls + 1, within_row, 1, work, near)
+    start_slot, end_slot = 1, 2
     for n in range(n_steps):
         n_parts, part = 1, 0
+        source, target, begin, end = now, single, start_slot, end_slot
+        changed = zero
         while part < n_parts:
             h = step / n_parts
             time = (first_step + n) * step + part * h
-            for i in range(n_dof):
-                trial_q[i], trial_v[i] = q[i], v[i]
-                sum_q[i], sum_v[i] = 0.0, 0.0
-            loaded, changed = 0.0, False
+            for i in range(0, 2 * size, LANES):
+                store(work, trial + i, load(work, source + i))
+                store(work, total + i, zero)
+            middle = 3 if n_parts == 1 else 4
+            loaded = zero
             for stage in range(4):
                 ahead = h * (0.0 if stage == 0 else 1.0 if stage == 3 else 0.5)
-                normal = acceleration(
-                    inverse_mass, k_row, k_column, k_value, c_row, c_column, c_value, force,
-                    m, table, pinion_row, wheel_row, pinion_error, wheel_error, sound_wheel,
-                    time + ahead, trial_q, trial_v, a, work,
+                approach, rate, roll, roll_rate = _motion(numbers, dofs, time + ahead, trial, trial + size, work)
+                slot = begin if stage == 0 else end if stage == 3 else middle
+                if stage == 1 or stage == 3:
+                    store(work, (rolls + slot) * LANES, roll)
+                    store(work, within_row * LANES, approach + margin)
+                    gather(numbers, places, table, tooth_row, tooth_error, rolls + slot, within_row, slot, work, near)
+                most = 0
+                for lane in range(LANES):
+                    most = max(most, near[slot * LANES + lane])
+                law = mesh_law(
+                    numbers, places, table, tooth_row, one_sided, consistent, most, slot,
+                    roll - load(work, (rolls + slot) * LANES), roll, approach, rate, roll_rate, work,
                 )  # fmt: skip
+                _accelerate(machine, numbers, dofs, law, trial, trial + size, a, work)
                 if stage == 0:
-                    loaded = work[LOADED, 0]
+                    loaded = law[7]
                     if n_parts == 1:
-                        n_lost += normal == 0.0
-                changed = changed or work[LOADED, 0] != loaded
-                weight = 1.0 if stage == 0 or stage == 3 else 2.0
-                reach = h * (1.0 if stage == 2 else 0.5)
-                for i in range(n_dof):
-                    sum_q[i] += weight * trial_v[i]
-                    sum_v[i] += weight * a[i]
-                    trial_q[i] = q[i] + reach * trial_v[i]
-                    trial_v[i] = v[i] + reach * a[i]
-            if changed and n_parts == 1:
-                n_parts = SUBSTEPS
-                continue
-            if store:
-                for c in range(len(channels)):
-                    mean = sum_v[channels[c]] / (6.0 * n_parts)
-                    out[c, n] = mean if part == 0 else out[c, n] + mean
-            for i in range(n_dof):
-                q[i] += h / 6.0 * sum_q[i]
-                v[i] += h / 6.0 * sum_v[i]
+                        store(
+                            lost,
+                            0,
+                            load(lost, 0) + where_above(law[0], zero, zero, where_above(zero, law[0], zero, one)),
+                        )
+                else:
+                    differs = law[7] - loaded
+                    changed = where_above(differs * differs, zero, one, changed)
+                weight = spread(1.0 if stage == 0 or stage == 3 else 2.0)
+                reach = spread(h * (1.0 if stage == 2 else 0.5))
+                for i in range(0, size, LANES):
+                    speed, gained = load(work, trial + size + i), load(work, a + i)
+                    store(work, total + i, load(work, total + i) + weight * speed)
+                    store(work, total + size + i, load(work, total + size + i) + weight * gained)
+                    store(work, trial + i, load(work, source + i) + reach * speed)
+                    store(work, trial + size + i, load(work, source + size + i) + reach * gained)
+            share = spread(h / 6.0)
+            for i in range(0, 2 * size, LANES):
+                store(work, target + i, load(work, source + i) + share * load(work, total + i))
+            for c in range(n_channels):
+                place = (mean if n_parts == 1 else part_mean) + c * LANES
+                value = load(work, total + size + channels[c] * LANES) * spread(1.0 / (6.0 * n_parts))
+                store(work, place, value if part == 0 else load(work, place) + value)
             part += 1
-        if not np.isfinite(v[n_dof - 1]):
-            return n_lost, n
-    return n_lost, -1
+            if n_parts == 1 and any_above(changed, zero):
+                n_parts, part = SUBSTEPS, 0
+                store(work, flags, changed)
+                for lane in range(LANES):
+                    near[WANTED * LANES + lane] = 1 if work[flags + lane] > 0.0 else 0
+                source, target, begin, end = now, parted, start_slot, 5
+            elif n_parts > 1:
+                source, begin = parted, end
+                end = 6 if end == 5 else 5
+        if n_parts > 1:
+            _take_parted(work, near, flags, begin, end_slot, rolls, single, parted, 2 * size)
+            for c in range(n_channels):
+                place = mean + c * LANES
+                taken = where_above(load(work, flags), zero, load(work, part_mean + c * LANES), load(work, place))
+                store(work, place, taken)
+        for c in range(n_channels):
+            store(out, (c * n_steps + n) * LANES, load(work, mean + c * LANES))
+        now, single = single, now
+        start_slot, end_slot = end_slot, start_slot
+    for i in range(0, 2 * size, LANES):
+        store(state, i, load(work, now + i))
 
 
-def work_arrays(n_dof):
-    """Scratch of ``integrate``: (5, dof) and (7, pair)."""
-    return np.empty((5, n_dof)), np.empty((LOADED + 1, N_PAIRS))
+@compiled
+def _take_parted(work, near, flags, parted_slot, slot, rolls, single, parted, size):
+    """Put the state and the pairs of the lanes that were taken in parts in place of those taken at once."""
+    for lane in range(LANES):
+        near[WANTED * LANES + lane] = 1
+        if work[flags + lane] == 0.0:
+            continue
+        for i in range(0, size, LANES):
+            work[single + i + lane] = work[parted + i + lane]
+        for row in range(SLOT_ROWS):
+            work[(slot * SLOT_ROWS + row) * LANES + lane] = work[(parted_slot * SLOT_ROWS + row) * LANES + lane]
+        work[(rolls + slot) * LANES + lane] = work[(rolls + parted_slot) * LANES + lane]
+        near[slot * LANES + lane] = near[parted_slot * LANES + lane]
+
+
+def scratch(n_dof, n_channels):
+    """Work rows and pair counts of ``integrate`` and ``law_at``."""
+    n_rows = N_SLOTS * SLOT_ROWS + mesh.LAW + mesh.N_LAW + 4 + 11 * n_dof + 2 * max(n_dof, n_channels) + n_dof
+    near = np.zeros((mesh.N_COUNTS, LANES), dtype=np.int64)
+    near[mesh.NEWEST] = -(2**62)  # no pair: the first look at the tables finds the teeth
+    return np.zeros(n_rows * LANES), near.ravel()

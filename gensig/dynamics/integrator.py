@@ -4,12 +4,16 @@ from __future__ import annotations
 
 import math
 import warnings
+from collections.abc import Sequence
 from dataclasses import dataclass
 
 import numpy as np
 from numpy.typing import NDArray
 
 from gensig.dynamics import _kernels
+from gensig.dynamics._mesh_kernels import Group
+from gensig.dynamics._vector import LANES
+from gensig.dynamics.lanes import pack
 from gensig.dynamics.pair import DOFS, PairDynamics
 from gensig.dynamics.system import eigenvalues, slowest_decay
 from gensig.errors import ConfigError, SimulationError
@@ -43,16 +47,17 @@ class Solver:
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
-class Motion:
-    """Mean accelerations over the internal steps, (channel, step) m/s2 or rad/s2, and what the run tells about itself.
+class Motions:
+    """Mean accelerations of up to ``LANES`` machines over the internal steps and what the runs tell about themselves.
 
-    The first step ends where the first sample of the margin lies.
+    ``acceleration`` (channel, step, lane) m/s2 or rad/s2; the first step ends where the first sample of the margin
+    lies. ``mean_speed`` (lane,) rad/s, ``contact_loss_fraction`` (lane,), ``finite`` (lane,) whether all stayed so.
     """
 
     acceleration: Array
-    step: float
-    mean_speed: float
-    contact_loss_fraction: float
+    mean_speed: Array
+    contact_loss_fraction: Array
+    finite: NDArray[np.bool_]
 
 
 def settling_time(dynamics: PairDynamics) -> float:
@@ -61,56 +66,81 @@ def settling_time(dynamics: PairDynamics) -> float:
     return min(LONGEST_SETTLING, math.log(1.0 / SETTLED) / rate)
 
 
+@dataclass(slots=True)
+class _Run:
+    """A group on its way: the state (2, dof, lane) and the lost steps (lane,)."""
+
+    machines: Sequence[PairDynamics]
+    state: Array
+    lost: Array
+    index: NDArray[np.int64]
+
+    def advance(self, group: Group, step: float, first_step: int, n_steps: int, out: Array) -> None:
+        work = _kernels.scratch(self.state.shape[1], len(self.index))
+        _kernels.integrate(
+            group, self.state.ravel(), self.lost, step, first_step, n_steps, self.index, out.ravel(), *work
+        )
+
+
 def integrate(
-    dynamics: PairDynamics, solver: Solver, *, sampling_rate: float, channels: tuple[str, ...], margin: int
-) -> Motion:
-    """Settle, then record ``duration`` plus ``margin`` output samples on either side for the filter.
+    machines: Sequence[PairDynamics],
+    solver: Solver,
+    *,
+    sampling_rate: float,
+    duration: float,
+    channels: tuple[str, ...],
+    margin: int,
+) -> Motions:
+    """Settle every machine by itself, then record ``duration`` plus ``margin`` output samples on either side.
 
     Raises
     ------
     ConfigError        for a channel the system has not
-    SimulationError    where the step is too long for the stiffest motion, or a value stops being finite
+    SimulationError    where the step is too long for the stiffest motion
     """
-    system = dynamics.system()
     check_channels(channels)
-    step = 1.0 / (sampling_rate * solver.oversampling)
-    check_step(dynamics, step)
-    mesh, arrays = dynamics.arrays(step), system.arrays()
-    index = np.array([system.names.index(name) for name in channels], dtype=np.int64)
-    n_samples = count_samples(dynamics.operating.duration, sampling_rate)
     fine = solver.oversampling
-    coarse = COARSE_OVERSAMPLING if fine > COARSE_OVERSAMPLING and _stable(dynamics, step * fine / 4) else fine
-    n_settle = math.ceil(settling_time(dynamics) * sampling_rate)
-    n_fine = min(n_settle, math.ceil(FINE_SETTLING * sampling_rate))
-    n_record = (n_samples + 2 * margin) * fine + 1
-    begin = -margin - n_fine  # output samples; time 0 is the first recorded one
-    coarse_step = step * fine / coarse
-    q = dynamics.static_start((begin - n_settle + n_fine) / sampling_rate)
-    v = np.zeros_like(q)
-    scratch = _kernels.work_arrays(len(q))
-    nothing = np.empty((len(index), 0))
-    out = np.empty((len(index), n_record))
-    angle, n_lost, broken = 0.0, 0, -1
-    for width, first, n_steps, target in (
-        (coarse_step, (begin - n_settle + n_fine) * coarse, (n_settle - n_fine) * coarse, nothing),
-        (step, begin * fine, n_fine * fine - 1, nothing),
-        (step, -margin * fine - 1, n_record, out),
-    ):
-        angle = q[2]
-        n_lost, broken = _kernels.integrate(arrays, mesh, q, v, width, first, n_steps, index, target, *scratch)
-        if broken >= 0:
-            break
-    if broken >= 0:
-        raise SimulationError(
-            f"the motion stopped being finite (speed {dynamics.operating.speed * 30 / math.pi:g} r/min, torque "
-            f"{dynamics.operating.torque:g} N m); raise solver.oversampling above {solver.oversampling}"
-        )
-    return Motion(
+    step = 1.0 / (sampling_rate * fine)
+    for dynamics in machines:
+        check_step(dynamics, step)
+    coarse = COARSE_OVERSAMPLING
+    if fine <= coarse or not all(_stable(dynamics, 1.0 / (sampling_rate * coarse)) for dynamics in machines):
+        coarse = fine
+    n_settle = [math.ceil(settling_time(dynamics) * sampling_rate) for dynamics in machines]
+    n_fine = math.ceil(FINE_SETTLING * sampling_rate)
+    n_record = (count_samples(duration, sampling_rate) + 2 * margin) * fine + 1
+    index = np.array([DOFS.index(name) for name in channels], dtype=np.int64)
+    run = _Run(machines, np.zeros((2, len(DOFS), LANES)), np.zeros(LANES), index)
+    nothing = np.empty(0)
+    end = -margin - n_fine  # output samples; time 0 is the first recorded one
+    group, coarse_step = pack(machines, 1.0 / (sampling_rate * coarse)), 1.0 / (sampling_rate * coarse)
+    now = min(end, end + n_fine - max(n_settle))
+    for begin in sorted({min(end, end + n_fine - n) for n in n_settle}):
+        run.advance(group, coarse_step, now * coarse, (begin - now) * coarse, nothing)
+        for lane, dynamics in enumerate(_lanes(machines)):
+            if min(end, end + n_fine - n_settle[lane % len(n_settle) if lane < len(n_settle) else 0]) == begin:
+                run.state[:, :, lane] = 0.0
+                run.state[0, :, lane] = dynamics.static_start(begin / sampling_rate)
+        now = begin
+    run.advance(group, coarse_step, now * coarse, (end - now) * coarse, nothing)
+    group = pack(machines, step)
+    run.advance(group, step, end * fine, n_fine * fine - 1, nothing)
+    angle, run.lost = run.state[0, DOFS.index("pinion_rotation")].copy(), np.zeros(LANES)
+    out = np.empty((len(index), n_record, LANES))
+    run.advance(group, step, -margin * fine - 1, n_record, out)
+    turned = run.state[0, DOFS.index("pinion_rotation")] - angle
+    speed = np.array([dynamics.operating.speed for dynamics in _lanes(machines)])
+    return Motions(
         acceleration=out,
-        step=step,
-        mean_speed=dynamics.operating.speed + (q[2] - angle) / (n_record * step),
-        contact_loss_fraction=n_lost / n_record,
+        mean_speed=speed + turned / (n_record * step),
+        contact_loss_fraction=run.lost / n_record,
+        finite=np.asarray(np.isfinite(run.state).all(axis=(0, 1))),
     )
+
+
+def _lanes(machines: Sequence[PairDynamics]) -> list[PairDynamics]:
+    """One machine a lane; lanes without one repeat the first."""
+    return [*machines, *[machines[0]] * (LANES - len(machines))]
 
 
 def _stable(dynamics: PairDynamics, step: float) -> bool:

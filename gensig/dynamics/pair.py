@@ -8,11 +8,11 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
-from gensig.dynamics._kernels import MeshArrays, MeshNumbers
+from gensig.dynamics._mesh_kernels import FAR_NEAR
 from gensig.dynamics.system import LumpedSystem
 from gensig.errors import ConfigError
 from gensig.mesh.load_distribution import PairStates, pair_states, static_mesh
-from gensig.mesh.pair_table import GearTable, PairTable
+from gensig.mesh.pair_table import PairTable
 from gensig.operating import Operating
 from gensig.units import split_unit, unit
 
@@ -137,49 +137,41 @@ class PairDynamics:
             ).mean()
         )
 
-    def arrays(self, step: float) -> MeshArrays:
-        """The mesh as the compiled integrator takes it."""
+    def numbers(self, step: float) -> tuple[float, ...]:
+        """The mesh as numbers, in the order of the rows of ``_mesh_kernels.Group.numbers``."""
         table, options, pair = self.table, self.table.options, self.table.pair
         viscous = 2.0 * options.damping_ratio * math.sqrt(self.mean_mesh_stiffness() * self.equivalent_mass)
-        one_sided = options.law == "one_sided"
-        numbers = MeshNumbers(
-            pinion_x=0,
-            pinion_y=1,
-            pinion_rotation=2,
-            wheel_x=3,
-            wheel_y=4,
-            wheel_rotation=5,
-            pinion_radius=pair.pinion.base_radius,
-            wheel_radius=pair.wheel.base_radius,
-            pitch=pair.base_pitch,
-            nodes_per_meter=options.points_per_pitch / pair.base_pitch,
-            path=pair.path_of_contact,
-            pitch_point=pair.pitch_point,
-            start_curvature=pair.start_curvature_radius,
-            tangent_length=pair.tangent_length,
-            shared=table.shared_compliance,
-            one_sided=one_sided,
-            consistent=options.roll_torque == "consistent",
-            damping=viscous / self.mesh_force if one_sided else viscous,
-            friction=options.friction_coefficient,
-            friction_half_width=0.5 * options.friction_transition * pair.base_pitch,
-            switch_half_width=0.5 * pair.pinion.base_radius * self.operating.speed * step,
-            backlash=pair.backlash,
-            start_pinion=self.start_tooth_pinion,
-            start_wheel=self.start_tooth_wheel,
-            start_roll=self.start_roll,
-            speed=self.operating.speed,
+        return (
+            pair.pinion.base_radius,
+            pair.wheel.base_radius,
+            pair.base_pitch,
+            1.0 / pair.base_pitch,
+            options.points_per_pitch / pair.base_pitch,
+            pair.path_of_contact,
+            pair.pitch_point,
+            pair.start_curvature_radius,
+            pair.tangent_length,
+            table.shared_compliance,
+            viscous / self.mesh_force if options.law == "one_sided" else viscous,
+            options.friction_coefficient,
+            2.0 / (options.friction_transition * pair.base_pitch),
+            2.0 / (pair.pinion.base_radius * self.operating.speed * step),
+            pair.backlash,
+            self.start_roll,
+            self.operating.speed,
+            *self._near_positions(),
         )
-        n_pinion_rows = len(table.pinion.compliance)
-        return MeshArrays(
-            numbers=numbers,
-            table=np.concatenate([_columns(table.pinion), _columns(table.wheel)]),
-            pinion_row=_rows(table.pinion, 0),
-            wheel_row=_rows(table.wheel, n_pinion_rows),
-            pinion_error=self.pinion_error,
-            wheel_error=self.wheel_error,
-            sound_wheel_row=n_pinion_rows,
-        )
+
+    def _near_positions(self) -> tuple[float, float]:
+        """Positions s outside of which no pair comes within ``FAR_NEAR`` of touching, m."""
+        table = self.table
+        nearest = [
+            side.gap[side.present].min(axis=0) + error.min()
+            for side, error in ((table.pinion, self.pinion_error), (table.wheel, self.wheel_error))
+        ]
+        near = np.flatnonzero(nearest[0] + nearest[1] < FAR_NEAR)
+        first, last = max(near[0] - 1, 0), min(near[-1] + 1, len(table.position) - 1)
+        return float(table.position[first]), float(table.position[last])
 
     def friction_torque(self) -> float:
         """Mean friction torque reduced to the pinion, from the static loads over one base pitch, N m."""
@@ -207,13 +199,3 @@ class PairDynamics:
         return pair_states(
             self.table, roll, start_tooth_pinion=self.start_tooth_pinion, start_tooth_wheel=self.start_tooth_wheel
         )
-
-
-def _columns(side: GearTable) -> Array:
-    """Table columns [c, c', g, g'], (distinct, node, 4)."""
-    return np.stack([side.compliance, side.compliance_slope, side.gap, side.gap_slope], axis=-1)
-
-
-def _rows(side: GearTable, offset: int) -> NDArray[np.int64]:
-    """Table row of every tooth, -1 for a missing one, (tooth,)."""
-    return np.where(side.present[side.kind], side.kind + offset, -1)

@@ -7,7 +7,6 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
-from gensig.dynamics._kernels import SystemArrays
 from gensig.errors import SimulationError
 
 Array = NDArray[np.float64]
@@ -36,21 +35,6 @@ class LumpedSystem:
                 raise SimulationError(f"the {what} matrix is not symmetric")
             if np.linalg.eigvalsh(matrix).min() < -1e-9 * max(1.0, float(np.abs(matrix).max())):
                 raise SimulationError(f"the {what} matrix would feed energy in; check the signs of the supports")
-
-    def arrays(self) -> SystemArrays:
-        """The system as the compiled integrator takes it."""
-        rows_k, columns_k = (np.ascontiguousarray(index) for index in np.nonzero(self.stiffness))
-        rows_c, columns_c = (np.ascontiguousarray(index) for index in np.nonzero(self.damping))
-        return SystemArrays(
-            inverse_mass=1.0 / self.mass,
-            stiffness_row=rows_k,
-            stiffness_column=columns_k,
-            stiffness_value=self.stiffness[rows_k, columns_k],
-            damping_row=rows_c,
-            damping_column=columns_c,
-            damping_value=self.damping[rows_c, columns_c],
-            force=self.force,
-        )
 
 
 def eigenvalues(system: LumpedSystem, direction: Array, mesh_stiffness: float) -> NDArray[np.complex128]:

@@ -9,9 +9,10 @@ from functools import lru_cache
 import numpy as np
 from numpy.typing import NDArray
 
+from gensig.dynamics._vector import LANES
 from gensig.dynamics.integrator import Solver, check_channels, check_step, count_samples, integrate
 from gensig.dynamics.pair import Body, PairDynamics, Support
-from gensig.errors import FaultError
+from gensig.errors import FaultError, SimulationError
 from gensig.faults.base import Fault, faulty_teeth
 from gensig.geometry.contact import GearPair
 from gensig.geometry.tooth import healthy_tooth
@@ -23,6 +24,7 @@ from gensig.operating import Operating
 from gensig.sensing.chain import Sensing
 from gensig.sensing.decimation import decimator
 from gensig.sensing.manufacturing import Gearbox, Quality, Specimen, nominal_gearbox, perfect_specimen
+from gensig.units import from_si
 
 Array = NDArray[np.float64]
 
@@ -124,23 +126,11 @@ class SpurPair:
         gearbox: Gearbox | None = None,
     ) -> CleanRecord:
         """Simulate one record; what is not given is perfect, nominal, and starts with teeth 0 at A."""
-        self.pair.require_continuous_drive()
-        begin = start or Start(tooth_pinion=0, tooth_wheel=0, phase=0.0)
-        gears = specimen or perfect_specimen(self.pair.pinion, self.pair.wheel)
-        housing = gearbox or nominal_gearbox(len(self.sensing.channels))
-        low_pass = decimator(self.solver.oversampling)
-        motion = integrate(
-            self._dynamics(faults, begin, gears, housing),
-            self.solver,
-            sampling_rate=self.sensing.sampling_rate,
-            channels=self.sensing.channels,
-            margin=low_pass.margin,
-        )
-        return CleanRecord(
-            acceleration=low_pass.apply(motion.acceleration) * housing.gain[:, None],
-            mean_speed=motion.mean_speed,
-            contact_loss_fraction=motion.contact_loss_fraction,
-        )
+        run = Run(system=self, faults=tuple(faults), start=start, specimen=specimen, gearbox=gearbox)
+        (record,) = simulate_together([run])
+        if isinstance(record, SimulationError):
+            raise record
+        return record
 
     def _dynamics(self, faults: Sequence[Fault], start: Start, specimen: Specimen, gearbox: Gearbox) -> PairDynamics:
         return PairDynamics(
@@ -207,6 +197,86 @@ def severity(faults: Sequence[Fault], pair: GearPair) -> float:
     if value > 1.0:
         raise FaultError(f"the fault's severity is {value:.3g}, above 1: it is larger than its tooth")
     return value
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class Run:
+    """One record to be simulated; what is None is perfect, nominal, and starts with teeth 0 at A."""
+
+    system: SpurPair
+    faults: tuple[Fault, ...]
+    start: Start | None = None
+    specimen: Specimen | None = None
+    gearbox: Gearbox | None = None
+
+    @property
+    def kind(self) -> tuple[object, ...]:
+        """What runs that are simulated side by side share."""
+        system = self.system
+        sensing = (system.sensing.sampling_rate, system.sensing.channels, system.operating.duration)
+        return (*sensing, system.solver, system.mesh.law, system.mesh.roll_torque)
+
+    def dynamics(self) -> PairDynamics:
+        """The equations of motion."""
+        system, pair = self.system, self.system.pair
+        pair.require_continuous_drive()
+        return system._dynamics(
+            self.faults,
+            self.start or Start(tooth_pinion=0, tooth_wheel=0, phase=0.0),
+            self.specimen or perfect_specimen(pair.pinion, pair.wheel),
+            self.gearbox or nominal_gearbox(len(system.sensing.channels)),
+        )
+
+
+def simulate_together(runs: Sequence[Run]) -> list[CleanRecord | SimulationError]:
+    """Simulate records in groups of those that share rate, duration and law, side by side; in the order given.
+
+    A record's bits do not depend on what it is simulated beside. A motion that does not stay finite gives its error in
+    place of its record.
+    """
+    found: dict[int, CleanRecord | SimulationError] = {}
+    kinds: dict[tuple[object, ...], list[int]] = {}
+    for place, run in enumerate(runs):
+        kinds.setdefault(run.kind, []).append(place)
+    for places in kinds.values():
+        for first in range(0, len(places), LANES):
+            group = places[first : first + LANES]
+            found.update(zip(group, _side_by_side([runs[place] for place in group]), strict=True))
+    return [found[place] for place in range(len(runs))]
+
+
+def _side_by_side(runs: Sequence[Run]) -> list[CleanRecord | SimulationError]:
+    system = runs[0].system
+    low_pass = decimator(system.solver.oversampling)
+    motions = integrate(
+        [run.dynamics() for run in runs],
+        system.solver,
+        sampling_rate=system.sensing.sampling_rate,
+        duration=system.operating.duration,
+        channels=system.sensing.channels,
+        margin=low_pass.margin,
+    )
+    signals = low_pass.apply(motions.acceleration)
+    records: list[CleanRecord | SimulationError] = []
+    for lane, run in enumerate(runs):
+        gain = 1.0 if run.gearbox is None else run.gearbox.gain[:, None]
+        operating = run.system.operating
+        if motions.finite[lane]:
+            records.append(
+                CleanRecord(
+                    acceleration=signals[lane] * gain,
+                    mean_speed=float(motions.mean_speed[lane]),
+                    contact_loss_fraction=float(motions.contact_loss_fraction[lane]),
+                )
+            )
+        else:
+            records.append(
+                SimulationError(
+                    f"the motion stopped being finite (speed {from_si('speed_rpm', operating.speed):g} r/min, torque "
+                    f"{operating.torque:g} N m); raise solver.oversampling above {system.solver.oversampling}"
+                )
+            )
+    return records
 
 
 @lru_cache(maxsize=32)

@@ -1,0 +1,66 @@
+"""A fake data set with the interface of ``gensig.stream``: no physics, any process makes the same records."""
+
+from dataclasses import dataclass, replace
+from typing import Any
+
+import numpy as np
+from fake_dataset import FakeDataset
+
+
+@dataclass(frozen=True)
+class FakeRecord:
+    signals: dict[str, np.ndarray]
+    values: dict[str, Any]
+
+
+@dataclass(frozen=True)
+class FakeStream:
+    """Four classes a condition; another epoch is another seed; records in ``failed`` are marked so."""
+
+    epoch: int = 0
+    numbers: tuple[int, ...] = tuple(range(16))
+    failed: tuple[int, ...] = ()
+    noise: float = 0.5
+
+    @property
+    def dataset(self):
+        return FakeDataset(n_units=4, records_per_unit=4, n_channels=2, noise=self.noise, seed=self.epoch)
+
+    def __getattr__(self, name):
+        if name in ("class_names", "channel_names", "n_samples", "protocols"):
+            return getattr(self.dataset, name)
+        raise AttributeError(name)
+
+    @property
+    def seed(self):
+        return self.epoch
+
+    @property
+    def usable(self):
+        return np.ones(len(self), dtype=bool)
+
+    def column(self, name):
+        return self.dataset.column(name)[list(self.numbers)]
+
+    def split(self, protocol):
+        assert len(self) == 16
+        return self.dataset.split(protocol)
+
+    def take(self, places):
+        return replace(self, numbers=tuple(self.numbers[place] for place in places))
+
+    def shard(self, index, count):
+        return replace(self, numbers=tuple(number for number in self.numbers if number // 4 % count == index))
+
+    def at_epoch(self, epoch):
+        return replace(self, epoch=epoch)
+
+    def __len__(self):
+        return len(self.numbers)
+
+    def __iter__(self):
+        dataset = self.dataset
+        for number in self.numbers:
+            values = {"record_id": str(dataset.column("record_id")[number])}
+            values["status"] = "failed" if number in self.failed else "ok"
+            yield FakeRecord(signals={"acceleration": dataset.signals(number)}, values=values)
