@@ -16,7 +16,7 @@ from gensig.dataset.schema import COLUMNS, DEFAULTS
 from gensig.dataset.splits import SUBSETS, make_splits
 from gensig.errors import ConfigError, DatasetError
 from gensig.planning import make_plan
-from gensig.records import Record, read_seed, simulate_record, whole_number
+from gensig.records import Record, read_seed, simulate_records, whole_number
 
 LANES = 4  # records simulated at a time
 EPOCH_STREAM = 9100  # spawn key of the seeds of later epochs; the causes of a record and the splits have others
@@ -186,7 +186,7 @@ def _at_epoch(config: Mapping[str, Any], epoch: int) -> dict[str, Any]:
 
 def _simulate(config: Mapping[str, Any], rows: Sequence[Mapping[str, Any]]) -> list[Record]:
     """Records of some rows of a plan: the one place where this module simulates."""
-    return [_as_stored(simulate_record(config, row)) for row in rows]
+    return [_as_stored(record) for record in simulate_records(config, rows)]
 
 
 def _as_stored(record: Record) -> Record:
