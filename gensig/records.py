@@ -143,6 +143,7 @@ def _finish(
             "speed_rpm": speed_rpm,
             "mesh_frequency_hz": speed_rpm / 60.0 * system.pair.pinion.n_teeth,
             "contact_loss_fraction": result.contact_loss_fraction,
+            "integration_error": result.integration_error,
         }
     noisy = add_noise(clean, noise_power, stream(seed, Stream.NOISE, index))
     signals: dict[str, NDArray[Any]] = {

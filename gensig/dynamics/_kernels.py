@@ -11,6 +11,7 @@ import numpy as np
 from gensig.dynamics import _mesh_kernels as mesh
 from gensig.dynamics._mesh_kernels import N_SLOTS, ROLL, SLOT_ROWS, WANTED, at_row, gather, mesh_law
 from gensig.dynamics._vector import LANES, any_above, compiled, inlined, load, spread, store, where_above
+from gensig.mesh.pair_table import N_PAIRS
 
 SUBSTEPS = 8
 
@@ -198,6 +199,16 @@ def _take_parted(work, near, flags, parted_slot, slot, rolls, single, parted, si
             work[(slot * SLOT_ROWS + row) * LANES + lane] = work[(parted_slot * SLOT_ROWS + row) * LANES + lane]
         work[(rolls + slot) * LANES + lane] = work[(rolls + parted_slot) * LANES + lane]
         near[slot * LANES + lane] = near[parted_slot * LANES + lane]
+    # a lane may have brought more pairs than any had here: what lies behind the others' must be nobody
+    for lane in range(LANES):
+        for k in range(near[slot * LANES + lane], N_PAIRS):
+            here = (slot * SLOT_ROWS + k * mesh.N_KEPT) * LANES + lane
+            work[here + mesh.OWN * LANES] = 1.0
+            work[here + mesh.STIFFNESS * LANES] = 1.0
+            work[here + mesh.OWN_SLOPE * LANES] = 0.0
+            work[here + mesh.GAP * LANES] = mesh.FAR
+            work[here + mesh.GAP_SLOPE * LANES] = 0.0
+            work[here + mesh.POSITION * LANES] = -mesh.FAR
 
 
 def scratch(n_dof, n_channels):

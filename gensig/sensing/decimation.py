@@ -15,6 +15,7 @@ Array = NDArray[np.float64]
 
 PASS_SHARE = 0.390625  # 20 kHz of 51.2 kHz
 ATTENUATION_DB = 100.0
+LOWEST_HZ = 20.0
 
 
 def usable_band(sampling_rate: float) -> tuple[float, float]:
@@ -68,3 +69,21 @@ def decimator(oversampling: int) -> Decimator:
     gain = np.append(1.0 / np.sinc(frequency[:65] / oversampling), [0.0, 0.0])
     taps = firwin2(2 * margin * oversampling, frequency, gain, nfreqs=16385, window=("kaiser", beta), fs=2.0 * nyquist)
     return Decimator(taps, oversampling, margin)
+
+
+def in_band_error(found: Array, exact: Array, sampling_rate: float) -> Array:
+    """Largest relative error of a channel's spectrum from 20 Hz to the end of the usable band, (lane,).
+
+    Parameters
+    ----------
+    found, exact : (lane, channel, sample)
+
+    Under a Hann window; 0 for channels that are still.
+    """
+    n_samples = exact.shape[-1]
+    frequency = np.fft.rfftfreq(n_samples, 1.0 / sampling_rate)
+    inside = (frequency >= LOWEST_HZ) & (frequency <= usable_band(sampling_rate)[1])
+    window = np.hanning(n_samples)
+    spectra = [np.fft.rfft(signal * window, axis=-1)[..., inside] for signal in (found - exact, exact)]
+    off, level = (np.linalg.norm(spectrum, axis=-1) for spectrum in spectra)
+    return np.asarray(np.divide(off, level, out=np.zeros_like(off), where=level > 0.0).max(axis=-1))

@@ -10,7 +10,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from gensig.dynamics._vector import LANES
-from gensig.dynamics.integrator import Solver, check_channels, check_step, count_samples, integrate
+from gensig.dynamics.integrator import FINEST, Solver, check_channels, check_step, count_samples, integrate
 from gensig.dynamics.pair import Body, PairDynamics, Support
 from gensig.errors import FaultError, SimulationError
 from gensig.faults.base import Fault, faulty_teeth
@@ -22,7 +22,7 @@ from gensig.mesh.options import MeshOptions
 from gensig.mesh.pair_table import PairTable, flank_sides, slice_bending, structural_terms
 from gensig.operating import Operating
 from gensig.sensing.chain import Sensing
-from gensig.sensing.decimation import decimator
+from gensig.sensing.decimation import decimator, in_band_error
 from gensig.sensing.manufacturing import Gearbox, Quality, Specimen, nominal_gearbox, perfect_specimen
 from gensig.units import from_si
 
@@ -45,6 +45,7 @@ class CleanRecord:
     acceleration: Array
     mean_speed: float
     contact_loss_fraction: float
+    integration_error: float
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -216,6 +217,11 @@ class Run:
         sensing = (system.sensing.sampling_rate, system.sensing.channels, system.operating.duration)
         return (*sensing, system.solver, system.mesh.law, system.mesh.roll_torque)
 
+    def finer(self) -> Run:
+        """The same at half the step."""
+        solver = self.system.solver
+        return replace(self, system=replace(self.system, solver=replace(solver, oversampling=2 * solver.oversampling)))
+
     def dynamics(self) -> PairDynamics:
         """The equations of motion."""
         system, pair = self.system, self.system.pair
@@ -242,7 +248,17 @@ def simulate_together(runs: Sequence[Run]) -> list[CleanRecord | SimulationError
         for first in range(0, len(places), LANES):
             group = places[first : first + LANES]
             found.update(zip(group, _side_by_side([runs[place] for place in group]), strict=True))
+    coarse = [place for place, record in found.items() if _is_too_coarse(runs[place], record)]
+    if coarse:
+        found.update(zip(coarse, simulate_together([runs[place].finer() for place in coarse]), strict=True))
     return [found[place] for place in range(len(runs))]
+
+
+def _is_too_coarse(run: Run, record: CleanRecord | SimulationError) -> bool:
+    solver = run.system.solver
+    if isinstance(record, SimulationError) or solver.max_error is None or 2 * solver.oversampling > FINEST:
+        return False
+    return record.integration_error > solver.max_error
 
 
 def _side_by_side(runs: Sequence[Run]) -> list[CleanRecord | SimulationError]:
@@ -257,6 +273,10 @@ def _side_by_side(runs: Sequence[Run]) -> list[CleanRecord | SimulationError]:
         margin=low_pass.margin,
     )
     signals = low_pass.apply(motions.acceleration)
+    errors = np.full(len(signals), np.nan)
+    if motions.check.size:
+        exact = decimator(2 * system.solver.oversampling).apply(motions.check)
+        errors = in_band_error(signals[:, :, : exact.shape[2]], exact, system.sensing.sampling_rate)
     records: list[CleanRecord | SimulationError] = []
     for lane, run in enumerate(runs):
         gain = 1.0 if run.gearbox is None else run.gearbox.gain[:, None]
@@ -267,6 +287,7 @@ def _side_by_side(runs: Sequence[Run]) -> list[CleanRecord | SimulationError]:
                     acceleration=signals[lane] * gain,
                     mean_speed=float(motions.mean_speed[lane]),
                     contact_loss_fraction=float(motions.contact_loss_fraction[lane]),
+                    integration_error=float(errors[lane]),
                 )
             )
         else:
