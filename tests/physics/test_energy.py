@@ -5,9 +5,9 @@ from typing import NamedTuple
 import numpy as np
 import pytest
 from fault_cases import one
+from lane_tools import advance, laws, right_hand_side, trajectory
 from numpy.testing import assert_allclose
 
-from gensig.dynamics import _kernels
 from gensig.faults.broken import MissingTooth
 
 SAMPLING_RATE = 51200.0
@@ -36,33 +36,16 @@ class Balance(NamedTuple):
         return self.energy - self.energy[0] - work
 
 
-def trajectory(dynamics, oversampling=OVERSAMPLING):
-    """q and v at every internal step, (step, dof), from static equilibrium."""
+def balance(dynamics, oversampling=OVERSAMPLING):
+    """From static equilibrium."""
     step = 1 / (SAMPLING_RATE * oversampling)
-    system, mesh = dynamics.system().arrays(), dynamics.arrays(step)
-    q, v = dynamics.static_start(0.0), np.zeros(6)
-    scratch, work, nothing, channel = *_kernels.work_arrays(6), np.empty((1, 0)), np.array([0])
-    states = [(q.copy(), v.copy())]
-    for n in range(round(DURATION / step)):
-        _kernels.integrate(system, mesh, q, v, step, n, 1, channel, nothing, scratch, work)
-        states.append((q.copy(), v.copy()))
-    return (*(np.array(part) for part in zip(*states, strict=True)), mesh, step)
-
-
-def balance(dynamics):
-    q, v, mesh, step = trajectory(dynamics)
-    system, m, work = dynamics.system(), mesh.numbers, _kernels.work_arrays(6)[1]
-    direction = dynamics.approach_direction()
-    time = np.arange(len(q)) * step
-    rolls = m.start_roll + m.pinion_radius * (m.speed * time + q[:, 2]), m.pinion_radius * (m.speed + v[:, 2])
-    law = np.array(
-        [
-            _kernels.mesh_law(*mesh, *values, work)
-            for values in zip(rolls[0], q @ direction, v @ direction, rolls[1], strict=True)
-        ]
-    )
-    _, friction, moment_p, moment_w, _, stored, lost = law.T
-    speeds = v + np.array([0, 0, m.speed, 0, 0, m.speed / dynamics.table.pair.ratio])
+    q, v = trajectory(dynamics, dynamics.static_start(0.0), np.zeros(6), step, round(DURATION / step))
+    system, direction, time = dynamics.system(), dynamics.approach_direction(), np.arange(len(q)) * step
+    radius, speed = dynamics.table.pair.pinion.base_radius, dynamics.operating.speed
+    roll, roll_rate = dynamics.start_roll + radius * (speed * time + q[:, 2]), radius * (speed + v[:, 2])
+    law = laws(dynamics, np.column_stack([roll, q @ direction, v @ direction, roll_rate]), step)
+    _, friction, moment_p, moment_w, _, stored, lost, _ = law.T
+    speeds = v + np.array([0, 0, speed, 0, 0, speed / dynamics.table.pair.ratio])
     k, c = np.diag(system.stiffness), np.diag(system.damping)
     springs = [0, 1, 3, 4]
     drive = system.force[2] - k[2] * q[:, 2] - c[2] * v[:, 2]
@@ -75,6 +58,17 @@ def balance(dynamics):
         stored=stored,
         step=step,
     )
+
+
+@pytest.mark.parametrize("name", FAULTS)
+def test_the_states_seen_are_those_of_a_run_in_one_go(machine, dynamics_of, name):
+    """The balance is that of what is recorded: the tables are read anew at every call."""
+    dynamics, step, n_steps = dynamics_of(machine(), FAULTS[name]), 1 / (SAMPLING_RATE * OVERSAMPLING), 4000
+    start = dynamics.static_start(0.0), np.zeros(6)
+    seen, whole = trajectory(dynamics, *start, step, n_steps), advance(dynamics, *start, step, 0, n_steps)
+    for one_by_one, at_once in zip(seen, whole[:2], strict=True):
+        scale = np.abs(one_by_one).max(axis=0)
+        assert_allclose(at_once / scale, one_by_one[-1] / scale, rtol=0, atol=1e-9)
 
 
 @pytest.fixture(scope="module", params=FAULTS)
@@ -123,30 +117,26 @@ def test_friction_dissipates(case):
 
 @pytest.mark.parametrize("seed", [1, 2])
 def test_friction_of_rigid_gears_dissipates_at_every_position(xiamen, dynamics_of, seed):
-    mesh = dynamics_of(xiamen).arrays(1e-6)
-    speed, ratio = xiamen.operating.speed, xiamen.pair.ratio
-    rng, work = np.random.default_rng(seed), _kernels.work_arrays(6)[1]
-    for roll in rng.uniform(0, 50, 500) * xiamen.pair.base_pitch:
-        rate = xiamen.pair.pinion.base_radius * speed
-        law = _kernels.mesh_law(*mesh, roll, rng.uniform(0, 20e-6), rng.normal(0, 1e-3), rate, work)
-        assert law[2] * speed + law[3] * speed / ratio <= 1e-9
-        assert law[6] >= 0
-        assert law[0] >= 0
+    speed, ratio, rng = xiamen.operating.speed, xiamen.pair.ratio, np.random.default_rng(seed)
+    roll, rate = rng.uniform(0, 50, 500) * xiamen.pair.base_pitch, xiamen.pair.pinion.base_radius * speed
+    motions = np.column_stack([roll, rng.uniform(0, 20e-6, 500), rng.normal(0, 1e-3, 500), np.full(500, rate)])
+    normal, _, moment_p, moment_w, _, _, lost, _ = laws(dynamics_of(xiamen), motions).T
+    assert np.all(moment_p * speed + moment_w * speed / ratio <= 1e-9)
+    assert np.all(lost >= 0)
+    assert np.all(normal >= 0)
 
 
 def test_action_equals_reaction(xiamen, dynamics_of):
     """The mesh puts opposite forces on the two gears, and friction on x as its normal force on y."""
     dynamics = dynamics_of(xiamen)
-    step, direction = 1e-7, dynamics.approach_direction()
-    system, mesh = dynamics.system(), dynamics.arrays(step)
+    system, direction = dynamics.system(), dynamics.approach_direction()
     rng = np.random.default_rng(3)
     for _ in range(50):
         q = rng.normal(0, 1e-6, 6)
         q[5] -= (rng.uniform(1e-6, 2e-5) - q @ direction) / xiamen.pair.wheel.base_radius
         v = rng.normal(0, 1e-3, 6)
-        found = np.empty(6)
-        _kernels.acceleration(*system.arrays(), *mesh, 0.0, q, v, found, _kernels.work_arrays(6)[1])
-        force = system.mass * found - system.force + system.stiffness @ q + system.damping @ v
+        acceleration = right_hand_side(dynamics, 0.0, q, v)
+        force = system.mass * acceleration - system.force + system.stiffness @ q + system.damping @ v
         assert force[1] > 0
         assert_allclose(force[1], -force[4], rtol=1e-9, atol=1e-6)
         assert_allclose(force[0], -force[3], rtol=1e-9, atol=1e-6)
@@ -159,13 +149,9 @@ def test_action_equals_reaction(xiamen, dynamics_of):
 def test_a_larger_approach_meets_a_larger_force_back(xiamen, dynamics_of):
     """Restoring: each gear is pushed so that the approach falls."""
     dynamics = dynamics_of(xiamen)
-    mesh = dynamics.arrays(1e-6)
+    approach = np.append(np.linspace(-20e-6, 20e-6, 41), -xiamen.pair.backlash - 5e-6)
     for roll in np.linspace(0.01, 0.99, 9) * xiamen.pair.base_pitch:
-        found = [
-            _kernels.mesh_law(*mesh, roll, a, 0.0, 4.0, _kernels.work_arrays(6)[1])[0]
-            for a in np.linspace(-20e-6, 20e-6, 41)
-        ]
+        *found, coast = laws(dynamics, [(roll, a, 0.0, 4.0) for a in approach])[:, 0]
         assert np.all(np.diff(found) >= 0)
         assert found[0] == pytest.approx(0.0, abs=0.0)
-        coast = _kernels.mesh_law(*mesh, roll, -xiamen.pair.backlash - 5e-6, 0.0, 4.0, _kernels.work_arrays(6)[1])[0]
         assert coast < -100

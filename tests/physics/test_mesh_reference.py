@@ -5,10 +5,13 @@ from itertools import chain, combinations
 import numpy as np
 import pytest
 from fault_cases import one
+from lane_tools import advance, group_laws, law_of, laws, right_hand_side, trajectory
 from numpy.testing import assert_allclose
 from scipy.integrate import solve_ivp
 
-from gensig.dynamics import _kernels
+from gensig.dynamics._mesh_kernels import DAMPING, SHARED
+from gensig.dynamics._vector import LANES
+from gensig.dynamics.lanes import pack
 from gensig.faults.broken import MissingTooth
 from gensig.faults.crack import Crack
 
@@ -22,7 +25,7 @@ FAULTS = {"healthy": (), "crack": (CRACK,), "missing": (MissingTooth(gear="wheel
 
 
 class Reference:
-    """Six equations of a pair, written as the theory has them; one-sided law, drive flank."""
+    """Six equations of a pair, written as the theory has them; one-sided law."""
 
     def __init__(self, dynamics, step):
         self.d, self.table, self.pair, self.options = (
@@ -32,7 +35,7 @@ class Reference:
             dynamics.table.options,
         )
         self.system = dynamics.system()
-        self.damping = dynamics.arrays(step).numbers.damping
+        self.damping = dynamics.numbers(step)[DAMPING]
 
     def pairs(self, roll):
         """Position, compliance, its slope, gap and its slope of every pair that exists, (pair,) each."""
@@ -96,6 +99,32 @@ class Reference:
             (load - elastic) @ pair_rate,
         )
 
+    def coast(self, roll, approach, rate, roll_rate):
+        """The same where the back flanks touch, and with the number of loaded pairs, which counts as negative.
+
+        The mirror image of a sound pair that turns backwards: its contact runs from where the back flanks of a space
+        half a pitch on stand, its teeth count down, missing ones stay missing; no errors, no friction.
+        """
+        pitch, position, n = self.pair.base_pitch, self.table.position, np.arange(-40, 41)
+        where = 2 * self.pair.pitch_point + 0.5 * pitch - roll - n * pitch
+        inside = (where >= position[0]) & (where < position[-1])
+        where, n = where[inside], n[inside]
+        sides = (self.table.pinion, self.d.start_tooth_pinion), (self.table.wheel, self.d.start_tooth_wheel)
+        there = np.all([side.present[side.kind[(start - n) % len(side.kind)]] for side, start in sides], axis=0)
+        c, c_slope, gap, gap_slope = (
+            sum(np.interp(where[there], position, getattr(side, name)[0]) for side, _ in sides)
+            for name in ("compliance", "compliance_slope", "gap", "gap_slope")
+        )
+        squeezed = -approach - self.pair.backlash
+        elastic = self.loads(c, gap, squeezed)
+        # backwards: both rates change sign, and so do the forces that answer
+        pair_rate = -rate - gap_slope * -roll_rate
+        load = np.maximum(0.0, elastic * (1 + self.damping * pair_rate))
+        own, shared = c - self.table.shared_compliance, self.table.shared_compliance
+        stored = elastic @ (squeezed - gap) - 0.5 * own @ elastic**2 - 0.5 * shared * elastic.sum() ** 2
+        along = -(load @ gap_slope + 0.5 * elastic**2 @ c_slope)
+        return -load.sum(), 0.0, 0.0, 0.0, along, stored, (load - elastic) @ pair_rate, -float(np.sum(load > 0))
+
     def acceleration(self, time, q, v, mesh=None):
         """q'' at one instant; ``mesh`` may stand in for the reference's own mesh law."""
         r_p, r_w = self.pair.pinion.base_radius, self.pair.wheel.base_radius
@@ -117,47 +146,82 @@ def dynamics(request, xiamen, dynamics_of):
 
 
 def random_states(dynamics, n, seed):
+    """Roll, approach, its rate and the roll's rate, (n, 4)."""
     rng = np.random.default_rng(seed)
     pitch, speed = dynamics.table.pair.base_pitch, dynamics.operating.speed * dynamics.table.pair.pinion.base_radius
-    return zip(
-        rng.uniform(0, 8, n) * pitch,
-        rng.uniform(-2e-6, 40e-6, n),
-        rng.normal(0, 2e-2, n),
-        rng.normal(speed, 0.01 * speed, n),
-        strict=True,
+    return np.column_stack(
+        [
+            rng.uniform(0, 8, n) * pitch,
+            rng.uniform(-2e-6, 40e-6, n),
+            rng.normal(0, 2e-2, n),
+            rng.normal(speed, 0.01 * speed, n),
+        ]
     )
 
 
 def test_mesh_law_agrees_for_random_states(dynamics):
-    reference, mesh, work = Reference(dynamics, 1e-6), dynamics.arrays(1e-6), _kernels.work_arrays(6)[1]
-    n_loaded = 0
-    for state in random_states(dynamics, 300, seed=7):
-        found, expected = np.array(_kernels.mesh_law(*mesh, *state, work)), np.array(reference.mesh(*state))
-        scale = np.array([1, 1, 0.1, 0.1, 1, 1e-5, 1e-2]) * max(1.0, expected[0])
-        assert_allclose(found / scale, expected / scale, rtol=1e-9, atol=1e-9)
-        n_loaded += expected[0] > 0
-    assert n_loaded > 200
+    reference, states = Reference(dynamics, 1e-6), random_states(dynamics, 300, seed=7)
+    found, expected = laws(dynamics, states)[:, :7], np.array([reference.mesh(*state) for state in states])
+    scale = np.array([1, 1, 0.1, 0.1, 1, 1e-5, 1e-2]) * np.maximum(1.0, expected[:, :1])
+    assert_allclose(found / scale, expected / scale, rtol=1e-9, atol=1e-9)
+    assert (expected[:, 0] > 0).sum() > 200
+
+
+def test_back_flanks_agree_for_random_states(dynamics):
+    reference, states, rng = Reference(dynamics, 1e-6), random_states(dynamics, 300, seed=17), np.random.default_rng(1)
+    states[:, 1] = -dynamics.table.pair.backlash - rng.uniform(0, 40e-6, 300)
+    found, expected = laws(dynamics, states), np.array([reference.coast(*state) for state in states])
+    scale = np.array([1, 1, 0.1, 0.1, 1, 1e-5, 1e-2, 1]) * np.maximum(1.0, -expected[:, :1])
+    assert_allclose(found / scale, expected / scale, rtol=1e-9, atol=1e-9)
+    assert (expected[:, 7] == -2).sum() > 50
+
+
+def test_between_the_flanks_there_is_nothing(dynamics):
+    """From half the backlash, where no tooth stands as proud, to the back flanks."""
+    states, rng = random_states(dynamics, 100, seed=18), np.random.default_rng(2)
+    states[:, 1] = -dynamics.table.pair.backlash * rng.uniform(0.5, 1.0, 100)
+    assert_allclose(laws(dynamics, states), 0.0, rtol=0, atol=0)
+
+
+@pytest.mark.parametrize("roll_torque", ["consistent", "classical"])
+def test_only_the_consistent_law_has_a_force_along_the_roll(machine, dynamics_of, roll_torque):
+    dynamics = dynamics_of(machine({"mesh.roll_torque": roll_torque}), (CRACK,))
+    states = random_states(dynamics, 40, seed=19)
+    states[1::2, 1] = -dynamics.table.pair.backlash - states[1::2, 1]
+    along = laws(dynamics, states)[:, 4]
+    assert np.any(along != 0) == (roll_torque == "consistent")
+
+
+def test_a_motion_against_the_back_flanks(machine, dynamics_of):
+    """Two teeth missing under a light load: the pinion runs ahead into the back flanks."""
+    light = machine({"operating.torque_nm": 2})
+    dynamics = dynamics_of(light, (MissingTooth(gear="pinion", tooth=3), MissingTooth(gear="pinion", tooth=4)))
+    step, direction = 1 / (51200 * 8), dynamics.approach_direction()
+    q, v = trajectory(dynamics, dynamics.static_start(0.0), np.zeros(6), step, 8000)
+    reference, backlash, n_seen = Reference(dynamics, step), light.pair.backlash, 0
+    for n in np.flatnonzero(q @ direction < -backlash):
+        expected = reference.acceleration(n * step, q[n], v[n], lambda *state: reference.coast(*state)[:7])
+        found = right_hand_side(dynamics, n * step, q[n], v[n])
+        assert_allclose(found, expected, rtol=1e-9, atol=1e-9 * np.abs(expected).max())
+        n_seen += 1
+    assert n_seen > 10
 
 
 def test_another_shared_compliance_would_show(dynamics):
-    mesh, work = dynamics.arrays(1e-6), _kernels.work_arrays(6)[1]
-    other = mesh._replace(numbers=mesh.numbers._replace(shared=1.001 * mesh.numbers.shared))
-    loads = [
-        [_kernels.mesh_law(*m, *state, work)[0] for m in (mesh, other)] for state in random_states(dynamics, 50, 7)
-    ]
-    one, two = np.array(loads).T
+    group, states = pack([dynamics], 1e-6), random_states(dynamics, 50, 7)
+    numbers = group.numbers.copy()
+    numbers[SHARED * LANES : (SHARED + 1) * LANES] *= 1.001
+    one, two = (group_laws(g, states)[:, 0] for g in (group, group._replace(numbers=numbers)))
     assert np.abs(one / np.maximum(two, 1e-9) - 1)[one > 100].max() > 1e-6
 
 
 def test_right_hand_side_agrees(dynamics):
-    step, rng = 1e-7, np.random.default_rng(11)
-    reference, system, mesh = Reference(dynamics, step), dynamics.system().arrays(), dynamics.arrays(step)
-    for first in rng.integers(0, 40_000, 40):
-        q = dynamics.static_start(first * step) + rng.normal(0, 1e-6, 6) * [1, 1, 20, 1, 1, 20]
+    reference, rng = Reference(dynamics, 1e-6), np.random.default_rng(11)
+    for time in rng.integers(0, 40_000, 40) * 1e-7:
+        q = dynamics.static_start(time) + rng.normal(0, 1e-6, 6) * [1, 1, 20, 1, 1, 20]
         v = rng.normal(0, 1e-2, 6) * [1, 1, 20, 1, 1, 20]
-        found, work = np.empty(6), _kernels.work_arrays(6)[1]
-        _kernels.acceleration(*system, *mesh, first * step, q, v, found, work)
-        expected = reference.acceleration(first * step, q, v)
+        expected = reference.acceleration(time, q, v)
+        found = right_hand_side(dynamics, time, q, v)
         assert_allclose(found, expected, rtol=1e-9, atol=1e-9 * np.abs(expected).max())
 
 
@@ -168,15 +232,12 @@ def test_one_millisecond_against_dop853(xiamen, dynamics_of):
     n_steps = round(duration / (64 * step)) * 64
     reference = Reference(dynamics, step)
     start = dynamics.static_start(0.0) + 1e-6 * np.array([1, 1, 0, -1, 1, 0])
-    stored = np.empty((6, n_steps))
-    q, v, mesh, work = start.copy(), np.zeros(6), dynamics.arrays(step), _kernels.work_arrays(6)[1]
-    _kernels.integrate(
-        dynamics.system().arrays(), mesh, q, v, step, 0, n_steps, np.arange(6), stored, np.empty((5, 6)), work
-    )
+    _, _, stored = advance(dynamics, start, np.zeros(6), step, 0, n_steps, tuple(range(6)))
+    law = law_of(dynamics, step)
     edges = np.arange(0, n_steps + 1, 64) * step
 
     def acceleration(t, y):
-        return reference.acceleration(t, y[:6], y[6:], lambda *state: _kernels.mesh_law(*mesh, *state, work))
+        return reference.acceleration(t, y[:6], y[6:], lambda *state: law(*state)[:7])
 
     solution = solve_ivp(
         lambda t, y: np.concatenate([y[6:], acceleration(t, y)]),
@@ -193,3 +254,47 @@ def test_one_millisecond_against_dop853(xiamen, dynamics_of):
     found = stored.reshape(6, -1, 64).mean(axis=2).T
     scale = np.sqrt(np.mean(expected**2, axis=0))
     assert_allclose(found / scale, expected / scale, rtol=0, atol=1e-4)
+
+
+def runge_kutta(reference, law, time, q, v, step, n_parts):
+    """The classical formula in ``n_parts``, on the compiled mesh law."""
+
+    def slope(t, y):
+        return np.concatenate([y[6:], reference.acceleration(t, y[:6], y[6:], lambda *state: law(*state)[:7])])
+
+    y, h = np.concatenate([q, v]), step / n_parts
+    for part in range(n_parts):
+        t = time + part * h
+        k1 = slope(t, y)
+        k2 = slope(t + 0.5 * h, y + 0.5 * h * k1)
+        k3 = slope(t + 0.5 * h, y + 0.5 * h * k2)
+        k4 = slope(t + h, y + h * k3)
+        y = y + h / 6 * (k1 + 2 * k2 + 2 * k3 + k4)
+    return y
+
+
+@pytest.mark.parametrize("oversampling", [5, 16])
+def test_a_step_with_an_entry_or_exit_is_taken_in_parts(xiamen, dynamics_of, oversampling):
+    """Every step of two mesh periods is one of Runge and Kutta's, or eight where a pair comes or goes."""
+    dynamics, step = dynamics_of(xiamen), 1 / (51200 * oversampling)
+    reference, law, direction = Reference(dynamics, step), law_of(dynamics, step), dynamics.approach_direction()
+    n_steps = round(2 / dynamics.mesh_frequency / step)
+    q, v = trajectory(dynamics, dynamics.static_start(0.0), np.zeros(6), step, n_steps)
+    states = np.hstack([q, v])
+    radius, speed = xiamen.pair.pinion.base_radius, xiamen.operating.speed
+    rolls = dynamics.start_roll + radius * (speed * np.arange(n_steps + 1) * step + q[:, 2])
+    motions = np.column_stack([rolls, q @ direction, v @ direction, radius * (speed + v[:, 2])])
+    loaded = laws(dynamics, motions, step)[:, 7]
+    events = np.flatnonzero(np.diff(loaded))
+    assert 3 <= len(events) <= 6
+    plain = np.setdiff1d(np.arange(0, n_steps, 3), np.concatenate([events - 1, events, events + 1]))
+    scale = np.abs(np.diff(states, axis=0)).max(axis=0)
+
+    def off(places, n_parts):
+        expected = [runge_kutta(reference, law, n * step, q[n], v[n], step, n_parts) for n in places]
+        return np.abs((states[places + 1] - expected) / scale).max(axis=1)
+
+    assert off(events, 8).max() < 1e-8
+    assert off(events, 1).min() > 1e-4
+    # between events the tables are read twice a step: the rest follows their slopes
+    assert off(plain, 1).max() < 5e-6

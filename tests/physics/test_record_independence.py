@@ -9,7 +9,7 @@ from numpy.testing import assert_allclose
 from gensig import records
 from gensig.config import read_request
 from gensig.planning import make_plan
-from gensig.records import simulate_record
+from gensig.records import simulate_record, simulate_records
 
 ORDER = (5, 0, 3, 6, 1, 7, 2, 4)
 
@@ -49,6 +49,28 @@ def test_alone_or_after_others_the_bits_are_the_same(config, plan, in_order):
     assert all(same(in_order[index], shuffled[index]) for index in ORDER)
     assert same(in_order[5], simulated(config, plan, [5])[5])
     assert not same(in_order[5], in_order[4])
+
+
+@pytest.mark.parametrize("size", [1, 3, 16])
+def test_in_blocks_the_bits_are_the_same(config, plan, in_order, size):
+    """However many are simulated side by side, twins with them, from a process that knows no twin or some."""
+    for known in (False, True):
+        if not known:
+            records._TWINS.clear()
+        rows = [plan.record(index) for index in ORDER]
+        found = [one for first in range(0, 8, size) for one in simulate_records(config, rows[first : first + size])]
+        assert [index for index, one in zip(ORDER, found, strict=True) if not same(one, in_order[index])] == []
+
+
+def test_one_that_cannot_be_leaves_its_block_alone(config, plan, in_order):
+    """A row whose step would be too long is a failed record, its neighbours' bits are theirs."""
+    rows = [plan.record(index) for index in range(4)]
+    rows[2] = {**rows[2], "params/operating.drive_frequency_hz": 1e6}
+    records._TWINS.clear()
+    found = simulate_records(config, rows)
+    assert [one.values.get("status") for one in found] == [None, None, "failed", None]
+    assert "solver.oversampling" in found[2].values["status_reason"]
+    assert all(same(found[index], in_order[index]) for index in (0, 1, 3))
 
 
 def test_a_longer_plan_of_the_same_draws_keeps_a_row(config, plan, in_order):

@@ -6,6 +6,8 @@ import numpy as np
 import pytest
 from numpy.testing import assert_allclose
 
+from gensig.dynamics._vector import LANES
+from gensig.dynamics.lanes import pack
 from gensig.dynamics.system import LumpedSystem, slowest_decay
 from gensig.errors import SimulationError
 
@@ -36,14 +38,22 @@ def test_systems_that_cannot_be(changes, text):
         two_masses(**changes)
 
 
-def test_triplets_hold_the_matrices():
-    system = two_masses()
-    arrays = system.arrays()
-    for matrix, part in ((system.stiffness, "stiffness"), (system.damping, "damping")):
-        rebuilt = np.zeros((2, 2))
-        rebuilt[getattr(arrays, f"{part}_row"), getattr(arrays, f"{part}_column")] = getattr(arrays, f"{part}_value")
-        assert_allclose(rebuilt, matrix, rtol=0, atol=0)
-    assert_allclose(arrays.inverse_mass, 1 / system.mass, rtol=1e-15, atol=0)
+def test_a_group_holds_the_matrices_of_each_machine(machine, dynamics_of):
+    """Also where a machine lacks an entry that its neighbour has; an empty lane repeats the first."""
+    soft = {"gear.pinion.support.stiffness_x_n_per_m": 0.0, "gear.wheel.support.damping_y_ns_per_m": 0.0}
+    stiff = {"gear.pinion.support.stiffness_x_n_per_m": 9e5, "operating.torque_nm": 31.0}
+    machines = [dynamics_of(machine(changes)) for changes in (soft, {}, stiff)]
+    group, n = pack(machines, 1e-6), 6
+    for lane, dynamics in enumerate([*machines, machines[0]]):
+        system = dynamics.system()
+        for matrix, part in ((system.stiffness, "stiffness"), (system.damping, "damping")):
+            rebuilt = np.zeros((n, n))
+            rebuilt[getattr(group, f"{part}_row"), getattr(group, f"{part}_column")] = getattr(group, f"{part}_value")[
+                lane::LANES
+            ]
+            assert_allclose(rebuilt, matrix, rtol=0, atol=0)
+        assert_allclose(group.inverse_mass[lane::LANES], 1 / system.mass, rtol=1e-15, atol=0)
+        assert_allclose(group.force[lane::LANES], system.force, rtol=0, atol=0)
 
 
 def test_slowest_decay_of_an_oscillator():

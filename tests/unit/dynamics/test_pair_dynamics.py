@@ -6,9 +6,9 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
+from lane_tools import laws
 from numpy.testing import assert_allclose
 
-from gensig.dynamics import _kernels
 from gensig.dynamics.integrator import Solver, integrate, settling_time
 from gensig.dynamics.pair import Support, solid_disc
 from gensig.errors import ConfigError, SimulationError
@@ -17,18 +17,19 @@ from gensig.systems.spur_pair import Start
 
 
 def run(system, dynamics, **changes):
-    values = {"sampling_rate": 51200.0, "channels": ("pinion_y",), "margin": 4, **changes}
-    return integrate(dynamics, values.pop("solver", system.solver), **values)
+    values = {"sampling_rate": 51200.0, "duration": system.operating.duration, "channels": ("pinion_y",), "margin": 4}
+    values.update(changes)
+    return integrate([dynamics], values.pop("solver", system.solver), **values)
 
 
 @pytest.mark.parametrize("phase", [0.0, 0.4, 0.9])
 def test_static_start_is_in_equilibrium_along_the_line_of_action(xiamen, dynamics_of, phase):
     dynamics = dynamics_of(xiamen, phase=phase)
     q, direction = dynamics.static_start(0.0), dynamics.approach_direction()
-    law = _kernels.mesh_law(*dynamics.arrays(1e-6), dynamics.start_roll, q @ direction, 0.0, 0.0, np.empty((6, 4)))
-    assert_allclose(law[0], dynamics.mesh_force, rtol=1e-6, atol=0)
+    force = laws(dynamics, [(dynamics.start_roll, q @ direction, 0.0, 0.0)])[0, 0]
+    assert_allclose(force, dynamics.mesh_force, rtol=1e-6, atol=0)
     system = dynamics.system()
-    assert_allclose(system.stiffness[[1, 4], [1, 4]] * q[[1, 4]], [law[0], -law[0]], rtol=1e-6, atol=0)
+    assert_allclose(system.stiffness[[1, 4], [1, 4]] * q[[1, 4]], [force, -force], rtol=1e-6, atol=0)
 
 
 def test_reduced_values(xiamen, dynamics_of):

@@ -1,9 +1,12 @@
 """The low-pass before decimation: flat, free of folded content, without delay."""
 
+from dataclasses import replace
+
 import numpy as np
 import pytest
 from numpy.testing import assert_allclose
 
+from gensig.dynamics._vector import LANES
 from gensig.sensing.decimation import decimator, usable_band
 
 RATE = 51200.0
@@ -15,6 +18,11 @@ def oversampling(request):
     return request.param
 
 
+def side_by_side(signals):
+    """(channel, step) in the first lane, something else in the others."""
+    return np.stack([signals, -signals, signals + 1.0, 0.0 * signals], axis=-1)
+
+
 def decimated(frequency, oversampling, phase=0.4):
     """A sine, as means over internal steps, through the decimator, and the same sine sampled at the output rate."""
     low_pass = decimator(oversampling)
@@ -23,7 +31,8 @@ def decimated(frequency, oversampling, phase=0.4):
     turn = 2 * np.pi * frequency
     integral = -np.cos(turn * edge + phase) / turn if frequency else edge * np.sin(phase)
     signal = np.diff(integral) * RATE * oversampling
-    return low_pass.apply(signal[None])[0], np.sin(2 * np.pi * frequency * np.arange(N_SAMPLES) / RATE + phase)
+    found = low_pass.apply(side_by_side(signal[None]))[0, 0]
+    return found, np.sin(2 * np.pi * frequency * np.arange(N_SAMPLES) / RATE + phase)
 
 
 @pytest.mark.parametrize("frequency", [0.0, 31.0, 690.0, 9000.0, 15_000.0, 20_000.0])
@@ -52,7 +61,31 @@ def test_without_the_filter_it_would_fold(oversampling):
 def test_length_and_channels(n_samples, oversampling):
     low_pass = decimator(oversampling)
     signal = np.zeros((3, (n_samples + 2 * low_pass.margin) * oversampling + 1))
-    assert low_pass.apply(signal).shape == (3, n_samples)
+    assert low_pass.apply(side_by_side(signal)).shape == (LANES, 3, n_samples)
+
+
+@pytest.mark.parametrize("n_samples", [1, 37])
+def test_channels_and_lanes_are_filtered_by_themselves(n_samples, oversampling):
+    """Against the plain sum of taps times means, whatever number of taps is left over after the fours."""
+    low_pass, rng = decimator(oversampling), np.random.default_rng(2)
+    for taps in (low_pass.taps, low_pass.taps[:-1], low_pass.taps[:-3]):
+        means = rng.standard_normal((3, (n_samples + 2 * low_pass.margin) * oversampling + 1, LANES))
+        expected = [
+            [[taps @ means[c, 1 + s * oversampling :, lane][: len(taps)] for s in range(n_samples)] for c in range(3)]
+            for lane in range(LANES)
+        ]
+        assert_allclose(replace(low_pass, taps=taps).apply(means), expected, rtol=0, atol=1e-14)
+
+
+@pytest.mark.parametrize("lane", range(LANES))
+def test_a_lane_that_is_not_finite_leaves_the_others_their_bits(lane, oversampling):
+    low_pass, rng = decimator(oversampling), np.random.default_rng(3)
+    means = rng.standard_normal((2, (20 + 2 * low_pass.margin) * oversampling + 1, LANES))
+    clean, others = low_pass.apply(means), [k for k in range(LANES) if k != lane]
+    means[:, 7:, lane] = np.nan
+    spoilt = low_pass.apply(means)
+    assert spoilt[others].tobytes() == clean[others].tobytes()
+    assert np.isnan(spoilt[lane]).all()
 
 
 def test_taps_are_symmetric_and_reach_the_margin(oversampling):
