@@ -23,7 +23,8 @@ from scipy.integrate import solve_ivp
 from gensig import records
 from gensig.config import read_request
 from gensig.dynamics import _kernels
-from gensig.dynamics._mesh_kernels import N_LAW, law_at
+from gensig.dynamics._kernels import law_at
+from gensig.dynamics._mesh_kernels import N_LAW
 from gensig.dynamics._vector import LANES
 from gensig.dynamics.lanes import pack
 from gensig.dynamics.pair import PairDynamics
@@ -58,7 +59,9 @@ def kernel_rate(machines: list[PairDynamics], oversampling: int, runs: int) -> f
     return (
         len(machines)
         * seconds
-        / least(lambda: _kernels.integrate(group, flat, lost, step, 0, n_steps, channels, out, *work), runs)
+        / least(
+            lambda: _kernels.integrate(group, flat, lost, np.ones(LANES), step, 0, n_steps, channels, out, *work), runs
+        )
     )
 
 

@@ -7,7 +7,8 @@ from collections.abc import Callable
 import numpy as np
 
 from gensig.dynamics import _kernels
-from gensig.dynamics._mesh_kernels import N_LAW, Group, law_at
+from gensig.dynamics._kernels import law_at
+from gensig.dynamics._mesh_kernels import N_LAW, Group
 from gensig.dynamics._vector import LANES
 from gensig.dynamics.lanes import pack
 from gensig.dynamics.pair import DOFS, PairDynamics
@@ -67,7 +68,9 @@ def _advance(group, q, v, step, first_step, n_steps, channels=()):
     state = np.repeat(np.array([q, v], dtype=np.float64)[:, :, None], LANES, axis=2)
     means = np.empty((len(index), n_steps, LANES))
     scratch = _kernels.scratch(len(DOFS), len(index))
-    _kernels.integrate(group, state.ravel(), np.zeros(LANES), step, first_step, n_steps, index, means.ravel(), *scratch)
+    _kernels.integrate(
+        group, state.ravel(), np.zeros(LANES), np.ones(LANES), step, first_step, n_steps, index, means.ravel(), *scratch
+    )
     return state[0, :, 0].copy(), state[1, :, 0].copy(), means[:, :, 0].copy()
 
 

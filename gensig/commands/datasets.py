@@ -82,19 +82,18 @@ def _closing_line(
 def plan(arguments: Namespace) -> int:
     """Dry run: how many records, how many bytes, how long."""
     from gensig.execution.local import n_workers
+    from gensig.generation import BLOCK
     from gensig.planning import make_plan, record_bytes
-    from gensig.records import forget_twins, simulate_record
+    from gensig.records import forget_twins, simulate_records
 
     request = read_request(arguments.overrides, config_dir=arguments.config_dir)
     config = request.config
     table = make_plan(config)
-    conditions = [str(name) for name in table.columns["condition_id"]]
-    probe = [index for index, name in enumerate(conditions) if name == conditions[0]][:8]
-    simulate_record(config, table.record(probe[-1]))  # compiles, or loads what was compiled
+    probe = [table.record(index) for index in range(min(BLOCK, table.n_records))]
+    simulate_records(config, probe[:1])  # compiles, or loads what was compiled
     forget_twins()
     begin = time.monotonic()
-    for index in probe:
-        simulate_record(config, table.record(index))
+    simulate_records(config, probe)
     seconds = (time.monotonic() - begin) / len(probe)
     workers = min(n_workers(config["executor"]["n_workers"]), table.n_shards)
     n_bytes = table.n_records * record_bytes(config)

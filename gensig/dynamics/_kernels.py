@@ -2,6 +2,8 @@
 
 Every number of a record lies in its own lane of a vector, and no instruction mixes lanes or reorders sums: a record's
 bits depend on nothing but its own numbers. Arrays are flat; a row is ``LANES`` numbers.
+
+Numba's cache knows the time of this file alone: touch it after a change of ``_mesh_kernels`` or ``_vector``.
 """
 
 from __future__ import annotations
@@ -65,7 +67,7 @@ def _accelerate(machine, numbers, dofs, law, q, v, a, work):
 
 
 @compiled
-def integrate(group, state, lost, step, first_step, n_steps, channels, out, work, near):
+def integrate(group, state, lost, fresh, step, first_step, n_steps, channels, out, work, near):
     """Advance every lane by ``n_steps`` of classical RK4.
 
     The tables are read once at the middle and once at the end of a step, where the next one begins; the stages differ
@@ -77,6 +79,8 @@ def integrate(group, state, lost, step, first_step, n_steps, channels, out, work
     ----------
     state : (2, dof, lane)    q and v, advanced in place
     lost : (lane,)            the number of steps without contact is added
+    fresh : (lane,)           1 where the state is new: its tables are read first. 0 goes on as if the last call of this
+        group, step and scratch had not ended; so where calls end leaves no trace
     out : (channel, n_steps, lane)    takes the mean acceleration over each step (what the equations add to the
         velocity, over the step: kinks then alias far less than point values would); empty stores nothing
     work, near : ``scratch`` of the group
@@ -102,11 +106,13 @@ def integrate(group, state, lost, step, first_step, n_steps, channels, out, work
     for i in range(0, 2 * size, LANES):
         store(work, now + i, load(state, i))
     for lane in range(LANES):
-        near[WANTED * LANES + lane] = 1
+        near[WANTED * LANES + lane] = 1 if fresh[lane] > 0.0 else 0
+    store(work, flags, load(fresh, 0))
     approach, rate, roll, roll_rate = _motion(numbers, dofs, first_step * step, now, now + size, work)
-    store(work, (rolls + 1) * LANES, roll)
+    store(work, (rolls + 4) * LANES, roll)
     store(work, within_row * LANES, approach + margin)
-    gather(numbers, places, table, tooth_row, tooth_error, rolls + 1, within_row, 1, work, near)
+    gather(numbers, places, table, tooth_row, tooth_error, rolls + 4, within_row, 4, work, near)
+    _take_parted(work, near, flags, 4, 1, rolls, single, parted, 0)
     start_slot, end_slot = 1, 2
     for n in range(n_steps):
         n_parts, part = 1, 0
@@ -182,6 +188,9 @@ def integrate(group, state, lost, step, first_step, n_steps, channels, out, work
             store(out, (c * n_steps + n) * LANES, load(work, mean + c * LANES))
         now, single = single, now
         start_slot, end_slot = end_slot, start_slot
+    if start_slot == 2:
+        store(work, flags, one)
+        _take_parted(work, near, flags, 2, 1, rolls, single, parted, 0)
     for i in range(0, 2 * size, LANES):
         store(state, i, load(work, now + i))
 
@@ -209,6 +218,35 @@ def _take_parted(work, near, flags, parted_slot, slot, rolls, single, parted, si
             work[here + mesh.GAP * LANES] = mesh.FAR
             work[here + mesh.GAP_SLOPE * LANES] = 0.0
             work[here + mesh.POSITION * LANES] = -mesh.FAR
+
+
+@compiled
+def law_at(group, motion, work, near, found):
+    """Every lane's law at one instant; rows of ``motion`` are roll, approach, its rate, the roll's rate.
+
+    ``found`` takes the rows of the law. For tests: the integrator reads the tables less often.
+    """
+    numbers, places, table, tooth_row, tooth_error = (
+        group.numbers,
+        group.places,
+        group.table,
+        group.tooth_row,
+        group.tooth_error,
+    )
+    one_sided, consistent = group.one_sided, group.consistent
+    extra = N_SLOTS * SLOT_ROWS
+    store(work, (extra + ROLL) * LANES, load(motion, 0))
+    within = load(motion, LANES) if one_sided else spread(2.0 * mesh.FAR)
+    store(work, (extra + mesh.WITHIN) * LANES, within)
+    for lane in range(LANES):
+        near[WANTED * LANES + lane] = 1
+    most = gather(numbers, places, table, tooth_row, tooth_error, extra + ROLL, extra + mesh.WITHIN, 1, work, near)
+    law = mesh_law(
+        numbers, places, table, tooth_row, one_sided, consistent, most, 1, spread(0.0), load(motion, 0),
+        load(motion, LANES), load(motion, 2 * LANES), load(motion, 3 * LANES), work,
+    )  # fmt: skip
+    for row in range(mesh.N_LAW):
+        store(found, row * LANES, law[row])
 
 
 def scratch(n_dof, n_channels):

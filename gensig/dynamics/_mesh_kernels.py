@@ -372,32 +372,3 @@ def mesh_law(
     else:
         law = papers_law(numbers, most, slot, extra, ahead, approach, rate, work)
     return law
-
-
-@compiled
-def law_at(group, motion, work, near, found):
-    """Every lane's law at one instant; rows of ``motion`` are roll, approach, its rate, the roll's rate.
-
-    ``found`` takes the rows of the law. For tests: the integrator reads the tables less often.
-    """
-    numbers, places, table, tooth_row, tooth_error = (
-        group.numbers,
-        group.places,
-        group.table,
-        group.tooth_row,
-        group.tooth_error,
-    )
-    one_sided, consistent = group.one_sided, group.consistent
-    extra = N_SLOTS * SLOT_ROWS
-    store(work, (extra + ROLL) * LANES, load(motion, 0))
-    within = load(motion, LANES) if one_sided else spread(2.0 * FAR)
-    store(work, (extra + WITHIN) * LANES, within)
-    for lane in range(LANES):
-        near[WANTED * LANES + lane] = 1
-    most = gather(numbers, places, table, tooth_row, tooth_error, extra + ROLL, extra + WITHIN, 1, work, near)
-    law = mesh_law(
-        numbers, places, table, tooth_row, one_sided, consistent, most, 1, spread(0.0), load(motion, 0),
-        load(motion, LANES), load(motion, 2 * LANES), load(motion, 3 * LANES), work,
-    )  # fmt: skip
-    for row in range(N_LAW):
-        store(found, row * LANES, law[row])

@@ -77,20 +77,21 @@ def settling_time(dynamics: PairDynamics) -> float:
     return min(LONGEST_SETTLING, math.log(1.0 / SETTLED) / rate)
 
 
-@dataclass(slots=True)
 class _Run:
-    """A group on its way: the state (2, dof, lane) and the lost steps (lane,)."""
+    """A group on its way: the state (2, dof, lane), the lost steps (lane,), and the scratch of the compiled core."""
 
-    machines: Sequence[PairDynamics]
-    state: Array
-    lost: Array
-    index: NDArray[np.int64]
+    def __init__(self, state: Array, index: NDArray[np.int64]) -> None:
+        self.state, self.index = state, index
+        self.lost, self.fresh = np.zeros(LANES), np.ones(LANES)
+        self.scratch = _kernels.scratch(state.shape[1], len(index))
 
     def advance(self, group: Group, step: float, first_step: int, n_steps: int, out: Array) -> None:
-        work = _kernels.scratch(self.state.shape[1], len(self.index))
+        """Integrate, and go on from there at the next call unless lanes are marked as fresh."""
+        state, flat = self.state.ravel(), out.ravel()
         _kernels.integrate(
-            group, self.state.ravel(), self.lost, step, first_step, n_steps, self.index, out.ravel(), *work
+            group, state, self.lost, self.fresh, step, first_step, n_steps, self.index, flat, *self.scratch
         )
+        self.fresh[:] = 0.0
 
 
 def integrate(
@@ -104,24 +105,21 @@ def integrate(
 ) -> Motions:
     """Settle every machine by itself, then record ``duration`` plus ``margin`` output samples on either side.
 
+    The machines share what ``settling_oversampling`` says of each.
+
     Raises
     ------
-    ConfigError        for a channel the system has not
-    SimulationError    where the step is too long for the stiffest motion
+    ConfigError    for a channel the system has not
     """
     check_channels(channels)
     fine = solver.oversampling
     step = 1.0 / (sampling_rate * fine)
-    for dynamics in machines:
-        check_step(dynamics, step)
-    coarse = COARSE_OVERSAMPLING
-    if fine <= coarse or not all(_stable(dynamics, 1.0 / (sampling_rate * coarse)) for dynamics in machines):
-        coarse = fine
+    coarse = settling_oversampling(machines[0], solver, sampling_rate)
     n_settle = [math.ceil(settling_time(dynamics) * sampling_rate) for dynamics in machines]
     n_fine = math.ceil(FINE_SETTLING * sampling_rate)
     n_record = (count_samples(duration, sampling_rate) + 2 * margin) * fine + 1
     index = np.array([DOFS.index(name) for name in channels], dtype=np.int64)
-    run = _Run(machines, np.zeros((2, len(DOFS), LANES)), np.zeros(LANES), index)
+    run = _Run(np.zeros((2, len(DOFS), LANES)), index)
     nothing = np.empty(0)
     end = -margin - n_fine  # output samples; time 0 is the first recorded one
     group, coarse_step = pack(machines, 1.0 / (sampling_rate * coarse)), 1.0 / (sampling_rate * coarse)
@@ -132,9 +130,10 @@ def integrate(
             if min(end, end + n_fine - n_settle[lane % len(n_settle) if lane < len(n_settle) else 0]) == begin:
                 run.state[:, :, lane] = 0.0
                 run.state[0, :, lane] = dynamics.static_start(begin / sampling_rate)
+                run.fresh[lane] = 1.0
         now = begin
     run.advance(group, coarse_step, now * coarse, (end - now) * coarse, nothing)
-    group = pack(machines, step)
+    group, run.fresh = pack(machines, step), np.ones(LANES)
     run.advance(group, step, end * fine, n_fine * fine - 1, nothing)
     settled = run.state.copy()
     angle, run.lost = run.state[0, DOFS.index("pinion_rotation")].copy(), np.zeros(LANES)
@@ -146,7 +145,7 @@ def integrate(
     if solver.max_error is not None:
         n_check = min(count_samples(duration, sampling_rate), math.ceil(CHECKED * sampling_rate))
         check = np.empty((len(index), (n_check + 2 * margin) * 2 * fine + 1, LANES))
-        again = _Run(machines, settled, np.zeros(LANES), index)
+        again = _Run(settled, index)
         finer, first = pack(machines, 0.5 * step), -2 * (margin * fine + 1)
         again.advance(finer, 0.5 * step, first, 1, nothing)
         again.advance(finer, 0.5 * step, first + 1, check.shape[1], check)
@@ -157,6 +156,20 @@ def integrate(
         contact_loss_fraction=run.lost / n_record,
         finite=np.asarray(np.isfinite(run.state).all(axis=(0, 1))),
     )
+
+
+def settling_oversampling(dynamics: PairDynamics, solver: Solver, sampling_rate: float) -> int:
+    """Steps per sample in which a machine settles: few where they are stable, else those of the record.
+
+    Raises
+    ------
+    SimulationError    where even the record's step is too long for the stiffest motion
+    """
+    fine = solver.oversampling
+    check_step(dynamics, 1.0 / (sampling_rate * fine))
+    if fine > COARSE_OVERSAMPLING and _stable(dynamics, 1.0 / (sampling_rate * COARSE_OVERSAMPLING)):
+        return COARSE_OVERSAMPLING
+    return fine
 
 
 def _lanes(machines: Sequence[PairDynamics]) -> list[PairDynamics]:

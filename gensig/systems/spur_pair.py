@@ -10,7 +10,15 @@ import numpy as np
 from numpy.typing import NDArray
 
 from gensig.dynamics._vector import LANES
-from gensig.dynamics.integrator import FINEST, Solver, check_channels, check_step, count_samples, integrate
+from gensig.dynamics.integrator import (
+    FINEST,
+    Solver,
+    check_channels,
+    check_step,
+    count_samples,
+    integrate,
+    settling_oversampling,
+)
 from gensig.dynamics.pair import Body, PairDynamics, Support
 from gensig.errors import FaultError, SimulationError
 from gensig.faults.base import Fault, faulty_teeth
@@ -241,13 +249,22 @@ def simulate_together(runs: Sequence[Run]) -> list[CleanRecord | SimulationError
     place of its record.
     """
     found: dict[int, CleanRecord | SimulationError] = {}
+    machines: dict[int, PairDynamics] = {}
     kinds: dict[tuple[object, ...], list[int]] = {}
     for place, run in enumerate(runs):
-        kinds.setdefault(run.kind, []).append(place)
+        system = run.system
+        try:
+            machines[place] = run.dynamics()
+            settling = settling_oversampling(machines[place], system.solver, system.sensing.sampling_rate)
+        except SimulationError as error:
+            found[place] = error
+        else:
+            kinds.setdefault((*run.kind, settling), []).append(place)
     for places in kinds.values():
         for first in range(0, len(places), LANES):
             group = places[first : first + LANES]
-            found.update(zip(group, _side_by_side([runs[place] for place in group]), strict=True))
+            records = _side_by_side([runs[place] for place in group], [machines[place] for place in group])
+            found.update(zip(group, records, strict=True))
     coarse = [place for place, record in found.items() if _is_too_coarse(runs[place], record)]
     if coarse:
         found.update(zip(coarse, simulate_together([runs[place].finer() for place in coarse]), strict=True))
@@ -261,11 +278,11 @@ def _is_too_coarse(run: Run, record: CleanRecord | SimulationError) -> bool:
     return record.integration_error > solver.max_error
 
 
-def _side_by_side(runs: Sequence[Run]) -> list[CleanRecord | SimulationError]:
+def _side_by_side(runs: Sequence[Run], machines: Sequence[PairDynamics]) -> list[CleanRecord | SimulationError]:
     system = runs[0].system
     low_pass = decimator(system.solver.oversampling)
     motions = integrate(
-        [run.dynamics() for run in runs],
+        machines,
         system.solver,
         sampling_rate=system.sensing.sampling_rate,
         duration=system.operating.duration,

@@ -6,7 +6,9 @@ from itertools import permutations
 import numpy as np
 import pytest
 from fault_cases import one
+from numpy.testing import assert_allclose
 
+from gensig.dynamics import _kernels
 from gensig.dynamics._vector import LANES
 from gensig.dynamics.integrator import Solver, integrate
 from gensig.dynamics.lanes import pack
@@ -227,6 +229,57 @@ class TestMotions:
         first, second, *rest = np.moveaxis(found.acceleration, -1, 0)
         assert first.tobytes() != second.tobytes()
         assert all(lane.tobytes() == first.tobytes() for lane in rest)
+
+
+class TestPieces:
+    """Where a call of the compiled core ends leaves no trace; a lane that is new begins anew, the others go on."""
+
+    STEP, N_STEPS = 1 / (51200 * 5), 3000
+
+    @pytest.fixture(scope="class", params=["one_sided", "paper"])
+    def machines(self, request, mix):
+        return [one_run.dynamics() for one_run in mix(LAWS[request.param])]
+
+    def motion(self, machines, pieces, begins=(0, 0, 0, 0), anew=False):
+        """State, means over the steps and lost steps; ``begins`` are steps at which lanes begin."""
+        group, channels = pack(machines, self.STEP), np.array([1, 5])
+        state, lost, means = np.zeros((2, 6, LANES)), np.zeros(LANES), []
+        scratch, fresh, now = _kernels.scratch(6, len(channels)), np.ones(LANES), 0
+        for n_steps in pieces:
+            for lane, begin in enumerate(begins):
+                if begin == now:
+                    state[:, :, lane], fresh[lane] = 0.0, 1.0
+                    state[0, :, lane] = machines[lane].static_start(now * self.STEP)
+            out = np.empty((len(channels), n_steps, LANES))
+            _kernels.integrate(
+                group, state.ravel(), lost, fresh, self.STEP, now, n_steps, channels, out.ravel(), *scratch
+            )
+            means.append(out)
+            now, fresh[:] = now + n_steps, float(anew)
+        return state, np.concatenate(means, axis=1), lost
+
+    @pytest.mark.parametrize("pieces", [(1, 2, 997, 2000), (0, 1500, 0, 1500), (7,) * 428 + (4,)])
+    def test_together_make_the_whole(self, machines, pieces):
+        whole, found = (self.motion(machines, one) for one in ((self.N_STEPS,), pieces))
+        assert [one.tobytes() for one in found] == [one.tobytes() for one in whole]
+
+    def test_a_lane_begins_anew_beside_others_that_go_on(self, machines):
+        whole = self.motion(machines, (self.N_STEPS,))
+        state, means, _ = self.motion(machines, (801, 1199, 1000), begins=(0, 801, 0, 2000))
+        assert state[..., [0, 2]].tobytes() == whole[0][..., [0, 2]].tobytes()
+        assert means[..., [0, 2]].tobytes() == whole[1][..., [0, 2]].tobytes()
+        for lane, begin in ((1, 801), (3, 2000)):
+            alone = self.motion([machines[lane]] * LANES, (begin, self.N_STEPS - begin), begins=(begin,) * LANES)
+            assert state[..., lane].tobytes() == alone[0][..., 0].tobytes()
+            assert means[:, begin:, lane].tobytes() == alone[1][:, begin:, 0].tobytes()
+
+    def test_reading_the_tables_anew_would_show(self, machines):
+        """All lanes fresh in the middle, from the same states: the last bits differ."""
+        whole, halves = self.motion(machines, (self.N_STEPS,)), self.motion(machines, (1500, 1500), anew=True)
+        assert halves[1][:, :1500].tobytes() == whole[1][:, :1500].tobytes()
+        assert halves[1].tobytes() != whole[1].tobytes()
+        level = whole[1].std(axis=1, keepdims=True)
+        assert_allclose(halves[1] / level, whole[1] / level, rtol=0, atol=1e-5)
 
 
 def test_a_group_takes_teeth_of_different_numbers(machine, dynamics_of):
