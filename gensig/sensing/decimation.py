@@ -86,4 +86,4 @@ def in_band_error(found: Array, exact: Array, sampling_rate: float) -> Array:
     window = np.hanning(n_samples)
     spectra = [np.fft.rfft(signal * window, axis=-1)[..., inside] for signal in (found - exact, exact)]
     off, level = (np.linalg.norm(spectrum, axis=-1) for spectrum in spectra)
-    return np.asarray(np.divide(off, level, out=np.zeros_like(off), where=level > 0.0).max(axis=-1))
+    return np.asarray(np.divide(off, level, out=np.zeros_like(off), where=level != 0.0).max(axis=-1))

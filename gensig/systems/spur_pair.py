@@ -275,7 +275,7 @@ def _is_too_coarse(run: Run, record: CleanRecord | SimulationError) -> bool:
     solver = run.system.solver
     if isinstance(record, SimulationError) or solver.max_error is None or 2 * solver.oversampling > FINEST:
         return False
-    return record.integration_error > solver.max_error
+    return not record.integration_error <= solver.max_error  # also where the check came to nothing
 
 
 def _side_by_side(runs: Sequence[Run], machines: Sequence[PairDynamics]) -> list[CleanRecord | SimulationError]:
@@ -293,7 +293,8 @@ def _side_by_side(runs: Sequence[Run], machines: Sequence[PairDynamics]) -> list
     errors = np.full(len(signals), np.nan)
     if motions.check.size:
         exact = decimator(2 * system.solver.oversampling).apply(motions.check)
-        errors = in_band_error(signals[:, :, : exact.shape[2]], exact, system.sensing.sampling_rate)
+        kept = motions.finite
+        errors[kept] = in_band_error(signals[kept, :, : exact.shape[2]], exact[kept], system.sensing.sampling_rate)
     records: list[CleanRecord | SimulationError] = []
     for lane, run in enumerate(runs):
         gain = 1.0 if run.gearbox is None else run.gearbox.gain[:, None]

@@ -203,6 +203,51 @@ class TestOneThatFails:
             run({"gear.pinion.support.stiffness_y_n_per_m": 1e13}).system.simulate()
 
 
+LIMIT = 5e-4
+
+
+class TestError:
+    """Records whose measured error is too large are made again at half the step, by themselves."""
+
+    @pytest.fixture(scope="class")
+    @classmethod
+    def runs(cls, run):
+        fast = {"operating.speed_rpm": 6000, "operating.torque_nm": 5, "solver.oversampling": 5,
+                "solver.max_error": LIMIT, "operating.duration_s": 0.1}  # fmt: skip
+        calm = {**fast, "operating.speed_rpm": 1200, "operating.torque_nm": 20}
+        return [run(calm), run(fast, MISSING), run(calm, MISSING), run(fast, TWO_MISSING), run(calm)]
+
+    @pytest.fixture(scope="class")
+    @classmethod
+    def found(cls, runs):
+        return simulate_together(runs)
+
+    def test_bits_are_those_alone(self, runs, found):
+        assert not different(found, alone(runs))
+
+    def test_only_the_coarse_are_made_again(self, runs, found):
+        for k, (one_run, record) in enumerate(zip(runs, found, strict=True)):
+            (first,) = simulate_together([with_solver(one_run, oversampling=5, max_error=1.0)])
+            assert (first.integration_error > LIMIT) == (k in (1, 3))
+            assert (bits(first) == bits(record)) == (k not in (1, 3))
+
+    def test_what_is_made_again_is_that_of_more_steps(self, runs, found):
+        (finer,) = simulate_together([with_solver(runs[1], oversampling=10, max_error=LIMIT)])
+        assert bits(finer) == bits(found[1])
+
+    def test_errors_are_measured_and_end_below_the_limit(self, runs, found):
+        assert all(0.0 < record.integration_error < LIMIT for record in found)
+
+    def test_nobody_looks_where_none_is_asked_for(self, runs):
+        (record,) = simulate_together([with_solver(runs[1], oversampling=5, max_error=None)])
+        assert np.isnan(record.integration_error)
+
+
+def with_solver(one_run, **changes):
+    solver = replace(one_run.system.solver, **changes)
+    return replace(one_run, system=replace(one_run.system, solver=solver))
+
+
 class TestMotions:
     @pytest.fixture
     def motions(self, xiamen, dynamics_of):
@@ -237,7 +282,8 @@ class TestPieces:
     STEP, N_STEPS = 1 / (51200 * 5), 3000
 
     @pytest.fixture(scope="class", params=["one_sided", "paper"])
-    def machines(self, request, mix):
+    @classmethod
+    def machines(cls, request, mix):
         return [one_run.dynamics() for one_run in mix(LAWS[request.param])]
 
     def motion(self, machines, pieces, begins=(0, 0, 0, 0), anew=False):

@@ -7,7 +7,7 @@ import pytest
 from numpy.testing import assert_allclose
 
 from gensig.dynamics._vector import LANES
-from gensig.sensing.decimation import decimator, usable_band
+from gensig.sensing.decimation import decimator, in_band_error, usable_band
 
 RATE = 51200.0
 N_SAMPLES = 2048
@@ -97,3 +97,34 @@ def test_taps_are_symmetric_and_reach_the_margin(oversampling):
 
 def test_usable_band_ends_at_20_khz():
     assert_allclose(usable_band(RATE), (0.0, 20_000.0), rtol=1e-12, atol=0)
+
+
+class TestInBandError:
+    """Of spectra under a Hann window, so that what lies outside the band does not count."""
+
+    TIME = np.arange(2560) / RATE
+
+    def tones(self, *tones):
+        """Sum of sines, each given as (Hz, amplitude)."""
+        return sum(a * np.sin(2 * np.pi * f * self.TIME + 0.3) for f, a in tones)
+
+    def error(self, found, exact):
+        return in_band_error(np.asarray(found), np.asarray(exact), RATE)
+
+    def test_is_relative_to_the_level_of_its_channel(self):
+        exact = np.array([[self.tones((1000, 1.0)), self.tones((3000, 200.0))]] * 2)
+        off = [[self.tones((5000, 1e-3)), self.tones((5000, 1e-2))], [self.tones((5000, 2e-5)), 0 * self.TIME]]
+        assert_allclose(self.error(np.add(exact, off), exact), [1e-3, 2e-5], rtol=1e-2, atol=0)
+
+    def test_is_that_of_the_worst_channel(self):
+        exact = np.array([[self.tones((1000, 1.0)), self.tones((1000, 1.0))]])
+        assert_allclose(self.error(exact * [[[1.001], [1.02]]], exact), [0.02], rtol=1e-9, atol=0)
+
+    def test_does_not_count_what_lies_outside_the_band(self):
+        exact = np.array([[self.tones((1000, 1.0))]])
+        assert self.error(exact + self.tones((22_000, 0.5)), exact) < 1e-4
+        assert self.error(exact + self.tones((19_000, 0.5)), exact) > 0.4
+
+    def test_of_what_is_still_is_none(self):
+        still = np.zeros((1, 1, 256))
+        assert_allclose(self.error(still, still), [0.0], rtol=0, atol=0)
