@@ -14,7 +14,9 @@ import numpy as np
 from numba import njit
 from numpy.typing import NDArray
 
-from gensig.dynamics._kernels import SUBSTEPS, MeshNumbers
+from gensig.dynamics import _mesh_kernels as rows
+from gensig.dynamics._kernels import SUBSTEPS
+from gensig.dynamics.pair import PairDynamics
 from gensig.dynamics.system import LumpedSystem
 from gensig.mesh.pair_table import FIRST_PITCH, N_PAIRS, PairTable
 
@@ -24,6 +26,50 @@ KIND, POSITION, BITE, LOAD, TOTAL = range(5)  # rows of a mesh law's scratch
 TOLERANCE, MOST_ROUNDS = 1e-13, 60  # of Newton's method, relative to the load
 N_DOF, PINION_Y = 6, 1
 _compiled: Any = functools.partial(njit, cache=True, error_model="numpy")()
+
+
+class MeshNumbers(NamedTuple):
+    """What the law needs of a gear mesh, by the names of ``_mesh_kernels.Group.numbers``."""
+
+    pinion_radius: float
+    pitch: float
+    nodes_per_meter: float
+    path: float
+    pitch_point: float
+    start_curvature: float
+    tangent_length: float
+    shared: float
+    damping: float
+    friction: float
+    friction_half_width: float
+    backlash: float
+    start_roll: float
+    speed: float
+    start_pinion: int
+    consistent: bool
+
+
+def mesh_numbers(dynamics: PairDynamics, step: float) -> MeshNumbers:
+    """The numbers of one machine, as gensig's own core takes them."""
+    values = dynamics.numbers(step)
+    return MeshNumbers(
+        pinion_radius=values[rows.PINION_RADIUS],
+        pitch=values[rows.PITCH],
+        nodes_per_meter=values[rows.NODES_PER_METER],
+        path=values[rows.PATH],
+        pitch_point=values[rows.PITCH_POINT],
+        start_curvature=values[rows.START_CURVATURE],
+        tangent_length=values[rows.TANGENT_LENGTH],
+        shared=values[rows.SHARED],
+        damping=values[rows.DAMPING],
+        friction=values[rows.FRICTION],
+        friction_half_width=1.0 / values[rows.PER_FRICTION_WIDTH],
+        backlash=values[rows.BACKLASH],
+        start_roll=values[rows.START_ROLL],
+        speed=values[rows.SPEED],
+        start_pinion=dynamics.start_tooth_pinion,
+        consistent=dynamics.table.options.roll_torque == "consistent",
+    )
 
 
 class Mesh(NamedTuple):
