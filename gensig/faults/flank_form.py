@@ -5,6 +5,7 @@ Each has a declared limit; its severity is the share of it that is used.
 
 from __future__ import annotations
 
+from abc import abstractmethod
 from dataclasses import dataclass
 from typing import ClassVar
 
@@ -32,9 +33,9 @@ class FlankForm(Fault):
         Fault.__post_init__(self)
         require(self, "limit_um", self.limit > 0.0, "must be positive")
 
+    @abstractmethod
     def size(self) -> float:
         """What is compared with the limit, m."""
-        raise NotImplementedError
 
     def severity(self, gear: Gear) -> float:
         """Share of the declared limit."""
