@@ -31,6 +31,7 @@ from gensig.dynamics.pair import PairDynamics
 from gensig.generation import open_shard
 from gensig.planning import make_plan
 from gensig.sensing.decimation import decimator
+from gensig.systems import spur_pair
 from gensig.systems.spur_pair import Run
 
 SAMPLING_RATE = 51200.0
@@ -99,10 +100,12 @@ def stages(config: dict[str, Any], rows: list[dict[str, Any]], runs: int) -> dic
         return [records._row_run(config, records.record_system(config, records._row_values(row)), row) for row in rows]
 
     def tables() -> None:
+        spur_pair._mesh_table.cache_clear()
         for run in machines():
             run.dynamics()
 
     def everything() -> list[records.Record]:
+        spur_pair._mesh_table.cache_clear()
         records.forget_twins()
         return records.simulate_records(config, rows)
 

@@ -115,19 +115,21 @@ def integrate(
     fine = solver.oversampling
     step = 1.0 / (sampling_rate * fine)
     coarse = settling_oversampling(machines[0], solver, sampling_rate)
-    n_settle = [math.ceil(settling_time(dynamics) * sampling_rate) for dynamics in machines]
     n_fine = math.ceil(FINE_SETTLING * sampling_rate)
     n_record = (count_samples(duration, sampling_rate) + 2 * margin) * fine + 1
     index = np.array([DOFS.index(name) for name in channels], dtype=np.int64)
     run = _Run(np.zeros((2, len(DOFS), LANES)), index)
     nothing = np.empty(0)
     end = -margin - n_fine  # output samples; time 0 is the first recorded one
+    lanes = _lanes(machines)
+    # every lane begins in its own time; until then it integrates what nobody looks at
+    begins = [min(end, end + n_fine - math.ceil(settling_time(machine) * sampling_rate)) for machine in lanes]
     group, coarse_step = pack(machines, 1.0 / (sampling_rate * coarse)), 1.0 / (sampling_rate * coarse)
-    now = min(end, end + n_fine - max(n_settle))
-    for begin in sorted({min(end, end + n_fine - n) for n in n_settle}):
+    now = min(begins)
+    for begin in sorted(set(begins)):
         run.advance(group, coarse_step, now * coarse, (begin - now) * coarse, nothing)
-        for lane, dynamics in enumerate(_lanes(machines)):
-            if min(end, end + n_fine - n_settle[lane % len(n_settle) if lane < len(n_settle) else 0]) == begin:
+        for lane, dynamics in enumerate(lanes):
+            if begins[lane] == begin:
                 run.state[:, :, lane] = 0.0
                 run.state[0, :, lane] = dynamics.static_start(begin / sampling_rate)
                 run.fresh[lane] = 1.0
@@ -140,7 +142,7 @@ def integrate(
     out = np.empty((len(index), n_record, LANES))
     run.advance(group, step, -margin * fine - 1, n_record, out)
     turned = run.state[0, DOFS.index("pinion_rotation")] - angle
-    speed = np.array([dynamics.operating.speed for dynamics in _lanes(machines)])
+    speed = np.array([dynamics.operating.speed for dynamics in lanes])
     check = np.empty((len(index), 0, LANES))
     if solver.max_error is not None:
         n_check = min(count_samples(duration, sampling_rate), math.ceil(CHECKED * sampling_rate))
