@@ -120,12 +120,24 @@ def records_per_shard(config: Mapping[str, Any]) -> int:
     return max(1, SHARD_BYTES // record_bytes(config))
 
 
-def record_bytes(config: Mapping[str, Any]) -> int:
-    """Bytes of one record's samples."""
-    system = read_system(config)
+def record_bytes(config: Mapping[str, Any], *, as_stored: bool = False) -> int:
+    """Bytes of one record's samples, ``as_stored`` in the chosen type before compression, else in single precision.
+
+    Shards are cut by the latter, so that how samples are stored does not change a plan.
+    """
+    system, dataset = read_system(config), config["dataset"]
     n_samples = round(system.operating.duration * system.sensing.sampling_rate)
-    n_copies = 2 if config["dataset"]["store_clean"] else 1
-    return max(1, 4 * n_copies * len(system.sensing.channels) * n_samples)
+    n_copies = 2 if dataset["store_clean"] else 1
+    size = 2 if as_stored and dataset["sample_type"] == "int16" else 4
+    angle = 8 * n_samples if dataset["store_shaft_angle"] else 0
+    return max(1, size * n_copies * len(system.sensing.channels) * n_samples + angle)
+
+
+def check_switches(config: Mapping[str, Any]) -> None:
+    """Raise ConfigError for a switch of ``dataset`` that is neither true nor false."""
+    for key in ("store_clean", "store_shaft_angle"):
+        if not isinstance(config["dataset"][key], bool):
+            raise ConfigError(f"dataset.{key} = {config['dataset'][key]!r} must be true or false")
 
 
 def _draw(

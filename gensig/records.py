@@ -54,7 +54,7 @@ class Stream(IntEnum):
 
 def stream(seed: int, cause: Stream, index: int = 0) -> np.random.Generator:
     """Generator of one cause and one index; depends on nothing else."""
-    return np.random.Generator(np.random.Philox(np.random.SeedSequence(seed, spawn_key=(int(cause), index))))
+    return np.random.Generator(np.random.SFC64(np.random.SeedSequence(seed, spawn_key=(int(cause), index))))
 
 
 def read_seed(config: Mapping[str, Any]) -> int:
@@ -144,6 +144,7 @@ def _finish(
             "mesh_frequency_hz": speed_rpm / 60.0 * system.pair.pinion.n_teeth,
             "contact_loss_fraction": result.contact_loss_fraction,
             "integration_error": result.integration_error,
+            "integration_check": result.integration_check,
         }
     noisy = add_noise(clean, noise_power, stream(seed, Stream.NOISE, index))
     signals: dict[str, NDArray[Any]] = {
@@ -154,6 +155,9 @@ def _finish(
     }
     if config["dataset"]["store_clean"]:
         signals["acceleration_clean"] = clean.astype(np.float32)
+    if config["dataset"]["store_shaft_angle"]:
+        failed = np.full(clean.shape[1], MISSING)
+        signals["shaft_angle"] = failed if isinstance(result, SimulationError) else result.shaft_angle
     columns = {key: value for key, value in row.items() if key not in ("shard", "row")}
     return Record(signals=signals, values={**columns, **told})
 

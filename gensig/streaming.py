@@ -14,11 +14,11 @@ from numpy.typing import ArrayLike, NDArray
 from gensig.dataset.plan import Plan
 from gensig.dataset.schema import COLUMNS, DEFAULTS
 from gensig.dataset.splits import SUBSETS, make_splits
+from gensig.dynamics._vector import n_lanes
 from gensig.errors import ConfigError, DatasetError
-from gensig.planning import make_plan
+from gensig.planning import check_switches, make_plan
 from gensig.records import Record, read_seed, simulate_records, whole_number
 
-LANES = 4  # records simulated at a time
 EPOCH_STREAM = 9100  # spawn key of the seeds of later epochs; the causes of a record and the splits have others
 
 
@@ -143,8 +143,9 @@ class RecordStream:
         return len(self.numbers)
 
     def __iter__(self) -> Iterator[Record]:
-        for first in range(0, len(self), LANES):
-            yield from self._records(self.numbers[first : first + LANES])
+        together = n_lanes(self.config["solver"]["precision"])
+        for first in range(0, len(self), together):
+            yield from self._records(self.numbers[first : first + together])
 
     def __getitem__(self, place: int) -> Record:
         return self._records([self.numbers[operator.index(place)]])[0]
@@ -159,15 +160,14 @@ class RecordStream:
 
 
 def open_stream(config: Mapping[str, Any], *, epoch: int = 0) -> RecordStream:
-    """All records of a composed configuration; ``out``, ``executor`` and ``dataset.compression`` change nothing.
+    """All records of a composed configuration; ``out``, ``executor`` and how samples are stored change nothing.
 
     Raises
     ------
     GensigError    for whatever ``make_plan`` refuses
     """
     plain: dict[str, Any] = {**json.loads(json.dumps(dict(config))), "out": None}
-    if not isinstance(plain["dataset"]["store_clean"], bool):
-        raise ConfigError(f"dataset.store_clean = {plain['dataset']['store_clean']!r} must be true or false")
+    check_switches(plain)
     plan = make_plan(_at_epoch(plain, epoch))
     return RecordStream(config=plain, epoch=epoch, plan=plan, numbers=np.arange(plan.n_records))
 

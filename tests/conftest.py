@@ -76,6 +76,8 @@ def dynamics_of() -> Callable[..., PairDynamics]:
             table=system.mesh_table(faults),
             pinion=system.pinion,
             wheel=system.wheel,
+            motor=system.motor,
+            load=system.load,
             operating=system.operating,
             pinion_error=np.zeros(system.pair.pinion.n_teeth) if pinion_error is None else pinion_error,
             wheel_error=np.zeros(system.pair.wheel.n_teeth) if wheel_error is None else wheel_error,

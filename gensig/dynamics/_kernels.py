@@ -1,257 +1,299 @@
-"""Compiled core: a fixed-step fourth-order Runge-Kutta integrator, four records side by side.
+"""Compiled core: a fixed-step fourth-order Runge-Kutta integrator and its low-pass, several records side by side.
 
 Every number of a record lies in its own lane of a vector, and no instruction mixes lanes or reorders sums: a record's
-bits depend on nothing but its own numbers. Arrays are flat; a row is ``LANES`` numbers.
+bits depend on nothing but its own numbers. Arrays are flat; a row is one number for every record of the group.
 
-Numba's cache knows the time of this file alone: touch it after a change of ``_mesh_kernels`` or ``_vector``.
+Numba's cache knows the time of this file alone: touch it after a change of one that it imports.
 """
 
 from __future__ import annotations
 
 import numpy as np
 
-from gensig.dynamics import _mesh_kernels as mesh
-from gensig.dynamics._mesh_kernels import N_SLOTS, ROLL, SLOT_ROWS, WANTED, at_row, gather, mesh_law
-from gensig.dynamics._vector import LANES, any_above, compiled, inlined, load, spread, store, where_above
+from gensig.dynamics import _layout as layout
+from gensig.dynamics._equations import P_TURN, accelerate, event, motion, recenter, set_out
+from gensig.dynamics._layout import AHEAD, BASE, NOMINAL, PART, ROLL, at_row
+from gensig.dynamics._mesh_kernels import mesh_law
+from gensig.dynamics._tables import between, cover, gather
+from gensig.dynamics._vector import any_above, compiled, load, n_lanes, spread, store, where_above, width
 from gensig.mesh.pair_table import N_PAIRS
 
-SUBSTEPS = 8
-
-
-@inlined
-def _motion(numbers, dofs, time, q, v, work):
-    """Approach, its rate, roll and its rate at one instant, from the rows of a state."""
-    pinion_radius, wheel_radius = at_row(numbers, mesh.PINION_RADIUS), at_row(numbers, mesh.WHEEL_RADIUS)
-    pinion, wheel = dofs[2] * LANES, dofs[5] * LANES
-    turned, spun = load(work, q + pinion), load(work, v + pinion)
-    approach = pinion_radius * turned - wheel_radius * load(work, q + wheel)
-    rate = pinion_radius * spun - wheel_radius * load(work, v + wheel)
-    if dofs[1] >= 0:
-        approach = approach - load(work, q + dofs[1] * LANES)
-        rate = rate - load(work, v + dofs[1] * LANES)
-    if dofs[4] >= 0:
-        approach = approach + load(work, q + dofs[4] * LANES)
-        rate = rate + load(work, v + dofs[4] * LANES)
-    speed = at_row(numbers, mesh.SPEED)
-    roll = at_row(numbers, mesh.START_ROLL) + pinion_radius * (speed * spread(time) + turned)
-    return approach, rate, roll, pinion_radius * (speed + spun)
-
-
-@inlined
-def _accelerate(machine, numbers, dofs, law, q, v, a, work):
-    """Fill the rows ``a`` with q'' under the forces of a mesh law."""
-    inverse_mass, k_row, k_column, k_value, c_row, c_column, c_value, force = machine
-    normal, friction, moment_p, moment_w, along = law[0], law[1], law[2], law[3], law[4]
-    for i in range(0, len(force), LANES):
-        store(work, a + i, load(force, i))
-    for k in range(len(k_row)):
-        place = a + k_row[k] * LANES
-        store(work, place, load(work, place) - load(k_value, k * LANES) * load(work, q + k_column[k] * LANES))
-    for k in range(len(c_row)):
-        place = a + c_row[k] * LANES
-        store(work, place, load(work, place) - load(c_value, k * LANES) * load(work, v + c_column[k] * LANES))
-    place = a + dofs[2] * LANES
-    store(work, place, load(work, place) + at_row(numbers, mesh.PINION_RADIUS) * (along - normal) + moment_p)
-    place = a + dofs[5] * LANES
-    store(work, place, load(work, place) + at_row(numbers, mesh.WHEEL_RADIUS) * normal + moment_w)
-    if dofs[1] >= 0:
-        store(work, a + dofs[1] * LANES, load(work, a + dofs[1] * LANES) + normal)
-    if dofs[4] >= 0:
-        store(work, a + dofs[4] * LANES, load(work, a + dofs[4] * LANES) - normal)
-    if dofs[0] >= 0:
-        store(work, a + dofs[0] * LANES, load(work, a + dofs[0] * LANES) + friction)
-    if dofs[3] >= 0:
-        store(work, a + dofs[3] * LANES, load(work, a + dofs[3] * LANES) - friction)
-    for i in range(0, len(force), LANES):
-        store(work, a + i, load(work, a + i) * load(inverse_mass, i))
+RECENTER = 256  # steps after which the drift of the rotations is taken out of them, so that small numbers stay small
+BLOCK = 64  # output samples between two passes of the low-pass: what it reads is still in the cache
 
 
 @compiled
-def integrate(group, state, lost, fresh, step, first_step, n_steps, channels, out, work, near):
+def integrate(
+    group, state, lost, fresh, step, first_step, n_steps, channels, out, out_row, angle, angle_row, per_angle, work,
+    wide, near,
+):  # fmt: skip
     """Advance every lane by ``n_steps`` of classical RK4.
 
-    The tables are read once at the middle and once at the end of a step, where the next one begins; the stages differ
-    from there by a roll so small that the slope of the gap makes up for it. A step in which a pair takes up or lets go
-    of its load is taken again in ``SUBSTEPS`` parts, in the lanes where it does: the force has a kink there, which
-    would otherwise set the accuracy of everything.
+    The tables are read once a step, at the roll where it will end; the middle follows from both ends, and what little
+    the stages differ from there by the slope of the gap. A step in which a pair takes up or lets go of its load is
+    taken again in two parts that meet there, in the lanes where it does: the force has a kink there, which would
+    otherwise set the accuracy of everything.
 
     Parameters
     ----------
-    state : (2, dof, lane)    q and v, advanced in place
+    state : (2, dof, lane)    q and v, advanced in place; the pinion has turned by ``wide[CENTER]`` besides
     lost : (lane,)            the number of steps without contact is added
     fresh : (lane,)           1 where the state is new: its tables are read first. 0 goes on as if the last call of this
         group, step and scratch had not ended; so where calls end leaves no trace
-    out : (channel, n_steps, lane)    takes the mean acceleration over each step (what the equations add to the
-        velocity, over the step: kinks then alias far less than point values would); empty stores nothing
-    work, near : ``scratch`` of the group
+    out : (step, channel, lane)    takes, from row ``out_row`` on, the mean acceleration over each step (what the
+        equations add to the velocity, over the step: kinks then alias far less than point values would); a negative
+        row stores nothing
+    angle : (sample, lane)    takes, from row ``angle_row`` on, the pinion's angle in rad since time 0 at the begin of
+        every step whose number ``per_angle`` divides; a negative row stores nothing
+    work, wide, near : ``scratch`` of the group
+
+    Returns
+    -------
+    the next row of ``angle``
     """
-    numbers, places, table, tooth_row, tooth_error = (
-        group.numbers, group.places, group.table, group.tooth_row, group.tooth_error,
-    )  # fmt: skip
-    one_sided, consistent, dofs = group.one_sided, group.consistent, group.dofs
-    machine = (
-        group.inverse_mass, group.stiffness_row, group.stiffness_column, group.stiffness_value, group.damping_row,
-        group.damping_column, group.damping_value, group.force,
-    )  # fmt: skip
-    zero, one = spread(0.0), spread(1.0)
-    size = len(group.force)
-    extra = N_SLOTS * SLOT_ROWS
-    rolls, within_row, flags = extra + ROLL, extra + mesh.WITHIN, (extra + mesh.CHANGED) * LANES
-    rows = (extra + mesh.LAW + mesh.N_LAW + 4) * LANES
-    now, single, parted = rows, rows + 2 * size, rows + 4 * size
-    trial, total, a = rows + 6 * size, rows + 8 * size, rows + 10 * size
-    mean, part_mean = rows + 11 * size, rows + 12 * size
-    n_channels = len(channels) if len(out) > 0 else 0
-    margin = spread(mesh.NEAR) if one_sided else spread(2.0 * mesh.FAR)
-    for i in range(0, 2 * size, LANES):
+    n = width(work)
+    numbers = group.numbers
+    n_dof = len(group.force) // n
+    size = n_dof * n
+    n_channels = len(channels) if out_row >= 0 else 0
+    zero, one = spread(work, 0.0), spread(work, 1.0)
+    now = layout.N_MESH * n
+    single, parted = now + 2 * size, now + 4 * size
+    trial_a, trial_b = now + 6 * size, now + 8 * size
+    a, total_q, total_v = now + 10 * size, now + 11 * size, now + 12 * size
+    drive = now + 13 * size
+    forces = drive + 4 * n
+    mean = forces + size
+    part_mean = mean + n_channels * n
+    margin = spread(work, layout.NEAR if group.one_sided else 2.0 * layout.FAR)
+    radius = at_row(numbers, layout.PINION_RADIUS)
+    begin, end = 1, 2
+    for i in range(0, 2 * size, n):
         store(work, now + i, load(state, i))
-    for lane in range(LANES):
-        near[WANTED * LANES + lane] = 1 if fresh[lane] > 0.0 else 0
-    store(work, flags, load(fresh, 0))
-    approach, rate, roll, roll_rate = _motion(numbers, dofs, first_step * step, now, now + size, work)
-    store(work, (rolls + 4) * LANES, roll)
-    store(work, within_row * LANES, approach + margin)
-    gather(numbers, places, table, tooth_row, tooth_error, rolls + 4, within_row, 4, work, near)
-    _take_parted(work, near, flags, 4, 1, rolls, single, parted, 0)
-    start_slot, end_slot = 1, 2
-    for n in range(n_steps):
+    for lane in range(n):
+        if fresh[lane] > 0.0:
+            near[layout.NEWEST * n + lane] = layout.NOBODY
+    for place in range(first_step, first_step + n_steps):
+        if place % RECENTER == 0:
+            recenter(group, now, n_dof, work, wide)
+        set_out(group, place * step, now, drive, work, wide)
+        if angle_row >= 0 and place % per_angle == 0:
+            for lane in range(n):
+                angle[angle_row * n + lane] = wide[NOMINAL * n + lane] + work[now + P_TURN * n + lane]
+            angle_row += 1
+        speed, gain = load(work, drive), load(work, drive + n)
+        approach, rate = motion(numbers, now, now + size, work)
+        store(work, layout.WITHIN * n, approach + margin)
+        turning = radius * (speed + load(work, now + size + P_TURN * n))
+        store(work, (AHEAD + end) * n, step * turning)
+        if place == first_step:
+            for lane in range(n):
+                if fresh[lane] > 0.0:
+                    wide[(ROLL + begin) * n + lane] = wide[BASE * n + lane]
+            gather(group, begin, True, work, wide, near)
+        for lane in range(n):
+            wide[(ROLL + end) * n + lane] = wide[BASE * n + lane] + work[(AHEAD + end) * n + lane]
+        if gather(group, end, True, work, wide, near):
+            store(work, layout.FLAGS * n, one)
+            gather(group, begin, False, work, wide, near)
+        for lane in range(n):
+            work[(AHEAD + begin) * n + lane] = wide[(ROLL + begin) * n + lane] - wide[BASE * n + lane]
+        spans = layout.SPAN * n
+        first = min(near[spans + 4 * begin + 2], near[spans + 4 * end + 2])
+        last = max(near[spans + 4 * begin + 3], near[spans + 4 * end + 3])
+        cover(begin, first, last, work, near)
+        cover(end, first, last, work, near)
+        q_0 = load(work, now + P_TURN * n)
+        changed, share = zero, zero
         n_parts, part = 1, 0
-        source, target, begin, end = now, single, start_slot, end_slot
-        changed = zero
         while part < n_parts:
-            h = step / n_parts
-            time = (first_step + n) * step + part * h
-            for i in range(0, 2 * size, LANES):
-                store(work, trial + i, load(work, source + i))
-                store(work, total + i, zero)
-            middle = 3 if n_parts == 1 else 4
+            source, target, slot_0, slot_1 = now, single, begin, end
+            h, offset = spread(work, step), zero
+            if part == 1:
+                target, slot_1, h = parted, PART, share * step
+            elif part == 2:
+                source, target, slot_0, h, offset = parted, parted, PART, (1.0 - share) * step, share * step
+            between(slot_0, slot_1, layout.MIDDLE, first, last, work)
+            half = 0.5 * h
+            at, ahead = source, trial_a
             loaded = zero
             for stage in range(4):
-                ahead = h * (0.0 if stage == 0 else 1.0 if stage == 3 else 0.5)
-                approach, rate, roll, roll_rate = _motion(numbers, dofs, time + ahead, trial, trial + size, work)
-                slot = begin if stage == 0 else end if stage == 3 else middle
-                if stage == 1 or stage == 3:
-                    store(work, (rolls + slot) * LANES, roll)
-                    store(work, within_row * LANES, approach + margin)
-                    gather(numbers, places, table, tooth_row, tooth_error, rolls + slot, within_row, slot, work, near)
-                most = 0
-                for lane in range(LANES):
-                    most = max(most, near[slot * LANES + lane])
-                law = mesh_law(
-                    numbers, places, table, tooth_row, one_sided, consistent, most, slot,
-                    roll - load(work, (rolls + slot) * LANES), roll, approach, rate, roll_rate, work,
-                )  # fmt: skip
-                _accelerate(machine, numbers, dofs, law, trial, trial + size, a, work)
-                if stage == 0:
-                    loaded = law[7]
-                    if n_parts == 1:
-                        store(
-                            lost,
-                            0,
-                            load(lost, 0) + where_above(law[0], zero, zero, where_above(zero, law[0], zero, one)),
-                        )
-                else:
-                    differs = law[7] - loaded
-                    changed = where_above(differs * differs, zero, one, changed)
-                weight = spread(1.0 if stage == 0 or stage == 3 else 2.0)
-                reach = spread(h * (1.0 if stage == 2 else 0.5))
-                for i in range(0, size, LANES):
-                    speed, gained = load(work, trial + size + i), load(work, a + i)
-                    store(work, total + i, load(work, total + i) + weight * speed)
-                    store(work, total + size + i, load(work, total + size + i) + weight * gained)
-                    store(work, trial + i, load(work, source + i) + reach * speed)
-                    store(work, trial + size + i, load(work, source + size + i) + reach * gained)
-            share = spread(h / 6.0)
-            for i in range(0, 2 * size, LANES):
-                store(work, target + i, load(work, source + i) + share * load(work, total + i))
+                since = offset + (zero if stage == 0 else h if stage == 3 else half)
+                slot = slot_0 if stage == 0 else slot_1 if stage == 3 else layout.MIDDLE
+                approach, rate = motion(numbers, at, at + size, work)
+                turned = radius * ((speed + 0.5 * gain * since) * since + (load(work, at + P_TURN * n) - q_0))
+                roll_rate = radius * (speed + gain * since + load(work, at + size + P_TURN * n))
+                rows = layout.MARGIN if stage == 0 else layout.MARGIN + N_PAIRS if stage == 3 else -1
+                law = mesh_law(group, first, last, slot, rows, turned, approach, rate, roll_rate, work, wide)
+                accelerate(group, law, at, at + size, forces, a, work)
+                if part == 0:
+                    if stage == 0:
+                        loaded = law[7]
+                        store(lost, 0, load(lost, 0) + where_above(law[0] * law[0], zero, zero, one))
+                    else:
+                        differs = law[7] - loaded
+                        changed = where_above(differs * differs, zero, one, changed)
+                        store(work, layout.MOTION * n, approach)
+                if stage == 3:
+                    break
+                reach = h if stage == 2 else half
+                for i in range(0, size, n):
+                    gained = load(work, a + i)
+                    store(work, ahead + i, load(work, source + i) + reach * load(work, at + size + i))
+                    store(work, ahead + size + i, load(work, source + size + i) + reach * gained)
+                    if stage == 0:
+                        store(work, total_q + i, gained)
+                        store(work, total_v + i, gained)
+                    else:
+                        store(work, total_q + i, load(work, total_q + i) + gained)
+                        store(work, total_v + i, load(work, total_v + i) + 2.0 * gained)
+                at, ahead = ahead, trial_b if ahead == trial_a else trial_a
+            sixth = h * (1.0 / 6.0)
+            for i in range(0, size, n):
+                gained = load(work, total_v + i) + load(work, a + i)
+                store(work, total_v + i, gained)
+                speed_0 = load(work, source + size + i)
+                store(work, target + i, load(work, source + i) + h * (speed_0 + sixth * load(work, total_q + i)))
+                store(work, target + size + i, speed_0 + sixth * gained)
             for c in range(n_channels):
-                place = (mean if n_parts == 1 else part_mean) + c * LANES
-                value = load(work, total + size + channels[c] * LANES) * spread(1.0 / (6.0 * n_parts))
-                store(work, place, value if part == 0 else load(work, place) + value)
+                value = load(work, total_v + channels[c] * n) * (1.0 / 6.0)
+                if part == 0:
+                    store(work, mean + c * n, value + gain * load(group.rotation, channels[c] * n))
+                elif part == 1:
+                    store(work, part_mean + c * n, share * value)
+                else:
+                    value = load(work, part_mean + c * n) + (1.0 - share) * value
+                    store(work, part_mean + c * n, value + gain * load(group.rotation, channels[c] * n))
             part += 1
             if n_parts == 1 and any_above(changed, zero):
-                n_parts, part = SUBSTEPS, 0
-                store(work, flags, changed)
-                for lane in range(LANES):
-                    near[WANTED * LANES + lane] = 1 if work[flags + lane] > 0.0 else 0
-                source, target, begin, end = now, parted, start_slot, 5
-            elif n_parts > 1:
-                source, begin = parted, end
-                end = 6 if end == 5 else 5
+                n_parts = 3
+                store(work, layout.WITHIN * n, load(work, layout.WITHIN * n) - margin)
+                share = event(group, first, last, work)
+                store(work, layout.WITHIN * n, load(work, layout.WITHIN * n) + margin)
+                store(work, layout.FLAGS * n, changed)
+                store(work, (AHEAD + PART) * n, share * load(work, (AHEAD + end) * n))
+                for lane in range(n):
+                    wide[(ROLL + PART) * n + lane] = wide[BASE * n + lane] + work[(AHEAD + PART) * n + lane]
+                gather(group, PART, False, work, wide, near)
+                first = min(first, near[spans + 4 * PART + 2])
+                last = max(last, near[spans + 4 * PART + 3])
+                cover(begin, first, last, work, near)
+                cover(PART, first, last, work, near)
+                cover(end, first, last, work, near)
         if n_parts > 1:
-            _take_parted(work, near, flags, begin, end_slot, rolls, single, parted, 2 * size)
-            for c in range(n_channels):
-                place = mean + c * LANES
-                taken = where_above(load(work, flags), zero, load(work, part_mean + c * LANES), load(work, place))
-                store(work, place, taken)
+            for i in range(0, 2 * size, n):
+                store(work, single + i, where_above(changed, zero, load(work, parted + i), load(work, single + i)))
+            for c in range(0, n_channels * n, n):
+                taken = where_above(changed, zero, load(work, part_mean + c), load(work, mean + c))
+                store(work, mean + c, taken)
         for c in range(n_channels):
-            store(out, (c * n_steps + n) * LANES, load(work, mean + c * LANES))
+            store(out, ((out_row + place - first_step) * n_channels + c) * n, load(work, mean + c * n))
         now, single = single, now
-        start_slot, end_slot = end_slot, start_slot
-    if start_slot == 2:
-        store(work, flags, one)
-        _take_parted(work, near, flags, 2, 1, rolls, single, parted, 0)
-    for i in range(0, 2 * size, LANES):
+        begin, end = end, begin
+    if begin == 2:
+        for i in range(0, layout.SLOT_ROWS * n, n):
+            store(work, layout.SLOT_ROWS * n + i, load(work, 2 * layout.SLOT_ROWS * n + i))
+        for lane in range(n):
+            wide[(ROLL + 1) * n + lane] = wide[(ROLL + 2) * n + lane]
+        for k in range(4):
+            near[layout.SPAN * n + 4 + k] = near[layout.SPAN * n + 8 + k]
+    for i in range(0, 2 * size, n):
         store(state, i, load(work, now + i))
+    return angle_row
 
 
 @compiled
-def _take_parted(work, near, flags, parted_slot, slot, rolls, single, parted, size):
-    """Put the state and the pairs of the lanes that were taken in parts in place of those taken at once."""
-    for lane in range(LANES):
-        near[WANTED * LANES + lane] = 1
-        if work[flags + lane] == 0.0:
-            continue
-        for i in range(0, size, LANES):
-            work[single + i + lane] = work[parted + i + lane]
-        for row in range(SLOT_ROWS):
-            work[(slot * SLOT_ROWS + row) * LANES + lane] = work[(parted_slot * SLOT_ROWS + row) * LANES + lane]
-        work[(rolls + slot) * LANES + lane] = work[(rolls + parted_slot) * LANES + lane]
-        near[slot * LANES + lane] = near[parted_slot * LANES + lane]
-    # a lane may have brought more pairs than any had here: what lies behind the others' must be nobody
-    for lane in range(LANES):
-        for k in range(near[slot * LANES + lane], N_PAIRS):
-            here = (slot * SLOT_ROWS + k * mesh.N_KEPT) * LANES + lane
-            work[here + mesh.OWN * LANES] = 1.0
-            work[here + mesh.STIFFNESS * LANES] = 1.0
-            work[here + mesh.OWN_SLOPE * LANES] = 0.0
-            work[here + mesh.GAP * LANES] = mesh.FAR
-            work[here + mesh.GAP_SLOPE * LANES] = 0.0
-            work[here + mesh.POSITION * LANES] = -mesh.FAR
+def low_pass(means, first, taps, factor, n_channels, n_samples, out, out_row):
+    """Every ``factor``-th value of the filtered series of every channel.
+
+    ``means`` (step, channel, lane) and, from row ``out_row`` on, ``out`` (sample, channel, lane), flat; ``first`` is
+    the step under the first tap of the first sample. Four partial sums, always in the same order.
+    """
+    n, n_taps = width(means), len(taps)
+    row = n_channels * n
+    for s in range(n_samples):
+        for c in range(n_channels):
+            base = (first + s * factor) * row + c * n
+            zero = spread(means, 0.0)
+            p, q, r, t = zero, zero, zero, zero
+            for k in range(0, n_taps - 3, 4):
+                here = base + k * row
+                p = p + taps[k] * load(means, here)
+                q = q + taps[k + 1] * load(means, here + row)
+                r = r + taps[k + 2] * load(means, here + 2 * row)
+                t = t + taps[k + 3] * load(means, here + 3 * row)
+            for k in range(n_taps - n_taps % 4, n_taps):
+                p = p + taps[k] * load(means, base + k * row)
+            store(out, (out_row + s) * row + c * n, (p + q) + (r + t))
 
 
 @compiled
-def law_at(group, motion, work, near, found):
+def record(
+    group, state, lost, fresh, step, first_step, n_samples, factor, taps, channels, out, angle, means, work, wide, near
+):
+    """Integrate and decimate block by block, so that nothing at the internal rate leaves the cache.
+
+    ``out`` (lane, channel, sample) float64 takes ``n_samples``; the first tap of the first stands on the step after
+    ``first_step``. ``means`` is a scratch of ``mean_rows`` rows of channels, of which the last ``BLOCK`` take samples.
+    """
+    n, n_channels, n_kept = width(work), len(channels), len(taps) - factor
+    angle_row, now, done, row = 0, first_step, 0, len(channels) * width(work)
+    samples = n_kept + BLOCK * factor
+    n_steps, out_row = 1, -1  # then what the first sample needs before its last steps, then block by block
+    while True:
+        angle_row = integrate(
+            group, state, lost, fresh, step, now, n_steps, channels, means, out_row, angle, angle_row, factor, work,
+            wide, near,
+        )  # fmt: skip
+        now += n_steps
+        for lane in range(n):
+            fresh[lane] = 0.0
+        if out_row == n_kept:
+            n_block = n_steps // factor
+            low_pass(means, 0, taps, factor, n_channels, n_block, means, samples)
+            for lane in range(n):
+                for c in range(n_channels):
+                    for s in range(n_block):
+                        out[(lane * n_channels + c) * n_samples + done + s] = means[(samples + s) * row + c * n + lane]
+            for i in range(0, n_kept * row, n):
+                store(means, i, load(means, n_steps * row + i))
+            done += n_block
+        if done == n_samples:
+            break
+        n_steps, out_row = (n_kept, 0) if out_row < 0 else (min(BLOCK, n_samples - done) * factor, n_kept)
+
+
+@compiled
+def law_at(group, motion, work, wide, near, found):
     """Every lane's law at one instant; rows of ``motion`` are roll, approach, its rate, the roll's rate.
 
     ``found`` takes the rows of the law. For tests: the integrator reads the tables less often.
     """
-    numbers, places, table, tooth_row, tooth_error = (
-        group.numbers,
-        group.places,
-        group.table,
-        group.tooth_row,
-        group.tooth_error,
-    )
-    one_sided, consistent = group.one_sided, group.consistent
-    extra = N_SLOTS * SLOT_ROWS
-    store(work, (extra + ROLL) * LANES, load(motion, 0))
-    within = load(motion, LANES) if one_sided else spread(2.0 * mesh.FAR)
-    store(work, (extra + mesh.WITHIN) * LANES, within)
-    for lane in range(LANES):
-        near[WANTED * LANES + lane] = 1
-    most = gather(numbers, places, table, tooth_row, tooth_error, extra + ROLL, extra + mesh.WITHIN, 1, work, near)
+    n = width(work)
+    for lane in range(n):
+        wide[BASE * n + lane] = motion[lane]
+        wide[(ROLL + 1) * n + lane] = motion[lane]
+        work[layout.WITHIN * n + lane] = motion[n + lane] if group.one_sided else 2.0 * layout.FAR
+    store(work, (AHEAD + 1) * n, spread(work, 0.0))
+    gather(group, 1, True, work, wide, near)
+    spans = layout.SPAN * n
     law = mesh_law(
-        numbers, places, table, tooth_row, one_sided, consistent, most, 1, spread(0.0), load(motion, 0),
-        load(motion, LANES), load(motion, 2 * LANES), load(motion, 3 * LANES), work,
+        group, near[spans + 6], near[spans + 7], 1, layout.MARGIN, spread(work, 0.0), load(motion, n),
+        load(motion, 2 * n), load(motion, 3 * n), work, wide,
     )  # fmt: skip
-    for row in range(mesh.N_LAW):
-        store(found, row * LANES, law[row])
+    for row in range(layout.N_LAW):
+        store(found, row * n, law[row])
 
 
-def scratch(n_dof, n_channels):
-    """Work rows and pair counts of ``integrate`` and ``law_at``."""
-    n_rows = N_SLOTS * SLOT_ROWS + mesh.LAW + mesh.N_LAW + 4 + 11 * n_dof + 2 * max(n_dof, n_channels) + n_dof
-    near = np.zeros((mesh.N_COUNTS, LANES), dtype=np.int64)
-    near[mesh.NEWEST] = -(2**62)  # no pair: the first look at the tables finds the teeth
-    return np.zeros(n_rows * LANES), near.ravel()
+def mean_rows(n_taps, factor):
+    """Rows of channels that ``record`` needs for its steps."""
+    return n_taps - factor + BLOCK * factor + BLOCK
+
+
+def scratch(n_dof, n_channels, precision="float64"):
+    """Work rows, float64 rows and whole numbers of ``integrate`` and ``law_at``."""
+    n = n_lanes(precision)
+    n_rows = layout.N_MESH + 14 * n_dof + 4 + 2 * n_channels
+    near = np.zeros((layout.N_COUNTS, n), dtype=np.int64)
+    near[layout.NEWEST] = layout.NOBODY  # no pair: the first look at the tables finds the teeth
+    return np.zeros(n_rows * n, dtype=precision), np.zeros(layout.N_WIDE * n), near.ravel()

@@ -1,7 +1,9 @@
-"""Four float64 side by side as one Numba value, one for each record of a group.
+"""Several numbers side by side as one Numba value, one for each record of a group.
 
 Numba cannot be told that arrays do not overlap, so LLVM seldom vectorises its loops. A value of LLVM's own vector type
 needs no luck, and its lanes cannot touch each other: a record's bits do not depend on its neighbours. No fast-math.
+
+A group is 64 bytes wide: two AVX registers, so that each waits less for the other. Rows of tables are vectors of four.
 """
 
 from __future__ import annotations
@@ -10,13 +12,16 @@ import functools
 import operator
 from typing import Any
 
+import numpy as np
 from llvmlite import ir
 from numba import njit
 from numba.core import types
 from numba.core.typing.templates import ConcreteTemplate, infer_global, signature
 from numba.extending import intrinsic, lower_builtin, models, register_model
 
-LANES = 4
+PRECISIONS = ("float64", "float32")
+GROUP_BYTES = 64
+FOUR = 4
 
 # Without Numba's reference counting (arrays are borrowed, none is made here) a step costs a third less.
 _OPTIONS: dict[str, Any] = {"cache": True, "error_model": "numpy", "_nrt": False}
@@ -24,34 +29,70 @@ compiled: Any = functools.partial(njit, nogil=True, **_OPTIONS)()
 inlined: Any = functools.partial(njit, inline="always", **_OPTIONS)()
 
 _intrinsic: Any = intrinsic
+_INDEX = ir.IntType(32)
+
+
+def n_lanes(precision: str) -> int:
+    """Records of a group: 8 in float64, 16 in float32."""
+    return int(GROUP_BYTES // np.dtype(precision).itemsize)
+
+
+LANES = n_lanes("float64")
 
 
 class Vector(types.Type):  # type: ignore[misc]
-    """The Numba type of ``LANES`` float64."""
+    """The Numba type of some numbers of one kind."""
 
-    def __init__(self) -> None:
-        super().__init__(name=f"float64x{LANES}")
-
-
-VECTOR = Vector()
-_LLVM = ir.VectorType(ir.DoubleType(), LANES)
-_INDEX = ir.IntType(32)
+    def __init__(self, element: Any, count: int) -> None:
+        self.element, self.count = element, count
+        self.llvm = ir.VectorType(ir.DoubleType() if element is types.float64 else ir.FloatType(), count)
+        super().__init__(name=f"{element}x{count}")
 
 
 @register_model(Vector)
 class _Model(models.PrimitiveModel):  # type: ignore[misc]
     def __init__(self, manager: Any, kind: Any) -> None:
-        super().__init__(manager, kind, _LLVM)
+        super().__init__(manager, kind, kind.llvm)
+
+
+_ELEMENTS = {name: getattr(types, name) for name in PRECISIONS}
+GROUPS = {element: Vector(element, n_lanes(name)) for name, element in _ELEMENTS.items()}
+ROWS = {element: Vector(element, FOUR) for element in _ELEMENTS.values()}
+VECTORS = (*GROUPS.values(), *ROWS.values())
+
+
+def _filled(builder: Any, kind: Vector, number: Any) -> Any:
+    """A float64 in every place of a vector."""
+    if kind.element is types.float32:
+        number = builder.fptrunc(number, ir.FloatType())
+    nothing = ir.Constant(kind.llvm, ir.Undefined)
+    one = builder.insert_element(nothing, number, ir.Constant(_INDEX, 0))
+    return builder.shuffle_vector(one, nothing, ir.Constant(ir.VectorType(_INDEX, kind.count), [0] * kind.count))
 
 
 def _binary(function: Any, instruction: str) -> None:
     @infer_global(function)
     class _Typed(ConcreteTemplate):  # type: ignore[misc]
-        cases = [signature(VECTOR, VECTOR, VECTOR)]  # noqa: RUF012
+        cases = [  # noqa: RUF012
+            signature(kind, *given)
+            for kind in VECTORS
+            for given in ((kind, kind), (kind, types.float64), (types.float64, kind))
+        ]
 
-    @lower_builtin(function, VECTOR, VECTOR)  # type: ignore[untyped-decorator]
-    def _lowered(context: Any, builder: Any, sig: Any, args: Any) -> Any:
-        return getattr(builder, instruction)(*args)
+    for kind in VECTORS:
+
+        @lower_builtin(function, kind, kind)  # type: ignore[untyped-decorator]
+        def _both(context: Any, builder: Any, sig: Any, args: Any) -> Any:
+            return getattr(builder, instruction)(*args)
+
+        @lower_builtin(function, kind, types.float64)  # type: ignore[untyped-decorator]
+        @lower_builtin(function, types.float64, kind)  # type: ignore[untyped-decorator]
+        def _mixed(context: Any, builder: Any, sig: Any, args: Any) -> Any:
+            vectors = [
+                value if given is sig.return_type else _filled(builder, sig.return_type, value)
+                for given, value in zip(sig.args, args, strict=True)
+            ]
+            return getattr(builder, instruction)(*vectors)
 
 
 for _function, _instruction in (
@@ -63,43 +104,64 @@ for _function, _instruction in (
     _binary(_function, _instruction)
 
 
-def _address(context: Any, builder: Any, kind: Any, array: Any, place: Any) -> Any:
+def _address(context: Any, builder: Any, kind: Any, array: Any, place: Any, vector: Vector) -> Any:
     # the plain field: a proxy of the whole array at every access would cost the compiler most of its time
     data = builder.extract_value(array, context.data_model_manager[kind].get_field_position("data"))
-    return builder.bitcast(builder.gep(data, [place]), _LLVM.as_pointer())
+    return builder.bitcast(builder.gep(data, [place]), vector.llvm.as_pointer())
+
+
+def _loaded(vectors: dict[Any, Vector], array: Any) -> Any:
+    def build(context: Any, builder: Any, sig: Any, args: Any) -> Any:
+        size = sig.return_type.element.bitwidth // 8
+        return builder.load(_address(context, builder, sig.args[0], args[0], args[1], sig.return_type), align=size)
+
+    return vectors[array.dtype](array, types.intp), build
 
 
 @_intrinsic
 def load(typing_context: Any, array: Any, place: Any) -> Any:
-    """The vector that begins at ``place`` of a one-dimensional float64 array."""
+    """The numbers of a group that begin at ``place`` of a one-dimensional array."""
+    return _loaded(GROUPS, array)
 
-    def build(context: Any, builder: Any, sig: Any, args: Any) -> Any:
-        return builder.load(_address(context, builder, sig.args[0], args[0], args[1]), align=8)
 
-    return VECTOR(array, types.intp), build
+@_intrinsic
+def load_four(typing_context: Any, array: Any, place: Any) -> Any:
+    """Four numbers from ``place`` on."""
+    return _loaded(ROWS, array)
 
 
 @_intrinsic
 def store(typing_context: Any, array: Any, place: Any, value: Any) -> Any:
-    """Write a vector from ``place`` of a one-dimensional float64 array on."""
+    """Write a vector from ``place`` of a one-dimensional array of its kind on."""
+    if array.dtype is not value.element:
+        raise TypeError(f"{value} does not fit an array of {array.dtype}")
 
     def build(context: Any, builder: Any, sig: Any, args: Any) -> Any:
-        builder.store(args[2], _address(context, builder, sig.args[0], args[0], args[1]), align=8)
+        size = sig.args[2].element.bitwidth // 8
+        builder.store(args[2], _address(context, builder, sig.args[0], args[0], args[1], sig.args[2]), align=size)
         return context.get_dummy_value()
 
-    return types.void(array, types.intp, VECTOR), build
+    return types.void(array, types.intp, value), build
 
 
 @_intrinsic
-def spread(typing_context: Any, value: Any) -> Any:
-    """The same number in every lane."""
+def width(typing_context: Any, array: Any) -> Any:
+    """Records of a group whose numbers have the array's kind."""
 
     def build(context: Any, builder: Any, sig: Any, args: Any) -> Any:
-        nothing = ir.Constant(_LLVM, ir.Undefined)
-        one = builder.insert_element(nothing, args[0], ir.Constant(_INDEX, 0))
-        return builder.shuffle_vector(one, nothing, ir.Constant(ir.VectorType(_INDEX, LANES), [0] * LANES))
+        return context.get_constant(types.intp, GROUPS[sig.args[0].dtype].count)
 
-    return VECTOR(types.float64), build
+    return types.intp(array), build
+
+
+@_intrinsic
+def spread(typing_context: Any, array: Any, value: Any) -> Any:
+    """The same number in every lane, of the array's kind."""
+
+    def build(context: Any, builder: Any, sig: Any, args: Any) -> Any:
+        return _filled(builder, sig.return_type, args[1])
+
+    return GROUPS[array.dtype](array, types.float64), build
 
 
 @_intrinsic
@@ -109,7 +171,7 @@ def where_above(typing_context: Any, a: Any, b: Any, yes: Any, no: Any) -> Any:
     def build(context: Any, builder: Any, sig: Any, args: Any) -> Any:
         return builder.select(builder.fcmp_ordered(">", args[0], args[1]), args[2], args[3])
 
-    return VECTOR(VECTOR, VECTOR, VECTOR, VECTOR), build
+    return a(a, a, a, a), build
 
 
 @_intrinsic
@@ -117,19 +179,21 @@ def any_above(typing_context: Any, a: Any, b: Any) -> Any:
     """Whether a > b in any lane."""
 
     def build(context: Any, builder: Any, sig: Any, args: Any) -> Any:
-        bits = builder.bitcast(builder.fcmp_ordered(">", args[0], args[1]), ir.IntType(LANES))
-        return builder.icmp_unsigned("!=", bits, ir.Constant(ir.IntType(LANES), 0))
+        bits = ir.IntType(sig.args[0].count)
+        return builder.icmp_unsigned(
+            "!=", builder.bitcast(builder.fcmp_ordered(">", args[0], args[1]), bits), ir.Constant(bits, 0)
+        )
 
-    return types.boolean(VECTOR, VECTOR), build
+    return types.boolean(a, a), build
 
 
 @_intrinsic
 def transpose(typing_context: Any, a: Any, b: Any, c: Any, d: Any) -> Any:
-    """Four rows as four columns."""
+    """Four rows of four as four columns."""
 
     def build(context: Any, builder: Any, sig: Any, args: Any) -> Any:
         def mixed(x: Any, y: Any, places: list[int]) -> Any:
-            return builder.shuffle_vector(x, y, ir.Constant(ir.VectorType(_INDEX, LANES), places))
+            return builder.shuffle_vector(x, y, ir.Constant(ir.VectorType(_INDEX, FOUR), places))
 
         low, high = [0, 4, 1, 5], [2, 6, 3, 7]
         ac_low, bd_low = mixed(args[0], args[2], low), mixed(args[1], args[3], low)
@@ -140,4 +204,15 @@ def transpose(typing_context: Any, a: Any, b: Any, c: Any, d: Any) -> Any:
         ]  # fmt: skip
         return context.make_tuple(builder, sig.return_type, columns)
 
-    return types.UniTuple(VECTOR, LANES)(VECTOR, VECTOR, VECTOR, VECTOR), build
+    return types.UniTuple(a, FOUR)(a, a, a, a), build
+
+
+@_intrinsic
+def second_and_fourth(typing_context: Any, row: Any) -> Any:
+    """(b, b, d, d) of a row (a, b, c, d)."""
+
+    def build(context: Any, builder: Any, sig: Any, args: Any) -> Any:
+        places = ir.Constant(ir.VectorType(_INDEX, FOUR), [1, 1, 3, 3])
+        return builder.shuffle_vector(args[0], ir.Constant(sig.args[0].llvm, ir.Undefined), places)
+
+    return row(row), build

@@ -11,9 +11,10 @@ import numpy as np
 from numpy.typing import NDArray
 
 from gensig.dynamics import _kernels
-from gensig.dynamics._mesh_kernels import Group
-from gensig.dynamics._vector import LANES
-from gensig.dynamics.lanes import pack
+from gensig.dynamics._layout import CENTER, Group
+from gensig.dynamics._vector import PRECISIONS, n_lanes
+from gensig.dynamics.decimation import Decimator, decimator
+from gensig.dynamics.lanes import at_step, fill_lanes, pack
 from gensig.dynamics.pair import DOFS, PairDynamics
 from gensig.dynamics.system import eigenvalues, slowest_decay
 from gensig.errors import ConfigError, SimulationError
@@ -28,6 +29,7 @@ CHECKED = 0.05  # s at the beginning of a record, integrated again at half the s
 FINEST = 64  # steps per sample that are tried where the error is too large
 SETTLED = 1e-4  # what is left of the start's transient, as a share
 STABILITY_LIMIT = 2.6  # |lambda| h of the classical RK4 on the imaginary axis is 2.83, on the real axis 2.79
+MOST_BYTES = 2**28  # of the samples of the records that are simulated side by side
 
 
 class CoarseStepWarning(UserWarning):
@@ -36,7 +38,7 @@ class CoarseStepWarning(UserWarning):
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Solver:
-    """How finely to integrate: ``oversampling`` internal steps per output sample.
+    """How finely to integrate: ``oversampling`` internal steps per output sample, numbers of a ``precision``.
 
     A record whose error is found to be above ``max_error`` is integrated again with twice as many, up to 64; None
     does not look.
@@ -49,23 +51,24 @@ class Solver:
     def __post_init__(self) -> None:
         if not 2 <= self.oversampling <= 256:
             raise ConfigError(f"solver.oversampling = {self.oversampling} must lie in 2..256")
-        if self.precision != "float64":
-            raise ConfigError(f"solver.precision = {self.precision!r}; allowed: float64")
+        if self.precision not in PRECISIONS:
+            raise ConfigError(f"solver.precision = {self.precision!r}; allowed: {', '.join(PRECISIONS)}")
         if self.max_error is not None and not 1e-6 <= self.max_error <= 1.0:
             raise ConfigError(f"solver.max_error = {self.max_error:g} must lie in 1e-6..1, or be null")
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Motions:
-    """Mean accelerations of up to ``LANES`` machines over the internal steps and what the runs tell about themselves.
+    """Accelerations of machines that were integrated side by side, and what the runs tell about themselves.
 
-    ``acceleration`` (channel, step, lane) m/s2 or rad/s2; the first step ends where the first sample of the margin
-    lies. ``check`` is the same at half the step, of the beginning only; empty where the error is not asked for.
+    ``acceleration`` (lane, channel, sample) m/s2 or rad/s2; ``check`` is the same at half the step, of the beginning
+    only; empty where the error is not asked for. ``shaft_angle`` (lane, sample) rad of the pinion since time 0,
     ``mean_speed`` (lane,) rad/s, ``contact_loss_fraction`` (lane,), ``finite`` (lane,) whether all stayed so.
     """
 
     acceleration: Array
     check: Array
+    shaft_angle: Array
     mean_speed: Array
     contact_loss_fraction: Array
     finite: NDArray[np.bool_]
@@ -78,20 +81,59 @@ def settling_time(dynamics: PairDynamics) -> float:
 
 
 class _Run:
-    """A group on its way: the state (2, dof, lane), the lost steps (lane,), and the scratch of the compiled core."""
+    """Machines on their way: the state (2, dof, lane), the lost steps (lane,), and the scratch of the compiled core."""
 
-    def __init__(self, state: Array, index: NDArray[np.int64]) -> None:
-        self.state, self.index = state, index
-        self.lost, self.fresh = np.zeros(LANES), np.ones(LANES)
-        self.scratch = _kernels.scratch(state.shape[1], len(index))
+    def __init__(self, lanes: Sequence[PairDynamics], channels: NDArray[np.int64], precision: str) -> None:
+        self.n_lanes, self.channels, self.precision = len(lanes), channels, precision
+        self.state = np.zeros((2, len(lanes[0].dofs), len(lanes)), dtype=precision)
+        self.lost, self.fresh = (np.full(len(lanes), value, dtype=precision) for value in (0.0, 1.0))
+        self.work, self.wide, self.near = _kernels.scratch(self.state.shape[1], len(channels), precision)
 
-    def advance(self, group: Group, step: float, first_step: int, n_steps: int, out: Array) -> None:
+    @property
+    def center(self) -> Array:
+        """What the pinions have turned besides ``state``, (lane,) rad; a view."""
+        return self.wide.reshape(-1, self.n_lanes)[CENTER]
+
+    def begin(self, group: Group, lane: int, deflection: Array) -> None:
+        """Put one lane at rest at a deflection (dof,)."""
+        self.state[:, :, lane] = 0.0
+        self.state[0, :, lane] = deflection - group.rest[:, lane]
+        self.center[lane], self.fresh[lane] = 0.0, 1.0
+
+    def again(self) -> _Run:
+        """The same state, to be integrated otherwise."""
+        other = object.__new__(_Run)
+        other.n_lanes, other.channels, other.precision = self.n_lanes, self.channels, self.precision
+        other.state, other.lost, other.fresh = self.state.copy(), np.zeros_like(self.lost), np.ones_like(self.fresh)
+        other.work, other.wide, other.near = self.work.copy(), self.wide.copy(), self.near.copy()
+        return other
+
+    def advance(self, group: Group, step: float, first_step: int, n_steps: int) -> None:
         """Integrate, and go on from there at the next call unless lanes are marked as fresh."""
-        state, flat = self.state.ravel(), out.ravel()
+        nothing = np.empty(0, dtype=self.precision)
         _kernels.integrate(
-            group, state, self.lost, self.fresh, step, first_step, n_steps, self.index, flat, *self.scratch
-        )
+            group, self.state.ravel(), self.lost, self.fresh, step, first_step, n_steps, self.channels, nothing, -1,
+            np.empty(0), -1, 1, self.work, self.wide, self.near,
+        )  # fmt: skip
         self.fresh[:] = 0.0
+
+    def record(self, group: Group, step: float, low_pass: Decimator, n_samples: int) -> tuple[Array, Array]:
+        """Integrate on, from ``low_pass.margin`` samples and a step before time 0, and decimate.
+
+        Returns
+        -------
+        accelerations (lane, channel, sample), and angles of the pinions (lane, sample + 1)
+        """
+        factor, margin = low_pass.oversampling, low_pass.margin
+        out = np.empty((self.n_lanes, len(self.channels), n_samples))
+        angle = np.empty((n_samples + 2 * margin, self.n_lanes))
+        n_rows = _kernels.mean_rows(len(low_pass.taps), factor)
+        means = np.empty((n_rows, len(self.channels), self.n_lanes), dtype=self.precision)
+        _kernels.record(
+            group, self.state.ravel(), self.lost, self.fresh, step, -margin * factor - 1, n_samples, factor,
+            low_pass.taps, self.channels, out.ravel(), angle.ravel(), means.ravel(), self.work, self.wide, self.near,
+        )  # fmt: skip
+        return out, np.ascontiguousarray(angle[margin : margin + n_samples + 1].T)
 
 
 def integrate(
@@ -101,61 +143,62 @@ def integrate(
     sampling_rate: float,
     duration: float,
     channels: tuple[str, ...],
-    margin: int,
 ) -> Motions:
-    """Settle every machine by itself, then record ``duration`` plus ``margin`` output samples on either side.
+    """Settle every machine by itself, then record ``duration`` from time 0 on.
 
-    The machines share what ``settling_oversampling`` says of each.
+    The machines share their degrees of freedom, the kind of their mesh law, and what ``settling_oversampling`` says.
 
     Raises
     ------
     ConfigError    for a channel the system has not
     """
-    check_channels(channels)
-    fine = solver.oversampling
-    step = 1.0 / (sampling_rate * fine)
-    coarse = settling_oversampling(machines[0], solver, sampling_rate)
-    n_fine = math.ceil(FINE_SETTLING * sampling_rate)
-    n_record = (count_samples(duration, sampling_rate) + 2 * margin) * fine + 1
-    index = np.array([DOFS.index(name) for name in channels], dtype=np.int64)
-    run = _Run(np.zeros((2, len(DOFS), LANES)), index)
-    nothing = np.empty(0)
-    end = -margin - n_fine  # output samples; time 0 is the first recorded one
-    lanes = _lanes(machines)
+    check_channels(channels, machines[0].dofs)
+    precision, fine, low_pass = solver.precision, solver.oversampling, decimator(solver.oversampling)
+    lanes = fill_lanes(machines, precision)
+    n_samples, n_fine = count_samples(duration, sampling_rate), math.ceil(FINE_SETTLING * sampling_rate)
+    end = -low_pass.margin - n_fine  # output samples; time 0 is the first recorded one
     # every lane begins in its own time; until then it integrates what nobody looks at
     begins = [min(end, end + n_fine - math.ceil(settling_time(machine) * sampling_rate)) for machine in lanes]
-    group, coarse_step = pack(machines, 1.0 / (sampling_rate * coarse)), 1.0 / (sampling_rate * coarse)
+    span = min(begins) / sampling_rate, duration + low_pass.margin / sampling_rate
+    run = _Run(lanes, np.array([machines[0].dofs.index(name) for name in channels], dtype=np.int64), precision)
+
+    coarse = settling_oversampling(machines[0], solver, sampling_rate)
+    step = 1.0 / (sampling_rate * coarse)
+    settling = pack(machines, step, precision, span), step
+
+    def at(oversampling: int) -> tuple[Group, float]:
+        other = 1.0 / (sampling_rate * oversampling)
+        return at_step(settling[0], step, other), other
+
     now = min(begins)
     for begin in sorted(set(begins)):
-        run.advance(group, coarse_step, now * coarse, (begin - now) * coarse, nothing)
+        run.advance(*settling, now * coarse, (begin - now) * coarse)
         for lane, dynamics in enumerate(lanes):
             if begins[lane] == begin:
-                run.state[:, :, lane] = 0.0
-                run.state[0, :, lane] = dynamics.static_start(begin / sampling_rate)
-                run.fresh[lane] = 1.0
+                run.begin(settling[0], lane, dynamics.static_start(begin / sampling_rate))
         now = begin
-    run.advance(group, coarse_step, now * coarse, (end - now) * coarse, nothing)
-    group, run.fresh = pack(machines, step), np.ones(LANES)
-    run.advance(group, step, end * fine, n_fine * fine - 1, nothing)
-    settled = run.state.copy()
-    angle, run.lost = run.state[0, DOFS.index("pinion_rotation")].copy(), np.zeros(LANES)
-    out = np.empty((len(index), n_record, LANES))
-    run.advance(group, step, -margin * fine - 1, n_record, out)
-    turned = run.state[0, DOFS.index("pinion_rotation")] - angle
-    speed = np.array([dynamics.operating.speed for dynamics in lanes])
-    check = np.empty((len(index), 0, LANES))
+    run.advance(*settling, now * coarse, (end - now) * coarse)
+    recording = at(fine)
+    run = run.again()
+    run.advance(*recording, end * fine, n_fine * fine - 1)
+    checking = run.again()
+    run.lost[:] = 0.0
+    acceleration, angle = run.record(*recording, low_pass, n_samples)
+    check = np.empty((len(lanes), len(channels), 0))
     if solver.max_error is not None:
-        n_check = min(count_samples(duration, sampling_rate), math.ceil(CHECKED * sampling_rate))
-        check = np.empty((len(index), (n_check + 2 * margin) * 2 * fine + 1, LANES))
-        again = _Run(settled, index)
-        finer, first = pack(machines, 0.5 * step), -2 * (margin * fine + 1)
-        again.advance(finer, 0.5 * step, first, 1, nothing)
-        again.advance(finer, 0.5 * step, first + 1, check.shape[1], check)
+        finer, finer_low_pass = at(2 * fine), decimator(2 * fine)
+        # the settled state stands before the step that is the first here; the finer low-pass may reach less far
+        first = -2 * (low_pass.margin * fine + 1)
+        wait = -2 * finer_low_pass.margin * fine - 1 - first
+        checking.advance(*finer, first, wait)
+        n_check = min(n_samples, math.ceil(CHECKED * sampling_rate))
+        check, _ = checking.record(*finer, finer_low_pass, n_check)
     return Motions(
-        acceleration=out,
+        acceleration=acceleration,
         check=check,
-        mean_speed=speed + turned / (n_record * step),
-        contact_loss_fraction=run.lost / n_record,
+        shaft_angle=angle[:, :-1],
+        mean_speed=(angle[:, -1] - angle[:, 0]) * sampling_rate / n_samples,
+        contact_loss_fraction=run.lost / ((n_samples + 2 * low_pass.margin) * fine + 1),
         finite=np.asarray(np.isfinite(run.state).all(axis=(0, 1))),
     )
 
@@ -168,19 +211,9 @@ def settling_oversampling(dynamics: PairDynamics, solver: Solver, sampling_rate:
     SimulationError    where even the record's step is too long for the stiffest motion
     """
     fine = solver.oversampling
-    check_step(dynamics, 1.0 / (sampling_rate * fine))
-    if fine > COARSE_OVERSAMPLING and _stable(dynamics, 1.0 / (sampling_rate * COARSE_OVERSAMPLING)):
-        return COARSE_OVERSAMPLING
-    return fine
-
-
-def _lanes(machines: Sequence[PairDynamics]) -> list[PairDynamics]:
-    """One machine a lane; lanes without one repeat the first."""
-    return [*machines, *[machines[0]] * (LANES - len(machines))]
-
-
-def _stable(dynamics: PairDynamics, step: float) -> bool:
-    return float(np.abs(_rates(dynamics)).max()) * step < 0.5 * STABILITY_LIMIT
+    check_step(dynamics, sampling_rate, fine)
+    stable = float(np.abs(_rates(dynamics)).max()) / (sampling_rate * COARSE_OVERSAMPLING) < 0.5 * STABILITY_LIMIT
+    return COARSE_OVERSAMPLING if stable and fine > COARSE_OVERSAMPLING else fine
 
 
 def _rates(dynamics: PairDynamics) -> NDArray[np.complex128]:
@@ -196,21 +229,35 @@ def count_samples(duration: float, sampling_rate: float) -> int:
     return n_samples
 
 
-def check_channels(channels: tuple[str, ...]) -> None:
-    """Raise ConfigError for a channel that a gear pair has not."""
-    unknown = [name for name in channels if name not in DOFS]
+def check_memory(duration: float, sampling_rate: float, n_channels: int, precision: str) -> None:
+    """Raise ConfigError for records that would not fit into memory side by side."""
+    together = n_lanes(precision)
+    n_bytes = count_samples(duration, sampling_rate) * n_channels * together * 8
+    if n_bytes > MOST_BYTES:
+        longest = duration * MOST_BYTES / n_bytes
+        raise ConfigError(
+            f"operating.duration_s = {duration:g}: {together} records side by side with {n_channels} channels at "
+            f"{sampling_rate:g} Hz take {n_bytes / 2**20:.0f} MiB, more than {MOST_BYTES / 2**20:.0f}; record at most "
+            f"{longest:.3g} s at a time"
+        )
+
+
+def check_channels(channels: tuple[str, ...], dofs: tuple[str, ...] = DOFS) -> None:
+    """Raise ConfigError for a channel that a machine has not."""
+    unknown = [name for name in channels if name not in dofs]
     if unknown:
-        raise ConfigError(f"sensing.channels: no channel {', '.join(unknown)}; allowed: {', '.join(DOFS)}")
+        raise ConfigError(f"sensing.channels: no channel {', '.join(unknown)}; allowed: {', '.join(dofs)}")
 
 
-def check_step(dynamics: PairDynamics, step: float) -> None:
+def check_step(dynamics: PairDynamics, sampling_rate: float, oversampling: int) -> None:
     """Raise SimulationError for a step that RK4 cannot take, warn of one that is too long to be accurate."""
-    rates = _rates(dynamics)
+    rates, step = _rates(dynamics), 1.0 / (sampling_rate * oversampling)
     fastest = float(np.abs(rates).max())
     if fastest * step > STABILITY_LIMIT:
         raise SimulationError(
-            f"the internal step {step:.3g} s is too long for the stiffest motion at {fastest / (2 * math.pi):.4g} Hz; "
-            f"raise solver.oversampling by at least {fastest * step / STABILITY_LIMIT:.2g} times"
+            f"solver.oversampling = {oversampling} makes internal steps of {step:.3g} s, too long for the stiffest "
+            f"motion at {fastest / (2 * math.pi):.4g} Hz; raise solver.oversampling to at least "
+            f"{math.ceil(oversampling * fastest * step / STABILITY_LIMIT)}"
         )
     oscillating = float(np.abs(np.imag(rates)).max())
     if oscillating * step > 0.5:

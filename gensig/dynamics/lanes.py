@@ -2,39 +2,64 @@
 
 from __future__ import annotations
 
+import math
 from collections.abc import Sequence
 
 import numpy as np
 from numpy.typing import NDArray
 
-from gensig.dynamics._mesh_kernels import N_NUMBERS, N_PLACES, Group
-from gensig.dynamics._vector import LANES
+from gensig.dynamics._layout import (
+    N_EXACT,
+    N_NUMBERS,
+    N_PLACES,
+    N_PROFILE,
+    NODES_PER_METER,
+    NOMINAL_ACCELERATION,
+    NOMINAL_ANGLE,
+    NOMINAL_SPEED,
+    PER_SWITCH_WIDTH,
+    TORQUE,
+    TORQUE_SLOPE,
+    Group,
+)
+from gensig.dynamics._vector import n_lanes
 from gensig.dynamics.pair import PairDynamics
-from gensig.mesh.pair_table import GearTable
+from gensig.dynamics.system import LumpedSystem
+from gensig.mesh.pair_table import GearTable, PairTable
 
 Array = NDArray[np.float64]
 
-DOF_PLACES = (0, 1, 2, 3, 4, 5)  # of pinion x, y, rotation, wheel x, y, rotation
+CELLS_PER_SECOND = 1000.0  # in which speed and torque run straight
 
 
-def pack(dynamics: Sequence[PairDynamics], step: float) -> Group:
-    """Up to ``LANES`` gear pairs of one mesh law as one group; lanes without a pair repeat the first.
+def fill_lanes(dynamics: Sequence[PairDynamics], precision: str) -> list[PairDynamics]:
+    """One machine a lane; lanes without one repeat the first."""
+    return [*dynamics, *[dynamics[0]] * (n_lanes(precision) - len(dynamics))]
+
+
+def pack(
+    dynamics: Sequence[PairDynamics],
+    step: float,
+    precision: str = "float64",
+    span: tuple[float, float] = (0.0, 0.0),
+) -> Group:
+    """Gear pairs of one mesh law as one group.
 
     Parameters
     ----------
     step : s    of integration, over which the paper's law switches a pair
+    span : s    from when to when the course of speed and torque is needed, where they change
     """
-    lanes = [*dynamics, *[dynamics[0]] * (LANES - len(dynamics))]
-    tables = [np.concatenate([_columns(one.table.pinion), _columns(one.table.wheel)]) for one in lanes]
-    rows = [
-        np.concatenate([_rows(one.table.pinion, 0), _rows(one.table.wheel, len(one.table.pinion.compliance))])
-        for one in lanes
-    ]
+    lanes = fill_lanes(dynamics, precision)
+    tables = [_pair_rows(one.table) for one in lanes]
+    rows = [np.concatenate([_rows(one.table.pinion), _rows(one.table.wheel)]) for one in lanes]
     sizes = [table.size for table in tables]
     teeth = [len(row) for row in rows]
-    numbers, places = np.empty((N_NUMBERS, LANES)), np.empty((N_PLACES, LANES), dtype=np.int64)
+    numbers, exact = np.empty((N_NUMBERS, len(lanes)), dtype=precision), np.empty((N_EXACT, len(lanes)))
+    places = np.empty((N_PLACES, len(lanes)), dtype=np.int64)
+    rests = [one.rest() for one in lanes]
     for lane, one in enumerate(lanes):
-        numbers[:, lane] = one.numbers(step)
+        numbers[:, lane], exact[:, lane] = one.numbers(step, rests[lane]), one.exact_numbers()
         first_tooth, n_nodes = sum(teeth[:lane]), tables[lane].shape[1]
         n_pinion = one.table.pair.pinion.n_teeth
         places[:, lane] = (
@@ -47,35 +72,72 @@ def pack(dynamics: Sequence[PairDynamics], step: float) -> Group:
             sum(sizes[:lane]),
             n_nodes * tables[lane].shape[2],
             n_nodes - 2,
-            len(one.table.pinion.compliance),
+            *_row_steps(one.table),
         )
     systems = [one.system() for one in lanes]
-    k_row, k_column = np.nonzero(np.any([system.stiffness != 0.0 for system in systems], axis=0))
-    c_row, c_column = np.nonzero(np.any([system.damping != 0.0 for system in systems], axis=0))
+    stiffness = np.stack([system.stiffness for system in systems])
+    damping = np.stack([system.damping for system in systems])
+    mass, rotation = (np.stack([getattr(system, name) for system in systems]) for name in ("mass", "rotation"))
+    n_dof = mass.shape[1]
+    coupled = np.any((stiffness != 0.0) | (damping != 0.0), axis=0) & ~np.eye(n_dof, dtype=bool)
+    row, column = np.nonzero(coupled)
+    profile, profile_start, cells_per_second = _nominal(lanes, span)
+
+    def side_by_side(values: Array) -> NDArray[np.floating]:
+        """(lane, row...) flat, one lane beside the other."""
+        return np.ascontiguousarray(np.moveaxis(values, 0, -1), dtype=precision).ravel()
+
+    diagonal = np.arange(n_dof)
     options = lanes[0].table.options
     return Group(
         numbers=numbers.ravel(),
+        exact=exact.ravel(),
         places=places.ravel(),
-        table=np.concatenate([table.ravel() for table in tables]),
+        table=np.concatenate([table.ravel() for table in tables]).astype(precision),
+        bend=np.outer(0.5 / exact[NODES_PER_METER], [1.0, 0.0, 1.0, 0.0]).astype(precision).ravel(),
         tooth_row=np.concatenate(rows),
         tooth_error=np.concatenate([error for one in lanes for error in (one.pinion_error, one.wheel_error)]),
         one_sided=options.law == "one_sided",
         consistent=options.roll_torque == "consistent",
-        dofs=DOF_PLACES,
-        inverse_mass=_side_by_side([1.0 / system.mass for system in systems]),
-        stiffness_row=k_row,
-        stiffness_column=k_column,
-        stiffness_value=_side_by_side([system.stiffness[k_row, k_column] for system in systems]),
-        damping_row=c_row,
-        damping_column=c_column,
-        damping_value=_side_by_side([system.damping[c_row, c_column] for system in systems]),
-        force=_side_by_side([system.force for system in systems]),
+        inverse_mass=side_by_side(1.0 / mass),
+        stiffness=side_by_side(stiffness[:, diagonal, diagonal]),
+        damping=side_by_side(damping[:, diagonal, diagonal]),
+        other_first=np.searchsorted(row, np.arange(n_dof + 1)),
+        other_column=column,
+        other_stiffness=side_by_side(stiffness[:, row, column]),
+        other_damping=side_by_side(damping[:, row, column]),
+        force=side_by_side(np.stack([*map(_force, lanes, systems, rests)])),
+        rest=np.stack(rests, axis=-1),
+        rotation=side_by_side(rotation),
+        held=side_by_side(np.einsum("lij,lj->li", stiffness, rotation)),
+        carried=side_by_side(mass * rotation),
+        profile=profile,
+        profile_start=profile_start,
+        cells_per_second=cells_per_second,
     )
 
 
-def _side_by_side(values: Sequence[Array]) -> Array:
-    """One row a value, one lane a machine, flat."""
-    return np.ascontiguousarray(np.stack(values, axis=-1), dtype=np.float64).ravel()
+def _nominal(lanes: Sequence[PairDynamics], span: tuple[float, float]) -> tuple[Array, float, float]:
+    """Nominal motion and torque by cells of time, (cell, 5, lane) flat, their first instant, and cells a second.
+
+    Speed and torque run straight through a cell; where neither changes there is one cell.
+    """
+    steady = all(one.operating.speed_profile is None and one.operating.torque_profile is None for one in lanes)
+    if steady:
+        profile = np.zeros((1, N_PROFILE, len(lanes)))
+        profile[0, NOMINAL_SPEED], profile[0, TORQUE] = [one.operating.speed for one in lanes], 1.0
+        return profile.ravel(), 0.0, 1.0
+    # cells begin at multiples of their length, so that the same instants have the same bits whatever the span
+    first, last = math.floor(span[0] * CELLS_PER_SECOND), math.ceil(span[1] * CELLS_PER_SECOND)
+    edges = np.arange(first, last + 1) / CELLS_PER_SECOND
+    profile = np.empty((last - first, N_PROFILE, len(lanes)))
+    for lane, one in enumerate(lanes):
+        nominal = one.nominal(edges)
+        gain, slope = (np.diff(values) * CELLS_PER_SECOND for values in (nominal.speed, nominal.torque_factor))
+        profile[:, NOMINAL_ANGLE, lane], profile[:, NOMINAL_SPEED, lane] = nominal.angle[:-1], nominal.speed[:-1]
+        profile[:, NOMINAL_ACCELERATION, lane] = gain
+        profile[:, TORQUE, lane], profile[:, TORQUE_SLOPE, lane] = nominal.torque_factor[:-1], slope
+    return profile.ravel(), float(edges[0]), CELLS_PER_SECOND
 
 
 def _columns(side: GearTable) -> Array:
@@ -83,6 +145,40 @@ def _columns(side: GearTable) -> Array:
     return np.stack([side.compliance, side.compliance_slope, side.gap, side.gap_slope], axis=-1)
 
 
-def _rows(side: GearTable, offset: int) -> NDArray[np.int64]:
+def at_step(group: Group, before: float, after: float) -> Group:
+    """The same group for another step, s."""
+    numbers = group.numbers.copy().reshape(N_NUMBERS, -1)
+    numbers[PER_SWITCH_WIDTH] *= before / after
+    return group._replace(numbers=numbers.ravel())
+
+
+def _force(dynamics: PairDynamics, system: LumpedSystem, rest: Array) -> Array:
+    """Force on what leaves the rest, under the mean mesh force, (dof,)."""
+    force = system.force - dynamics.mesh_force * dynamics.approach_direction()
+    return np.asarray(force - system.stiffness @ rest)
+
+
+def _are_many(table: PairTable) -> bool:
+    """Whether all pairs of distinct teeth would take much more memory than the teeth."""
+    n_pinion, n_wheel = len(table.pinion.compliance), len(table.wheel.compliance)
+    return n_pinion * n_wheel > 2 * (n_pinion + n_wheel)
+
+
+def _pair_rows(table: PairTable) -> Array:
+    """Rows of the pairs of distinct teeth, or of the teeth where the pairs are many, (row, node, 4)."""
+    pinion, wheel = _columns(table.pinion), _columns(table.wheel)
+    if _are_many(table):
+        return np.concatenate([pinion, wheel])
+    return (pinion[:, None] + wheel[None]).reshape(-1, *pinion.shape[1:])
+
+
+def _row_steps(table: PairTable) -> tuple[int, int]:
+    """Rows from one pinion tooth to the next, and to the wheel's first where the teeth stand by themselves, else 0."""
+    if _are_many(table):
+        return 1, len(table.pinion.compliance)
+    return len(table.wheel.compliance), 0
+
+
+def _rows(side: GearTable) -> NDArray[np.int64]:
     """Table row of every tooth, -1 for a missing one, (tooth,)."""
-    return np.where(side.present[side.kind], side.kind + offset, -1)
+    return np.where(side.present[side.kind], side.kind, -1)

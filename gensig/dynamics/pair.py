@@ -1,25 +1,29 @@
-"""A gear pair on its supports as a lumped system: six equations, one mesh, a soft speed source."""
+"""A gear pair on its supports as a lumped system: one mesh, a soft speed source, a motor and a load if there are."""
 
 from __future__ import annotations
 
 import math
 from dataclasses import dataclass
+from functools import cached_property, lru_cache
 
 import numpy as np
 from numpy.typing import NDArray
 
-from gensig.dynamics._mesh_kernels import FAR_NEAR
+from gensig.dynamics._layout import FAR_NEAR
 from gensig.dynamics.system import LumpedSystem
 from gensig.errors import ConfigError
 from gensig.mesh.load_distribution import PairStates, pair_states, static_mesh
 from gensig.mesh.pair_table import PairTable
-from gensig.operating import Operating
+from gensig.operating import Nominal, Operating
 from gensig.units import split_unit, unit
 
 Array = NDArray[np.float64]
 
-DOFS = ("pinion_x", "pinion_y", "pinion_rotation", "wheel_x", "wheel_y", "wheel_rotation")
+PAIR_DOFS = ("pinion_x", "pinion_y", "pinion_rotation", "wheel_x", "wheel_y", "wheel_rotation")
+# all that a machine may have; ``PairDynamics.dofs`` says which
+DOFS = (*PAIR_DOFS, "motor_rotation", "load_rotation")
 APPROACH_SIGN = (0.0, -1.0, 1.0, 0.0, 1.0, -1.0)
+PINION_X, PINION_Y, PINION_ROTATION, WHEEL_X, WHEEL_Y, WHEEL_ROTATION = range(6)  # places in PAIR_DOFS
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -47,15 +51,35 @@ class Body:
     support: Support
 
 
+@dataclass(frozen=True, slots=True, kw_only=True)
+class Rotor:
+    """A motor or a load: a disc that a coupling, a torsional spring and damper, holds to the shaft of its gear."""
+
+    inertia: float = unit("kg_m2")
+    coupling_stiffness: float = unit("nm_per_rad")
+    coupling_damping_ratio: float
+
+    def __post_init__(self) -> None:
+        for key in ("inertia_kg_m2", "coupling_stiffness_nm_per_rad", "coupling_damping_ratio"):
+            value = getattr(self, split_unit(key)[0])
+            if not value > 0.0:
+                raise ConfigError(f"rotor.{key} = {value:g} must be positive")
+
+    def coupling_damping(self, gear_inertia: float) -> float:
+        """Damping of the coupling for its ratio on the two inertias it joins, N m s/rad."""
+        joined = self.inertia * gear_inertia / (self.inertia + gear_inertia)
+        return 2.0 * self.coupling_damping_ratio * math.sqrt(self.coupling_stiffness * joined)
+
+
 def solid_disc(radius: float, bore_radius: float, width: float, density: float) -> tuple[float, float]:
     """Mass in kg and moment of inertia in kg m2 of a disc with a bore: for gears whose source prints none."""
     mass = density * math.pi * (radius**2 - bore_radius**2) * width
     return mass, 0.5 * mass * (radius**2 + bore_radius**2)
 
 
-@dataclass(frozen=True, slots=True, kw_only=True)
+@dataclass(frozen=True, kw_only=True, eq=False)
 class PairDynamics:
-    """Everything that decides the motion of one gear pair."""
+    """Everything that decides the motion of one gear pair. No slots: the equations are kept once they are made."""
 
     table: PairTable
     pinion: Body
@@ -66,10 +90,24 @@ class PairDynamics:
     start_tooth_pinion: int
     start_tooth_wheel: int
     start_phase: float
+    motor: Rotor | None = None
+    load: Rotor | None = None
+
+    @property
+    def dofs(self) -> tuple[str, ...]:
+        """Names of the degrees of freedom, in the order of every (dof,) array."""
+        rotors = (("motor_rotation", self.motor), ("load_rotation", self.load))
+        return (*PAIR_DOFS, *[name for name, rotor in rotors if rotor is not None])
+
+    @property
+    def _ends(self) -> tuple[int, int]:
+        """Degrees of freedom that the drive and the load torque act on."""
+        driver = PINION_ROTATION if self.motor is None else self.dofs.index("motor_rotation")
+        return driver, WHEEL_ROTATION if self.load is None else self.dofs.index("load_rotation")
 
     @property
     def equivalent_mass(self) -> float:
-        """Both inertias reduced to the line of action, kg."""
+        """Inertias of the two gears reduced to the line of action, kg."""
         pair = self.table.pair
         return 1.0 / (pair.pinion.base_radius**2 / self.pinion.inertia + pair.wheel.base_radius**2 / self.wheel.inertia)
 
@@ -88,65 +126,84 @@ class PairDynamics:
         """Tooth meshing frequency at the set speed, Hz."""
         return self.operating.speed / (2.0 * math.pi) * self.table.pair.pinion.n_teeth
 
+    @property
+    def driven_inertia(self) -> float:
+        """Inertia of the wheel and its load, kg m2."""
+        return self.wheel.inertia + (0.0 if self.load is None else self.load.inertia)
+
+    @property
+    def reduced_inertia(self) -> float:
+        """Inertia of all that turns, reduced to the pinion, kg m2."""
+        driving = self.pinion.inertia + (0.0 if self.motor is None else self.motor.inertia)
+        return driving + self.driven_inertia / self.table.pair.ratio**2
+
+    @property
+    def drive_stiffness(self) -> float:
+        """Torsional spring of the soft speed source, N m/rad."""
+        return self.reduced_inertia * self._drive_rate**2
+
+    @property
+    def _drive_rate(self) -> float:
+        """Circular frequency of the soft speed source on all that turns, rad/s."""
+        return 2.0 * math.pi * self.operating.drive_frequency
+
     def system(self) -> LumpedSystem:
-        """Equations (1) of the spur paper with the signs put right, without the mesh.
+        """Equations (1) of the spur paper with the signs put right, without the mesh, and those of motor and load.
 
         Action and reaction on both gears, mesh force driving the wheel: ``docs/theory/spur_dynamics.md``. The soft
-        speed source acts on the deviation from the set rotation, so it is a spring and a damper there; its set angle
-        leads by what the mean friction torque winds up, so that the mean deviation is about 0.
+        speed source acts on the deviation from the set rotation, so it is a spring and a damper there, of the motor if
+        there is one, else of the pinion; its set angle leads by what the mean torque winds up, so that the mean
+        deviation of the pinion is about 0.
         """
-        ratio = self.table.pair.ratio
-        reduced = self.pinion.inertia + self.wheel.inertia / ratio**2
-        omega = 2.0 * math.pi * self.operating.drive_frequency
-        drive_stiffness = reduced * omega**2
-        drive_damping = 2.0 * self.operating.drive_damping_ratio * reduced * omega
-        p, w = self.pinion, self.wheel
-        torque = self.operating.torque
-        return LumpedSystem(
-            names=DOFS,
-            mass=np.array([p.mass, p.mass, p.inertia, w.mass, w.mass, w.inertia]),
-            stiffness=np.diag(
-                [
-                    p.support.stiffness_x,
-                    p.support.stiffness_y,
-                    drive_stiffness,
-                    w.support.stiffness_x,
-                    w.support.stiffness_y,
-                    0.0,
-                ]
-            ),
-            damping=np.diag(
-                [p.support.damping_x, p.support.damping_y, drive_damping, w.support.damping_x, w.support.damping_y, 0.0]
-            ),
-            force=np.array([0.0, 0.0, torque + self.friction_torque(), 0.0, 0.0, -torque * ratio]),
-        )
+        return self._system
+
+    @cached_property
+    def _system(self) -> LumpedSystem:
+        dofs, p, w, ratio = self.dofs, self.pinion, self.wheel, self.table.pair.ratio
+        mass, rotation, force = np.zeros((3, len(dofs)))
+        stiffness, damping = np.zeros((2, len(dofs), len(dofs)))
+        mass[: len(PAIR_DOFS)] = p.mass, p.mass, p.inertia, w.mass, w.mass, w.inertia
+        rotation[PINION_ROTATION], rotation[WHEEL_ROTATION] = 1.0, 1.0 / ratio
+        for x, support in ((PINION_X, p.support), (WHEEL_X, w.support)):
+            stiffness[[x, x + 1], [x, x + 1]] = support.stiffness_x, support.stiffness_y
+            damping[[x, x + 1], [x, x + 1]] = support.damping_x, support.damping_y
+        driver, driven = self._ends
+        for rotor, place, gear in ((self.motor, driver, PINION_ROTATION), (self.load, driven, WHEEL_ROTATION)):
+            if rotor is not None:
+                mass[place], rotation[place] = rotor.inertia, rotation[gear]
+                _couple(stiffness, place, gear, rotor.coupling_stiffness)
+                _couple(damping, place, gear, rotor.coupling_damping(mass[gear]))
+        drive_stiffness, reduced = self.drive_stiffness, self.reduced_inertia
+        stiffness[driver, driver] += drive_stiffness
+        damping[driver, driver] += 2.0 * self.operating.drive_damping_ratio * reduced * self._drive_rate
+        force[driver] = self.operating.torque + self.friction_torque()
+        if self.motor is not None:
+            force[driver] += drive_stiffness * force[driver] / self.motor.coupling_stiffness
+        force[driven] = -self.operating.torque * ratio
+        return LumpedSystem(names=dofs, mass=mass, stiffness=stiffness, damping=damping, force=force, rotation=rotation)
+
+    def nominal(self, times: Array) -> Nominal:
+        """Nominal motion of the pinion and share of the set torque at times in s, (time,)."""
+        return self.operating.nominal(times)
 
     def approach_direction(self) -> Array:
         """Gradient of the approach along the line of action, (dof,)."""
+        direction = np.zeros(len(self.dofs))
         radii = np.array([1.0, 1.0, self.table.pair.pinion.base_radius, 1.0, 1.0, self.table.pair.wheel.base_radius])
-        return np.array(APPROACH_SIGN) * radii
+        direction[: len(PAIR_DOFS)] = np.array(APPROACH_SIGN) * radii
+        return direction
 
     def mean_mesh_stiffness(self) -> float:
         """Mean tangent stiffness of sound teeth over one base pitch under the set torque, N/m."""
-        # tooth pairs away from a faulty tooth are the sound ones: average where most pairs are
-        roll = self.table.pair.base_pitch * (np.arange(self.table.pair.pinion.n_teeth * 32) + 0.5) / 32
-        return float(
-            np.median(
-                static_mesh(self.table, pair_states(self.table, roll), self.mesh_force).stiffness.reshape(-1, 32),
-                axis=0,
-            ).mean()
-        )
+        return _mean_mesh_stiffness(self.table, self.mesh_force)
 
-    def numbers(self, step: float) -> tuple[float, ...]:
-        """The mesh as numbers, in the order of the rows of ``_mesh_kernels.Group.numbers``."""
+    def numbers(self, step: float, rest: Array) -> tuple[float, ...]:
+        """The mesh as numbers, in the order of the rows of ``_layout.Group.numbers``."""
         table, options, pair = self.table, self.table.options, self.table.pair
         viscous = 2.0 * options.damping_ratio * math.sqrt(self.mean_mesh_stiffness() * self.equivalent_mass)
         return (
             pair.pinion.base_radius,
             pair.wheel.base_radius,
-            pair.base_pitch,
-            1.0 / pair.base_pitch,
-            options.points_per_pitch / pair.base_pitch,
             pair.path_of_contact,
             pair.pitch_point,
             pair.start_curvature_radius,
@@ -157,9 +214,21 @@ class PairDynamics:
             2.0 / (options.friction_transition * pair.base_pitch),
             2.0 / (pair.pinion.base_radius * self.operating.speed * step),
             pair.backlash,
+            self.mesh_force,
+            float(self.approach_direction() @ rest),
+        )
+
+    def exact_numbers(self) -> tuple[float, ...]:
+        """What decides where pairs stand, in the order of the rows of ``_layout.Group.exact``."""
+        options, pair = self.table.options, self.table.pair
+        near = self._near_positions() if options.law == "one_sided" else (-math.inf, math.inf)
+        return (
+            pair.pinion.base_radius,
+            pair.base_pitch,
+            1.0 / pair.base_pitch,
+            options.points_per_pitch / pair.base_pitch,
             self.start_roll,
-            self.operating.speed,
-            *self._near_positions(),
+            *near,
         )
 
     def _near_positions(self) -> tuple[float, float]:
@@ -170,6 +239,8 @@ class PairDynamics:
             for side, error in ((table.pinion, self.pinion_error), (table.wheel, self.wheel_error))
         ]
         near = np.flatnonzero(nearest[0] + nearest[1] < FAR_NEAR)
+        if len(near) == 0:  # every pair may be as near as any other
+            return float(table.position[0]), float(table.position[-1])
         first, last = max(near[0] - 1, 0), min(near[-1] + 1, len(table.position) - 1)
         return float(table.position[first]), float(table.position[last])
 
@@ -182,20 +253,57 @@ class PairDynamics:
         loss_arm = np.sign(states.position - pair.pitch_point) * (arm - (pair.tangent_length - arm) / pair.ratio)
         return self.table.options.friction_coefficient * float(np.mean((loads * loss_arm).sum(axis=1)))
 
+    def rest(self) -> Array:
+        """Deflections of supports and couplings about which the machine moves; the pinion has not turned, (dof,)."""
+        start = self.static_start(0.0)
+        return np.asarray(start - self.system().rotation * start[PINION_ROTATION])
+
     def static_start(self, time: float) -> Array:
-        """Static equilibrium at a nominal time: deflected supports and the approach of the pairs in contact, (dof,)."""
-        pair, force, system = self.table.pair, self.mesh_force, self.system()
-        roll = self.start_roll + pair.pinion.base_radius * self.operating.speed * time
-        approach = float(static_mesh(self.table, self._states(np.array([roll])), force).approach[0])
+        """Equilibrium at a nominal time: deflected supports and couplings, approach of the pairs in contact, (dof,).
+
+        Under a nominal acceleration it is that of the accelerated machine.
+        """
+        pair, system, (driver, driven) = self.table.pair, self.system(), self._ends
+        nominal = self.nominal(np.array([time]))
+        factor, acceleration = float(nominal.torque_factor[0]), float(nominal.acceleration[0])
+        wheel_acceleration = acceleration / pair.ratio
+        force = factor * self.mesh_force + wheel_acceleration * self.driven_inertia / pair.wheel.base_radius
         start = np.zeros(len(system.mass))
-        for dof, direction in ((1, 1.0), (4, -1.0)):
+        start[PINION_ROTATION] -= acceleration / self._drive_rate**2
+        if self.motor is not None:
+            lead = factor * system.force[driver] / system.stiffness[driver, driver]
+            start[driver] = start[PINION_ROTATION] + lead
+            driven_inertia = self.reduced_inertia - self.motor.inertia
+            start[PINION_ROTATION] -= acceleration * driven_inertia / self.motor.coupling_stiffness
+        advance = pair.pinion.base_radius * start[PINION_ROTATION]
+        elapsed = float(self.operating.time_at_set_speed(np.array([time]))[0])
+        roll = self.start_roll + pair.pinion.base_radius * self.operating.speed * elapsed + advance
+        approach = float(static_mesh(self.table, self._states(np.array([roll])), force).approach[0])
+        for dof, direction in ((PINION_Y, 1.0), (WHEEL_Y, -1.0)):
             if system.stiffness[dof, dof] > 0.0:
                 start[dof] = direction * force / system.stiffness[dof, dof]
         closed = approach if math.isfinite(approach) else 0.0
-        start[5] = (start[4] - start[1] - closed) / pair.wheel.base_radius
+        start[WHEEL_ROTATION] = (start[WHEEL_Y] - start[PINION_Y] - closed + advance) / pair.wheel.base_radius
+        if self.load is not None:
+            torque = factor * system.force[driven] - wheel_acceleration * self.load.inertia
+            start[driven] = start[WHEEL_ROTATION] + torque / self.load.coupling_stiffness
         return start
 
     def _states(self, roll: Array) -> PairStates:
         return pair_states(
             self.table, roll, start_tooth_pinion=self.start_tooth_pinion, start_tooth_wheel=self.start_tooth_wheel
         )
+
+
+def _couple(matrix: Array, one: int, other: int, value: float) -> None:
+    """Put a spring or a damper between two degrees of freedom."""
+    matrix[[one, other], [one, other]] += value
+    matrix[[one, other], [other, one]] -= value
+
+
+@lru_cache(maxsize=32)
+def _mean_mesh_stiffness(table: PairTable, force: float) -> float:
+    # tooth pairs away from a faulty tooth are the sound ones: average where most pairs are
+    roll = table.pair.base_pitch * (np.arange(table.pair.pinion.n_teeth * 32) + 0.5) / 32
+    stiffness = static_mesh(table, pair_states(table, roll), force).stiffness
+    return float(np.median(stiffness.reshape(-1, 32), axis=0).mean())

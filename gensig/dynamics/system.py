@@ -14,10 +14,12 @@ Array = NDArray[np.float64]
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class LumpedSystem:
-    """Masses, springs, dampers and constant forces; rotations are deviations from the nominal rotation.
+    """Masses, springs, dampers and forces; rotations are deviations from the nominal rotation.
 
-    ``mass`` (dof,) kg or kg m2, ``stiffness`` and ``damping`` (dof, dof), ``force`` (dof,); ``names`` name the
-    degrees of freedom, as channels call them.
+    ``mass`` (dof,) kg or kg m2, ``stiffness`` and ``damping`` (dof, dof); ``force`` (dof,) at the set torque, all of it
+    follows a torque profile. ``rotation`` (dof,) says how far each turns with the nominal rotation of the pinion, 0 for
+    a translation: under its acceleration the equations get the inertia force -mass * rotation * acceleration. ``names``
+    name the degrees of freedom, as channels call them.
     """
 
     names: tuple[str, ...]
@@ -25,6 +27,7 @@ class LumpedSystem:
     stiffness: Array
     damping: Array
     force: Array
+    rotation: Array
 
     def __post_init__(self) -> None:
         if np.any(self.mass <= 0.0):

@@ -23,19 +23,23 @@ from gensig.mesh.face import bearing_width, face_contact, is_nominal
 from gensig.mesh.local_contact import ContactLaw, contact_law, relative_radius
 from gensig.mesh.options import MeshOptions
 from gensig.mesh.root_crack import crack_compliance
+from gensig.mesh.smooth_table import smooth
 
 Array = NDArray[np.float64]
 
 # pairs followed at once: positions u - 1, u, u + 1, u + 2 base pitches, u in 0..1
 N_PAIRS = 4
 FIRST_PITCH, LAST_PITCH = -1, 3
+# larger second differences of compliances, as a share, and of gaps in m are steps and kinks of the flank
+SMOOTHED_SHARE, SMOOTHED_GAP = 0.01, 1e-7
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class GearTable:
     """One gear's side of the mesh: one row per distinct tooth, ``kind`` says which row a tooth has.
 
-    ``compliance`` and ``gap`` are (distinct, node), m/N and m, each with its slope over position.
+    ``compliance`` and ``gap`` are (distinct, node), m/N and m, each with its slope over position; between nodes slopes
+    go straight and values follow their integral.
     """
 
     compliance: Array
@@ -46,7 +50,7 @@ class GearTable:
     kind: NDArray[np.int64]
 
 
-@dataclass(frozen=True, slots=True, kw_only=True)
+@dataclass(frozen=True, slots=True, kw_only=True, eq=False)
 class PairTable:
     """Both gears' tables on the node positions s of -1 to 3 base pitches, and what the pairs share.
 
@@ -287,11 +291,14 @@ def _gear_table(
         own_gap, contact = side.contact(tooth, bending, options)
         compliance[row] = structures[key] + contact
         gap[row] = own_gap + corner
+    distance = float(position[1] - position[0])
+    compliance, compliance_slope = smooth(compliance, distance, SMOOTHED_SHARE * float(compliance[0].min()))
+    gap, gap_slope = smooth(gap, distance, SMOOTHED_GAP)
     return GearTable(
         compliance=compliance,
-        compliance_slope=np.gradient(compliance, position, axis=1),
+        compliance_slope=compliance_slope,
         gap=gap,
-        gap_slope=np.gradient(gap, position, axis=1),
+        gap_slope=gap_slope,
         present=np.array([tooth.present for tooth in distinct]),
         kind=kind,
     )

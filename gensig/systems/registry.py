@@ -6,13 +6,13 @@ from collections.abc import Callable, Mapping
 from typing import Any
 
 from gensig.dynamics.integrator import Solver
-from gensig.dynamics.pair import Body, Support, solid_disc
+from gensig.dynamics.pair import Body, Rotor, Support, solid_disc
 from gensig.errors import ConfigError
 from gensig.geometry.contact import GearPair
 from gensig.geometry.gear import Gear
 from gensig.material import Material
 from gensig.mesh.options import read_mesh_options
-from gensig.operating import Operating
+from gensig.operating import Operating, read_profile
 from gensig.sensing.chain import Sensing
 from gensig.sensing.manufacturing import Quality
 from gensig.systems.spur_pair import SpurPair
@@ -27,6 +27,8 @@ COMMON_GEAR_KEYS = (
     "cutter_tip_radius_coefficient",
 )
 BODY_KEYS = ("mass_kg", "inertia_kg_m2", "support")
+SYSTEM_KEYS = ("kind", "motor", "load")
+PROFILE_KEYS = ("speed_profile", "torque_profile")
 
 
 def read_spur_pair(config: Mapping[str, Any]) -> SpurPair:
@@ -38,6 +40,10 @@ def read_spur_pair(config: Mapping[str, Any]) -> SpurPair:
     if material.poisson_ratio >= 0.5:
         raise ConfigError(f"material.poisson_ratio = {material.poisson_ratio:g} must be below 0.5")
     sides = {name: section(config, "gear", name) for name in SIDES}
+    machine = section(config, "system")
+    for key in machine:
+        if key not in SYSTEM_KEYS:
+            raise ConfigError(f"system: unknown key '{key}'; known: {', '.join(SYSTEM_KEYS)}")
     gears = {name: _read_gear(name, gear) for name in SIDES}
     return SpurPair(
         pair=GearPair(**gears, backlash=_number("gear.backlash_um", gear["backlash_um"])),
@@ -45,10 +51,12 @@ def read_spur_pair(config: Mapping[str, Any]) -> SpurPair:
         mesh=read_mesh_options(section(config, "mesh")),
         pinion=_read_body(gears["pinion"], sides["pinion"], material),
         wheel=_read_body(gears["wheel"], sides["wheel"], material),
-        operating=read(Operating, section(config, "operating"), "operating"),
+        operating=_read_operating(section(config, "operating")),
         sensing=read(Sensing, section(config, "sensing"), "sensing"),
         quality=read(Quality, section(config, "quality"), "quality"),
         solver=read(Solver, section(config, "solver"), "solver"),
+        motor=_read_rotor("system.motor", machine.get("motor")),
+        load=_read_rotor("system.load", machine.get("load")),
     )
 
 
@@ -100,6 +108,22 @@ def _read_body(gear: Gear, values: Mapping[str, Any], material: Material) -> Bod
     except ConfigError as error:
         raise ConfigError(f"gear.{gear.name}.{error}") from None
     return Body(mass=mass, inertia=inertia, support=support)
+
+
+def _read_rotor(place: str, values: Any) -> Rotor | None:
+    """A motor or a load; None where it is null, or its inertia."""
+    if values is None or (isinstance(values, Mapping) and values.get("inertia_kg_m2", 0.0) is None):
+        return None
+    try:
+        return read(Rotor, values, "rotor")
+    except ConfigError as error:
+        raise ConfigError(f"{place}{str(error).removeprefix('rotor')}") from None
+
+
+def _read_operating(values: Mapping[str, Any]) -> Operating:
+    profiles = {key: read_profile(f"operating.{key}", values.get(key)) for key in PROFILE_KEYS}
+    plain = {key: value for key, value in values.items() if key not in PROFILE_KEYS}
+    return read(Operating, plain, "operating", **profiles)
 
 
 def _number(key: str, value: Any) -> float:

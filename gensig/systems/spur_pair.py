@@ -9,17 +9,19 @@ from functools import lru_cache
 import numpy as np
 from numpy.typing import NDArray
 
-from gensig.dynamics._vector import LANES
+from gensig.dynamics._vector import n_lanes
+from gensig.dynamics.decimation import in_band_error
 from gensig.dynamics.integrator import (
     FINEST,
+    Motions,
     Solver,
     check_channels,
+    check_memory,
     check_step,
-    count_samples,
     integrate,
     settling_oversampling,
 )
-from gensig.dynamics.pair import Body, PairDynamics, Support
+from gensig.dynamics.pair import Body, PairDynamics, Rotor, Support
 from gensig.errors import FaultError, SimulationError
 from gensig.faults.base import Fault, faulty_teeth
 from gensig.geometry.contact import GearPair
@@ -29,8 +31,8 @@ from gensig.mesh.load_distribution import loaded_pair_table, pair_states, static
 from gensig.mesh.options import MeshOptions
 from gensig.mesh.pair_table import PairTable, flank_sides, slice_bending, structural_terms
 from gensig.operating import Operating
+from gensig.sensing.agreement import agreement
 from gensig.sensing.chain import Sensing
-from gensig.sensing.decimation import decimator, in_band_error
 from gensig.sensing.manufacturing import Gearbox, Quality, Specimen, nominal_gearbox, perfect_specimen
 from gensig.units import from_si
 
@@ -46,14 +48,27 @@ class Start:
     phase: float
 
 
+# What an integration at half the step says of a record: its error is below the limit; teeth bounce, which makes point
+# values mean little, but band levels and indicators agree; neither; nobody looked.
+CHECKS = ("error", "levels", "unresolved", "none")
+BOUNCING = 0.01  # share of the time without contact above which levels may stand in for the error
+FINEST_BOUNCING = 20  # steps per sample above which what bounces does not come nearer to anything
+
+
 @dataclass(frozen=True, slots=True, kw_only=True)
 class CleanRecord:
-    """Accelerations before noise, (channel, sample) m/s2 (rad/s2 for rotations), and what the run tells of itself."""
+    """Accelerations before noise, (channel, sample) m/s2 (rad/s2 for rotations), and what the run tells of itself.
+
+    ``shaft_angle`` (sample,) rad of the pinion since the first sample, ``mean_speed`` rad/s, ``integration_check`` one
+    of ``CHECKS``.
+    """
 
     acceleration: Array
+    shaft_angle: Array
     mean_speed: float
     contact_loss_fraction: float
     integration_error: float
+    integration_check: str
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -103,6 +118,8 @@ class SpurPair:
     sensing: Sensing
     quality: Quality
     solver: Solver
+    motor: Rotor | None = None
+    load: Rotor | None = None
 
     def mesh_table(self, faults: Sequence[Fault] = ()) -> PairTable:
         """Compliance and gap tables with the given faults."""
@@ -117,14 +134,11 @@ class SpurPair:
         """Raise for what would stop every record: interrupted drive, fits out of range, channels, step length."""
         self.pair.require_continuous_drive()
         self.mesh_table()
-        check_channels(self.sensing.channels)
-        count_samples(self.operating.duration, self.sensing.sampling_rate)
-        perfect, start = (
-            perfect_specimen(self.pair.pinion, self.pair.wheel),
-            Start(tooth_pinion=0, tooth_wheel=0, phase=0),
-        )
-        nominal = self._dynamics((), start, perfect, nominal_gearbox(len(self.sensing.channels)))
-        check_step(nominal, 1.0 / (self.sensing.sampling_rate * self.solver.oversampling))
+        sensing, operating = self.sensing, self.operating
+        check_memory(operating.duration, sensing.sampling_rate, len(sensing.channels), self.solver.precision)
+        nominal = Run(system=self, faults=()).dynamics()
+        check_channels(sensing.channels, nominal.dofs)
+        check_step(nominal, sensing.sampling_rate, self.solver.oversampling)
 
     def simulate(
         self,
@@ -152,6 +166,8 @@ class SpurPair:
             start_tooth_pinion=start.tooth_pinion,
             start_tooth_wheel=start.tooth_wheel,
             start_phase=start.phase,
+            motor=self.motor,
+            load=self.load,
         )
 
     def stiffness_curves(
@@ -222,8 +238,11 @@ class Run:
     def kind(self) -> tuple[object, ...]:
         """What runs that are simulated side by side share."""
         system = self.system
-        sensing = (system.sensing.sampling_rate, system.sensing.channels, system.operating.duration)
-        return (*sensing, system.solver, system.mesh.law, system.mesh.roll_torque)
+        operating = system.operating
+        steady = operating.speed_profile is None and operating.torque_profile is None
+        sensing = (system.sensing.sampling_rate, system.sensing.channels, operating.duration)
+        machine = (system.motor is None, system.load is None, steady)
+        return (*sensing, *machine, system.solver, system.mesh.law, system.mesh.roll_torque)
 
     def finer(self) -> Run:
         """The same at half the step."""
@@ -261,8 +280,9 @@ def simulate_together(runs: Sequence[Run]) -> list[CleanRecord | SimulationError
         else:
             kinds.setdefault((*run.kind, settling), []).append(place)
     for places in kinds.values():
-        for first in range(0, len(places), LANES):
-            group = places[first : first + LANES]
+        together = n_lanes(runs[places[0]].system.solver.precision)
+        for first in range(0, len(places), together):
+            group = places[first : first + together]
             records = _side_by_side([runs[place] for place in group], [machines[place] for place in group])
             found.update(zip(group, records, strict=True))
     coarse = [place for place, record in found.items() if _is_too_coarse(runs[place], record)]
@@ -272,29 +292,39 @@ def simulate_together(runs: Sequence[Run]) -> list[CleanRecord | SimulationError
 
 
 def _is_too_coarse(run: Run, record: CleanRecord | SimulationError) -> bool:
-    solver = run.system.solver
-    if isinstance(record, SimulationError) or solver.max_error is None or 2 * solver.oversampling > FINEST:
+    if isinstance(record, SimulationError) or record.integration_check != "unresolved":
         return False
-    return not record.integration_error <= solver.max_error  # also where the check came to nothing
+    finest = FINEST_BOUNCING if record.contact_loss_fraction > BOUNCING else FINEST
+    return 2 * run.system.solver.oversampling <= finest
+
+
+def _checks(motions: Motions, solver: Solver, sampling_rate: float) -> tuple[Array, list[str]]:
+    """Relative error in the band and what it means, of every lane."""
+    exact, kept = motions.check, motions.finite
+    errors = np.full(len(exact), np.nan)
+    if solver.max_error is None:
+        return errors, ["none"] * len(exact)
+    found = motions.acceleration[:, :, : exact.shape[2]]
+    errors[kept] = in_band_error(found[kept], exact[kept], sampling_rate)
+    checks = ["error" if error <= solver.max_error else "unresolved" for error in errors]
+    for lane, check in enumerate(checks):
+        if check == "unresolved" and kept[lane] and motions.contact_loss_fraction[lane] > BOUNCING:
+            one = slice(lane, lane + 1)
+            if agreement(found[one], exact[one], sampling_rate).agrees[0]:
+                checks[lane] = "levels"
+    return errors, checks
 
 
 def _side_by_side(runs: Sequence[Run], machines: Sequence[PairDynamics]) -> list[CleanRecord | SimulationError]:
     system = runs[0].system
-    low_pass = decimator(system.solver.oversampling)
     motions = integrate(
         machines,
         system.solver,
         sampling_rate=system.sensing.sampling_rate,
         duration=system.operating.duration,
         channels=system.sensing.channels,
-        margin=low_pass.margin,
     )
-    signals = low_pass.apply(motions.acceleration)
-    errors = np.full(len(signals), np.nan)
-    if motions.check.size:
-        exact = decimator(2 * system.solver.oversampling).apply(motions.check)
-        kept = motions.finite
-        errors[kept] = in_band_error(signals[kept, :, : exact.shape[2]], exact[kept], system.sensing.sampling_rate)
+    errors, checks = _checks(motions, system.solver, system.sensing.sampling_rate)
     records: list[CleanRecord | SimulationError] = []
     for lane, run in enumerate(runs):
         gain = 1.0 if run.gearbox is None else run.gearbox.gain[:, None]
@@ -302,10 +332,12 @@ def _side_by_side(runs: Sequence[Run], machines: Sequence[PairDynamics]) -> list
         if motions.finite[lane]:
             records.append(
                 CleanRecord(
-                    acceleration=signals[lane] * gain,
+                    acceleration=motions.acceleration[lane] * gain,
+                    shaft_angle=motions.shaft_angle[lane],
                     mean_speed=float(motions.mean_speed[lane]),
                     contact_loss_fraction=float(motions.contact_loss_fraction[lane]),
                     integration_error=float(errors[lane]),
+                    integration_check=checks[lane],
                 )
             )
         else:

@@ -158,6 +158,8 @@ def pair_dynamics(case: Case) -> PairDynamics:
         table=case.table,
         pinion=system.pinion,
         wheel=system.wheel,
+        motor=system.motor,
+        load=system.load,
         operating=system.operating,
         pinion_error=np.zeros(system.pair.pinion.n_teeth),
         wheel_error=np.zeros(system.pair.wheel.n_teeth),

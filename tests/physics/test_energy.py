@@ -68,7 +68,8 @@ def test_the_states_seen_are_those_of_a_run_in_one_go(machine, dynamics_of, name
     seen, whole = trajectory(dynamics, *start, step, n_steps), advance(dynamics, *start, step, 0, n_steps)
     for one_by_one, at_once in zip(seen, whole[:2], strict=True):
         scale = np.abs(one_by_one).max(axis=0)
-        assert_allclose(at_once / scale, one_by_one[-1] / scale, rtol=0, atol=1e-9)
+        # one read the tables at the roll of a step's begin, the other where that was foreseen
+        assert_allclose(at_once / scale, one_by_one[-1] / scale, rtol=0, atol=1e-7)
 
 
 @pytest.fixture(scope="module", params=FAULTS)
@@ -85,16 +86,16 @@ def relative_residual(found):
 
 
 def test_power_in_is_stored_and_dissipated(case):
-    assert relative_residual(case["consistent"]) < 2e-3
+    assert relative_residual(case["consistent"]) < 2e-4
 
 
 def test_the_classical_equations_do_not_balance(case):
     assert relative_residual(case["classical"]) > 0.1
 
 
-def test_what_is_left_comes_from_the_tables_slopes(machine, dynamics_of, case):
-    fine = balance(dynamics_of(machine({"mesh.points_per_pitch": 4096})))
-    assert relative_residual(fine) < 2e-4
+def test_coarse_tables_balance_too(machine, dynamics_of):
+    """Force and energy of a table belong together, however far its nodes are apart."""
+    assert relative_residual(balance(dynamics_of(machine({"mesh.points_per_pitch": 128})))) < 2e-4
 
 
 def test_the_balance_sees_a_missing_term(case):

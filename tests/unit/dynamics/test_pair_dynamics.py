@@ -9,7 +9,15 @@ import pytest
 from lane_tools import laws
 from numpy.testing import assert_allclose
 
-from gensig.dynamics.integrator import Solver, integrate, settling_time
+from gensig.dynamics.integrator import (
+    MOST_BYTES,
+    CoarseStepWarning,
+    Solver,
+    check_memory,
+    check_step,
+    integrate,
+    settling_time,
+)
 from gensig.dynamics.pair import Support, solid_disc
 from gensig.errors import ConfigError, SimulationError
 from gensig.faults.broken import MissingTooth
@@ -17,7 +25,7 @@ from gensig.systems.spur_pair import Start
 
 
 def run(system, dynamics, **changes):
-    values = {"sampling_rate": 51200.0, "duration": system.operating.duration, "channels": ("pinion_y",), "margin": 4}
+    values = {"sampling_rate": 51200.0, "duration": system.operating.duration, "channels": ("pinion_y",)}
     values.update(changes)
     return integrate([dynamics], values.pop("solver", system.solver), **values)
 
@@ -75,8 +83,48 @@ class TestRefusals:
             run(xiamen, dynamics_of(xiamen), channels=("housing",))
 
     def test_a_step_too_long(self, xiamen, dynamics_of):
-        with pytest.raises(SimulationError, match=r"raise solver.oversampling by at least [\d.]+ times"):
+        with pytest.raises(SimulationError, match=r"raise solver.oversampling to at least \d+$"):
             run(xiamen, dynamics_of(xiamen), sampling_rate=6e3, solver=Solver(oversampling=2, precision="float64"))
+
+    @pytest.mark.filterwarnings("ignore::gensig.dynamics.integrator.CoarseStepWarning")
+    @pytest.mark.parametrize(("rate", "oversampling"), [(6e3, 2), (6e3, 3), (1e3, 2), (1e3, 17), (10.0, 2)])
+    def test_the_step_that_it_names_is_the_longest_that_will_do(self, xiamen, dynamics_of, rate, oversampling):
+        dynamics = dynamics_of(xiamen)
+        with pytest.raises(SimulationError) as caught:
+            check_step(dynamics, rate, oversampling)
+        text = str(caught.value)
+        assert text.startswith(f"solver.oversampling = {oversampling} makes internal steps of ")
+        assert "\n" not in text
+        enough = int(re.search(r"to at least (\d+)$", text)[1])
+        check_step(dynamics, rate, enough)
+        with pytest.raises(SimulationError, match=f"to at least {enough}$"):
+            check_step(dynamics, rate, enough - 1)
+
+    def test_a_coarse_step_is_warned_of(self, xiamen, dynamics_of):
+        with pytest.warns(CoarseStepWarning, match=r"internal steps to a period of the mesh mode .* raise solver"):
+            check_step(dynamics_of(xiamen), 51200.0, 2)
+
+    @pytest.mark.parametrize(("precision", "lanes"), [("float64", 8), ("float32", 16)])
+    def test_more_than_fits_into_memory(self, precision, lanes):
+        """The duration that it names fits, a longer one does not."""
+        with pytest.raises(ConfigError) as caught:
+            check_memory(1e4, 51200.0, 4, precision)
+        text = str(caught.value)
+        assert text.startswith(
+            f"operating.duration_s = 10000: {lanes} records side by side with 4 channels at 51200 Hz"
+        )
+        longest = float(re.search(r"at most (.+) s at a time$", text)[1])
+        assert_allclose(longest, MOST_BYTES / (51200 * 4 * 8 * lanes), rtol=5e-3, atol=0)
+        check_memory(0.99 * longest, 51200.0, 4, precision)
+        with pytest.raises(ConfigError, match="record at most"):
+            check_memory(1.01 * longest, 51200.0, 4, precision)
+
+    def test_a_machine_checks_its_memory_and_its_step(self, machine):
+        machine().check()
+        with pytest.raises(ConfigError, match="side by side with 4 channels"):
+            machine({"operating.duration_s": 2000.0}).check()
+        with pytest.raises(SimulationError, match=r"solver\.oversampling = 2 makes internal steps of"):
+            machine({"solver.oversampling": 2, "sensing.sampling_rate_hz": 6000}).check()
 
     def test_a_duration_without_samples(self, machine, dynamics_of):
         system = machine({"operating.duration_s": 1e-6})
@@ -87,7 +135,9 @@ class TestRefusals:
         ("changes", "text"),
         [
             ({"oversampling": 0}, "solver.oversampling = 0 must lie in 2..256"),
-            ({"precision": "float32"}, "solver.precision = 'float32'; allowed: float64"),
+            ({"oversampling": 257}, "solver.oversampling = 257 must lie in 2..256"),
+            ({"precision": "float16"}, "solver.precision = 'float16'; allowed: float64, float32"),
+            ({"max_error": 0.0}, "solver.max_error = 0 must lie in 1e-6..1, or be null"),
         ],
     )
     def test_solvers(self, changes, text):

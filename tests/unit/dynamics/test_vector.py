@@ -6,32 +6,63 @@ import numpy as np
 import pytest
 from numba import njit
 
-from gensig.dynamics._vector import LANES, any_above, load, spread, store, transpose, where_above
+from gensig.dynamics._vector import (
+    FOUR,
+    LANES,
+    PRECISIONS,
+    any_above,
+    load,
+    load_four,
+    n_lanes,
+    second_and_fourth,
+    spread,
+    store,
+    transpose,
+    where_above,
+    width,
+)
 
 N_GROUPS = 400
-ODD = np.array([np.inf, -np.inf, np.nan, 0.0, -0.0, 5e-324, -1e-310, 1.7e308, -1.7e308, 1.0])
+ODD = {"float64": [np.inf, -np.inf, np.nan, 0.0, -0.0, 5e-324, -1e-310, 1.7e308, -1.7e308, 1.0],
+       "float32": [np.inf, -np.inf, np.nan, 0.0, -0.0, 1e-45, -1e-40, 3.4e38, -3.4e38, 1.0]}  # fmt: skip
+EXPONENTS = {"float64": 200, "float32": 25}
 OPERATIONS = {"add": operator.add, "sub": operator.sub, "mul": operator.mul, "truediv": operator.truediv}
 COMPILED = njit(error_model="numpy")
+CHOICE, N_LANE_BY_LANE = 12, 13  # results before: two vectors, vector and number, number and vector
 
 
-@COMPILED
-def every_operation(rows, out, above):
-    """``rows`` holds groups of four vectors; ``out`` takes nine results of each, ``above`` whether a > b anywhere."""
-    for n in range(len(above)):
-        here, there = n * 4 * LANES, n * 9 * LANES
-        a, b = load(rows, here), load(rows, here + LANES)
-        c, d = load(rows, here + 2 * LANES), load(rows, here + 3 * LANES)
-        store(out, there, a + b)
-        store(out, there + LANES, a - b)
-        store(out, there + 2 * LANES, a * b)
-        store(out, there + 3 * LANES, a / b)
-        store(out, there + 4 * LANES, where_above(a, b, c, d))
-        first, second, third, fourth = transpose(a, b, c, d)
-        store(out, there + 5 * LANES, first)
-        store(out, there + 6 * LANES, second)
-        store(out, there + 7 * LANES, third)
-        store(out, there + 8 * LANES, fourth)
-        above[n] = any_above(a, b)
+def lane_by_lane(read, n):
+    """Every operation that mixes no lanes, on vectors of n that ``read`` loads."""
+
+    @COMPILED
+    def every(rows, numbers, out, above):
+        """``rows`` holds groups of four vectors; ``above`` takes whether a > b anywhere."""
+        for k in range(len(above)):
+            here, there, x = k * 4 * n, k * N_LANE_BY_LANE * n, numbers[k]
+            a, b = read(rows, here), read(rows, here + n)
+            store(out, there, a + b)
+            store(out, there + n, a - b)
+            store(out, there + 2 * n, a * b)
+            store(out, there + 3 * n, a / b)
+            store(out, there + 4 * n, a + x)
+            store(out, there + 5 * n, a - x)
+            store(out, there + 6 * n, a * x)
+            store(out, there + 7 * n, a / x)
+            store(out, there + 8 * n, x + a)
+            store(out, there + 9 * n, x - a)
+            store(out, there + 10 * n, x * a)
+            store(out, there + 11 * n, x / a)
+            store(out, there + 12 * n, where_above(a, b, read(rows, here + 2 * n), read(rows, here + 3 * n)))
+            above[k] = any_above(a, b)
+
+    return every
+
+
+EVERY = {
+    (precision, shape): lane_by_lane(*of)
+    for precision in PRECISIONS
+    for shape, of in (("group", (load, n_lanes(precision))), ("row", (load_four, FOUR)))
+}
 
 
 @COMPILED
@@ -40,32 +71,100 @@ def move(values, source, target, out):
 
 
 @COMPILED
+def move_four(values, source, target, out):
+    store(out, target, load_four(values, source))
+
+
+@COMPILED
+def rows_of_four(rows, columns, picked):
+    for k in range(0, len(rows), FOUR * FOUR):
+        a, b = load_four(rows, k), load_four(rows, k + FOUR)
+        c, d = load_four(rows, k + 2 * FOUR), load_four(rows, k + 3 * FOUR)
+        first, second, third, fourth = transpose(a, b, c, d)
+        store(columns, k, first)
+        store(columns, k + FOUR, second)
+        store(columns, k + 2 * FOUR, third)
+        store(columns, k + 3 * FOUR, fourth)
+        store(picked, k, second_and_fourth(a))
+        store(picked, k + FOUR, second_and_fourth(b))
+        store(picked, k + 2 * FOUR, second_and_fourth(c))
+        store(picked, k + 3 * FOUR, second_and_fourth(d))
+
+
+@COMPILED
 def spread_over(value, out):
-    store(out, 1, spread(value))
+    store(out, 1, spread(out, value))
+
+
+@COMPILED
+def asked_width(values):
+    return width(values)
+
+
+@pytest.fixture(scope="module", params=PRECISIONS)
+def precision(request):
+    return request.param
+
+
+@pytest.fixture(scope="module", params=["group", "row"])
+def shape(request):
+    return request.param
 
 
 @pytest.fixture(scope="module")
-def rows():
-    """(group, a to d, lane); a third of the numbers odd, some of a equal to b."""
-    rng = np.random.default_rng(4)
-    values = rng.standard_normal((N_GROUPS, 4, LANES)) * 10.0 ** rng.integers(-200, 200, (N_GROUPS, 4, LANES))
-    values = np.where(rng.random(values.shape) < 0.3, rng.choice(ODD, values.shape), values)
+def numbers(precision):
+    """Draws numbers, a third of them odd."""
+    rng, reach = np.random.default_rng(4), EXPONENTS[precision]
+
+    def draw(*size):
+        values = rng.standard_normal(size) * 10.0 ** rng.integers(-reach, reach, size)
+        return np.where(rng.random(size) < 0.3, rng.choice(ODD[precision], size), values)
+
+    return draw
+
+
+@pytest.fixture(scope="module")
+def rows(precision, shape, numbers):
+    """(group, a to d, lane); some of a equal to b."""
+    values = numbers(N_GROUPS, 4, n_lanes(precision) if shape == "group" else FOUR).astype(precision)
     values[::5, 1] = values[::5, 0]
     return values
 
 
 @pytest.fixture(scope="module")
-def found(rows):
-    out, above = np.empty((N_GROUPS, 9, LANES)), np.empty(N_GROUPS, dtype=np.bool_)
-    every_operation(rows.ravel(), out.ravel(), above)
-    return out, above
+def scalars(numbers):
+    """One float64 for every group."""
+    return numbers(N_GROUPS)
+
+
+@pytest.fixture(scope="module")
+def compute(precision, shape):
+    def results(rows, scalars):
+        out = np.empty((len(rows), N_LANE_BY_LANE, rows.shape[2]), dtype=precision)
+        above = np.empty(len(rows), dtype=np.bool_)
+        EVERY[precision, shape](rows.ravel(), scalars, out.ravel(), above)
+        return out, above
+
+    return results
+
+
+@pytest.fixture(scope="module")
+def found(compute, rows, scalars):
+    return compute(rows, scalars)
 
 
 def same_numbers(one, two):
-    """Equal, zeros of the same sign; one not-a-number is as good as another."""
-    return np.array_equal(one, two, equal_nan=True) and np.array_equal(
-        np.signbit(one)[~np.isnan(one)], np.signbit(two)[~np.isnan(two)]
+    """Equal and of one kind, zeros of the same sign; one not-a-number is as good as another."""
+    return (
+        one.dtype == two.dtype
+        and np.array_equal(one, two, equal_nan=True)
+        and np.array_equal(np.signbit(one)[~np.isnan(one)], np.signbit(two)[~np.isnan(two)])
     )
+
+
+def test_a_group_is_64_bytes_wide():
+    assert {name: n_lanes(name) for name in PRECISIONS} == {"float64": 8, "float32": 16}
+    assert n_lanes("float64") == LANES
 
 
 @pytest.mark.parametrize(("place", "name"), list(enumerate(OPERATIONS)))
@@ -77,9 +176,21 @@ def test_arithmetic(rows, found, place, name):
     assert np.isinf(expected).any()
 
 
+@pytest.mark.parametrize(("place", "name"), list(enumerate(OPERATIONS)))
+def test_arithmetic_with_a_number_on_either_side(rows, scalars, found, place, name):
+    """A Python float is rounded to the vector's kind first."""
+    with np.errstate(all="ignore"):
+        x = scalars.astype(rows.dtype)[:, None]
+        right, left = OPERATIONS[name](rows[:, 0], x), OPERATIONS[name](x, rows[:, 0])
+    assert same_numbers(found[0][:, 4 + place], right)
+    assert same_numbers(found[0][:, 8 + place], left)
+    assert np.isnan(x).any()
+    assert np.isinf(x).any()
+
+
 def test_where_above(rows, found):
     a, b, yes, no = rows.transpose(1, 0, 2)
-    assert same_numbers(found[0][:, 4], np.where(a > b, yes, no))
+    assert same_numbers(found[0][:, CHOICE], np.where(a > b, yes, no))
     assert 0.2 < (a > b).mean() < 0.8
 
 
@@ -89,43 +200,62 @@ def test_any_above(rows, found):
     assert 0 < expected.sum() < N_GROUPS
 
 
-@pytest.mark.parametrize("lane", range(LANES))
-def test_any_above_sees_every_lane(lane):
-    rows = np.zeros((2, 4, LANES))
-    rows[0, 0, lane], rows[1, 1, lane] = 5e-324, 1.0
-    above = np.empty(2, dtype=np.bool_)
-    every_operation(rows.ravel(), np.empty(2 * 9 * LANES), above)
-    assert above.tolist() == [True, False]
+def test_any_above_sees_every_lane(compute, rows, precision):
+    tiniest = np.finfo(precision).smallest_subnormal
+    for lane in range(rows.shape[2]):
+        some = np.zeros((2, 4, rows.shape[2]), dtype=precision)
+        some[0, 0, lane], some[1, 1, lane] = tiniest, 1.0
+        assert compute(some, np.ones(2))[1].tolist() == [True, False]
 
 
-def test_transpose(rows, found):
-    assert same_numbers(found[0][:, 5:], rows.transpose(0, 2, 1))
+def test_rows_of_four(precision, numbers):
+    rows = numbers(N_GROUPS, FOUR, FOUR).astype(precision)
+    columns, picked = np.empty_like(rows), np.empty_like(rows)
+    rows_of_four(rows.ravel(), columns.ravel(), picked.ravel())
+    assert same_numbers(columns, rows.transpose(0, 2, 1))
+    assert same_numbers(picked, rows[..., [1, 1, 3, 3]])
 
 
-def test_load_and_store_move_four_numbers_wherever_they_lie():
-    values = np.arange(12.0)
-    for source in range(9):
-        for target in range(9):
-            out = np.full(12, -1.0)
-            move(values, source, target, out)
-            expected = np.full(12, -1.0)
-            expected[target : target + LANES] = values[source : source + LANES]
-            assert out.tolist() == expected.tolist()
+def test_load_and_store_move_vectors_wherever_they_lie(precision):
+    for moved, n in ((move, n_lanes(precision)), (move_four, FOUR)):
+        values = np.arange(n + 8, dtype=precision)
+        for source in range(9):
+            for target in range(9):
+                out = np.full(n + 8, -1.0, dtype=precision)
+                moved(values, source, target, out)
+                expected = np.full(n + 8, -1.0)
+                expected[target : target + n] = values[source : source + n]
+                assert out.tolist() == expected.tolist()
 
 
-@pytest.mark.parametrize("value", ODD)
-def test_spread(value):
-    out = np.full(6, 7.0)
+def test_a_vector_goes_into_an_array_of_its_own_kind_only(precision):
+    (other,) = (name for name in PRECISIONS if name != precision)
+    values, out = np.zeros(16, dtype=precision), np.full(16, 7.0, dtype=other)
+    for moved, n in ((move, n_lanes(precision)), (move_four, FOUR)):
+        with pytest.raises(TypeError, match=f"{precision}x{n} does not fit an array of {other}"):
+            moved(values, 0, 0, out)
+    assert (out == 7.0).all()
+
+
+def test_width(precision):
+    assert asked_width(np.empty(0, dtype=precision)) == n_lanes(precision)
+
+
+@pytest.mark.parametrize("place", range(len(ODD["float64"])))
+def test_spread(precision, place):
+    value, n = ODD[precision][place], n_lanes(precision)
+    out = np.full(n + 2, 7.0, dtype=precision)
     spread_over(value, out)
-    assert same_numbers(out, np.array([7.0, *[value] * LANES, 7.0]))
+    assert same_numbers(out, np.array([7.0, *[value] * n, 7.0], dtype=precision))
 
 
-def test_a_lane_has_no_part_in_its_neighbours(rows, found):
+def test_a_lane_has_no_part_in_its_neighbours(compute, rows, scalars, found):
     """Whatever stands in one lane, the others' bits stay."""
-    for lane in range(LANES):
-        others = [k for k in range(LANES) if k != lane]
+    n = rows.shape[2]
+    for lane in range(n):
+        others = [k for k in range(n) if k != lane]
         for value in (np.nan, np.inf, 0.0):
-            changed, out = rows.copy(), np.empty_like(found[0])
+            changed = rows.copy()
             changed[:, :, lane] = value
-            every_operation(changed.ravel(), out.ravel(), np.empty(N_GROUPS, dtype=np.bool_))
-            assert out[:, :5][..., others].tobytes() == found[0][:, :5][..., others].tobytes()
+            out, _ = compute(changed, scalars)
+            assert out[..., others].tobytes() == found[0][..., others].tobytes()

@@ -30,21 +30,22 @@ def test_single_pair_stiffness_of_the_reference_pair(paper_machine):
 def test_sound_teeth_have_the_corner_gap_and_nothing_else(xiamen):
     table = xiamen.mesh_table()
     expected = corner_gap_by_pinion(xiamen.pair, table.position)
-    assert_allclose(table.pinion.gap[0] + table.wheel.gap[0], expected, rtol=0, atol=1e-15)
+    near = expected < 1e-4
+    # the parabolas of the table cut that much off where the gap begins
+    assert_allclose((table.pinion.gap[0] + table.wheel.gap[0])[near], expected[near], rtol=0, atol=5e-9)
     assert table.pinion.kind.tolist() == [0] * 23
     assert table.wheel.kind.tolist() == [0] * 84
 
 
 def test_slopes_are_those_of_the_tables(xiamen):
-    table = xiamen.mesh_table()
-    near = np.flatnonzero(table.pinion.gap[0] < 1e-3)
-    here = slice(near[0], near[-1] + 1)
-    step = np.diff(table.position[here])
+    """Between nodes the slope goes straight and the value follows it."""
+    table = xiamen.mesh_table((one("pitting", tooth=0),))
+    step = np.diff(table.position)
     for key in ("compliance", "gap"):
-        value, slope = getattr(table.pinion, key)[0, here], getattr(table.pinion, f"{key}_slope")[0, here]
-        climbed = np.cumsum(0.5 * (slope[1:] + slope[:-1]) * step)
-        # central differences miss up to half a cell's rise at the kinks, where a pair takes up and lets go of its load
-        assert_allclose(climbed, value[1:] - value[0], rtol=0, atol=0.015 * np.ptp(value))
+        values, slopes = getattr(table.pinion, key), getattr(table.pinion, f"{key}_slope")
+        for value, slope in zip(values, slopes, strict=True):
+            climbed = np.cumsum(0.5 * (slope[1:] + slope[:-1]) * step)
+            assert_allclose(climbed, value[1:] - value[0], rtol=0, atol=1e-12 * np.ptp(value))
 
 
 def test_only_the_faulty_tooth_has_its_own_row(xiamen):
@@ -131,8 +132,8 @@ class TestRows:
         table, curves = xiamen.mesh_table((fault,)), xiamen.stiffness_curves((fault,), points_per_tooth=1)
         side, at = side_of(table, gear), curves.contact_position * xiamen.pair.base_pitch
         expected = np.interp(at, table.position, side.gap[side.kind[0]] - side.gap[0])
-        # straight between nodes against the value itself
-        assert_allclose(curves.faulty_pair_gap, expected, rtol=0, atol=2e-9 + 1e-3 * np.abs(expected).max())
+        # straight between nodes, whose parabolas round steps off, against the value itself
+        assert_allclose(curves.faulty_pair_gap, expected, rtol=0, atol=2e-9 + 3e-3 * np.abs(expected).max())
         assert np.all(np.isfinite(side.compliance))
         assert side.compliance.min() > 0
         assert np.isfinite(side.gap[:, on_path(table)]).all()

@@ -9,7 +9,7 @@ from functools import lru_cache
 import numpy as np
 from numpy.typing import NDArray
 
-from gensig.sensing._kernels import low_pass
+from gensig.dynamics._kernels import low_pass
 
 Array = NDArray[np.float64]
 
@@ -36,18 +36,17 @@ class Decimator:
 
         Parameters
         ----------
-        means : (channel, step, lane)    the first step ends ``margin`` output samples before the first output sample
+        means : (step, channel, lane)    the first step ends ``margin`` output samples before the first output sample
 
         Returns
         -------
         (lane, channel, sample)
         """
-        n_channels, n_steps, n_lanes = means.shape
+        n_steps, n_channels, n_lanes = means.shape
         n_samples = (n_steps - 1) // self.oversampling - 2 * self.margin
-        out = np.empty((n_channels, n_samples, n_lanes))
-        for channel in range(n_channels):
-            low_pass(means[channel].ravel(), self.taps, 1, self.oversampling, n_steps, n_samples, out[channel].ravel())
-        return np.ascontiguousarray(out.transpose(2, 0, 1))
+        out = np.empty((n_samples, n_channels, n_lanes), dtype=means.dtype)
+        low_pass(means.ravel(), 1, self.taps, self.oversampling, n_channels, n_samples, out.ravel(), 0)
+        return np.ascontiguousarray(out.transpose(2, 1, 0), dtype=np.float64)
 
 
 @lru_cache(maxsize=16)

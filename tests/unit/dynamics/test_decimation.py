@@ -6,8 +6,8 @@ import numpy as np
 import pytest
 from numpy.testing import assert_allclose
 
-from gensig.dynamics._vector import LANES
-from gensig.sensing.decimation import decimator, in_band_error, usable_band
+from gensig.dynamics._vector import LANES, n_lanes
+from gensig.dynamics.decimation import ATTENUATION_DB, decimator, in_band_error, usable_band
 
 RATE = 51200.0
 N_SAMPLES = 2048
@@ -19,8 +19,9 @@ def oversampling(request):
 
 
 def side_by_side(signals):
-    """(channel, step) in the first lane, something else in the others."""
-    return np.stack([signals, -signals, signals + 1.0, 0.0 * signals], axis=-1)
+    """(channel, step) in the first lane, something else in the others, as (step, channel, lane)."""
+    others = [-signals, signals + 1.0, 0.0 * signals, 2.0 * signals, signals - 1.0, -3.0 * signals, 1.0 - signals]
+    return np.stack([signals, *others], axis=-1).transpose(1, 0, 2)
 
 
 def decimated(frequency, oversampling, phase=0.4):
@@ -69,9 +70,9 @@ def test_channels_and_lanes_are_filtered_by_themselves(n_samples, oversampling):
     """Against the plain sum of taps times means, whatever number of taps is left over after the fours."""
     low_pass, rng = decimator(oversampling), np.random.default_rng(2)
     for taps in (low_pass.taps, low_pass.taps[:-1], low_pass.taps[:-3]):
-        means = rng.standard_normal((3, (n_samples + 2 * low_pass.margin) * oversampling + 1, LANES))
+        means = rng.standard_normal(((n_samples + 2 * low_pass.margin) * oversampling + 1, 3, LANES))
         expected = [
-            [[taps @ means[c, 1 + s * oversampling :, lane][: len(taps)] for s in range(n_samples)] for c in range(3)]
+            [[taps @ means[1 + s * oversampling :, c, lane][: len(taps)] for s in range(n_samples)] for c in range(3)]
             for lane in range(LANES)
         ]
         assert_allclose(replace(low_pass, taps=taps).apply(means), expected, rtol=0, atol=1e-14)
@@ -80,9 +81,9 @@ def test_channels_and_lanes_are_filtered_by_themselves(n_samples, oversampling):
 @pytest.mark.parametrize("lane", range(LANES))
 def test_a_lane_that_is_not_finite_leaves_the_others_their_bits(lane, oversampling):
     low_pass, rng = decimator(oversampling), np.random.default_rng(3)
-    means = rng.standard_normal((2, (20 + 2 * low_pass.margin) * oversampling + 1, LANES))
+    means = rng.standard_normal(((20 + 2 * low_pass.margin) * oversampling + 1, 2, LANES))
     clean, others = low_pass.apply(means), [k for k in range(LANES) if k != lane]
-    means[:, 7:, lane] = np.nan
+    means[7:, :, lane] = np.nan
     spoilt = low_pass.apply(means)
     assert spoilt[others].tobytes() == clean[others].tobytes()
     assert np.isnan(spoilt[lane]).all()
@@ -93,6 +94,29 @@ def test_taps_are_symmetric_and_reach_the_margin(oversampling):
     assert len(low_pass.taps) == 2 * low_pass.margin * oversampling
     assert_allclose(low_pass.taps, low_pass.taps[::-1], rtol=0, atol=1e-13)
     assert_allclose(low_pass.taps.sum(), 1.0, rtol=5e-4, atol=0)
+
+
+def test_in_float32_the_sums_keep_six_digits(oversampling):
+    """Sixteen lanes; the samples come back in float64."""
+    low_pass, rng = decimator(oversampling), np.random.default_rng(5)
+    means = rng.standard_normal(((20 + 2 * low_pass.margin) * oversampling + 1, 2, n_lanes("float32")))
+    found = low_pass.apply(means.astype(np.float32))
+    assert found.dtype == np.float64
+    assert found.shape == (n_lanes("float32"), 2, 20)
+    halves = low_pass.apply(means[..., :LANES].copy()), low_pass.apply(means[..., LANES:].copy())
+    assert_allclose(found, np.concatenate(halves), rtol=0, atol=1e-6)
+
+
+@pytest.mark.parametrize("finest", [2, 5, 64, 128, 256])
+def test_every_step_that_is_allowed_has_its_low_pass(finest):
+    """And so has half of it, by which the error is found; that one must not reach further."""
+    coarse, fine = decimator(finest), decimator(2 * finest)
+    assert fine.margin <= coarse.margin
+    frequency = np.array([0.0, usable_band(RATE)[1], 0.5 * RATE, 0.7 * RATE, (0.5 * 2 * finest - 0.3) * RATE])
+    turn = np.exp(-2j * np.pi * np.outer(frequency / (2 * finest * RATE), np.arange(len(fine.taps))))
+    gain = np.abs(turn @ fine.taps) * np.sinc(frequency / (2 * finest * RATE))
+    assert_allclose(gain[:2], 1.0, rtol=0, atol=10 ** (0.01 / 20) - 1)
+    assert gain[2:].max() < 10 ** ((3 - ATTENUATION_DB) / 20)
 
 
 def test_usable_band_ends_at_20_khz():

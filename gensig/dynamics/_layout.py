@@ -1,0 +1,107 @@
+"""Compiled core: where every number lies.
+
+Arrays are flat; a row is one number for every record of the group. ``slot`` names an instant at which the tables were
+read.
+"""
+
+from __future__ import annotations
+
+from typing import Any, NamedTuple
+
+from gensig.dynamics._vector import FOUR, inlined, load, width
+from gensig.mesh.pair_table import N_PAIRS
+
+# pairs this much further apart than the approach are followed through a step, m: none comes closer as fast
+NEAR = 2e-5
+FAR, YIELDING = 1.0, 1e30  # gap in m and compliance in m/N of a pair that is not there
+FAR_NEAR = 1e-4  # approaches below are asked of the pairs between FIRST_NEAR and LAST_NEAR only, m
+
+# rows of Group.numbers
+(
+    PINION_RADIUS, WHEEL_RADIUS, PATH, PITCH_POINT, START_CURVATURE, TANGENT_LENGTH, SHARED, DAMPING, FRICTION,
+    PER_FRICTION_WIDTH, PER_SWITCH_WIDTH, BACKLASH, MEAN_FORCE, REST_APPROACH, N_NUMBERS,
+) = range(15)  # fmt: skip
+# rows of Group.exact, float64 whatever the precision: where pairs stand must not be lost in a long roll
+(
+    EXACT_RADIUS, PITCH, PER_PITCH, NODES_PER_METER, START_ROLL, FIRST_NEAR, LAST_NEAR, N_EXACT,
+) = range(8)  # fmt: skip
+# rows of Group.places
+(
+    PINION_TEETH, WHEEL_TEETH, START_PINION, START_WHEEL, PINION_TOOTH, WHEEL_TOOTH, TABLE, STRIDE, LAST_CELL,
+    PINION_ROWS, WHEEL_ROWS, N_PLACES,
+) = range(12)  # fmt: skip
+# rows of a cell of Group.profile
+NOMINAL_ANGLE, NOMINAL_SPEED, NOMINAL_ACCELERATION, TORQUE, TORQUE_SLOPE, N_PROFILE = range(6)
+
+# rows of one pair in a slot of the scratch
+OWN, OWN_SLOPE, GAP, GAP_SLOPE, STIFFNESS, POSITION, N_KEPT = range(7)
+COAST, MIDDLE, PART = 0, 3, 4  # slots 1 and 2 take turns as begin and end of a step
+N_SLOTS = 5
+SLOT_ROWS = N_PAIRS * N_KEPT
+COLUMNS = FOUR  # of a table: compliance, its slope, gap, its slope
+# rows of the scratch behind the slots
+BITE = N_SLOTS * SLOT_ROWS
+MARGIN = BITE + N_PAIRS  # twice N_PAIRS: at the first and at the last stage of a step
+ERROR = MARGIN + 2 * N_PAIRS
+AHEAD = ERROR + N_PAIRS  # roll of a slot, less that at the begin of the step
+WITHIN = AHEAD + N_SLOTS
+FLAGS = WITHIN + 1
+MOTION = FLAGS + 1  # roll less that at the begin of the step, approach, its rate, the roll's rate
+N_LAW = 8
+LAW = MOTION + 4
+RAW = LAW + N_LAW  # table rows as they are read, lane by lane
+N_MESH = RAW + N_PAIRS * COLUMNS
+# rows of the float64 scratch
+BASE, CENTER, NOMINAL, ROLL, N_WIDE = 0, 1, 2, 3, 3 + N_SLOTS
+# rows of the whole numbers of the scratch
+NEWEST, AT_PINION, AT_WHEEL, SPAN, N_COUNTS = 0, 1, 1 + N_PAIRS, 1 + 2 * N_PAIRS, 1 + 2 * N_PAIRS + N_SLOTS
+NOBODY = -(2**62)
+
+
+class Group(NamedTuple):
+    """Gear meshes of the same kind side by side, with the machines around them.
+
+    ``numbers``, ``exact`` and ``places`` hold rows as named above. ``table`` holds, lane after lane, the pairs of
+    distinct teeth (pinion's times wheel's, node, [c, c', g, g']), or where those are many the distinct teeth of the
+    pinion and then those of the wheel, whose ``WHEEL_ROWS`` is then not 0. ``bend`` (lane, 4) is half the distance of
+    nodes where a column is followed by its slope, else 0: values bend between nodes as their slopes say.
+    ``tooth_row`` and ``tooth_error`` are the row of every tooth (-1 for a missing one) and its gap offset in m.
+
+    The machine is M q'' + C q' + K q = f + mesh forces; q is the deviation from nominal rotation and begins with pinion
+    x, y, rotation, wheel x, y, rotation. The state is q less ``rest`` (dof, lane), a static equilibrium, so that it
+    stays small. K and C stand as diagonals and as rows of what else there is (``other_first`` (dof + 1,),
+    ``other_column``). ``force`` is f and the mean mesh force, less what holds the rest; the mean mesh force is taken
+    off the mesh force again: large forces and torques balance before they are rounded. ``held`` is K times, and
+    ``carried`` M times, how far each degree of freedom turns with the pinion (``rotation``). ``profile`` (cell, 5,
+    lane) tells the nominal motion and the torque from ``profile_start`` s on.
+    """
+
+    numbers: Any
+    exact: Any
+    places: Any
+    table: Any
+    bend: Any
+    tooth_row: Any
+    tooth_error: Any
+    one_sided: bool
+    consistent: bool
+    inverse_mass: Any
+    stiffness: Any
+    damping: Any
+    other_first: Any
+    other_column: Any
+    other_stiffness: Any
+    other_damping: Any
+    force: Any
+    rest: Any
+    rotation: Any
+    held: Any
+    carried: Any
+    profile: Any
+    profile_start: float
+    cells_per_second: float
+
+
+@inlined
+def at_row(numbers, row):
+    return load(numbers, row * width(numbers))

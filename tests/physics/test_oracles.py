@@ -1,0 +1,249 @@
+"""Other ways to the same motion: another method, periodic motions that nobody settled, other steps where teeth bounce.
+
+Equations of motion and mesh law are ours, written out in ``test_mesh_reference.py``; the methods are scipy's.
+"""
+
+import math
+from dataclasses import dataclass, replace
+
+import numpy as np
+import pytest
+from fault_cases import one
+from lane_tools import law_of, trajectory
+from numpy.testing import assert_allclose
+from scipy.integrate import solve_ivp
+from scipy.linalg import expm
+
+from gensig.faults.broken import MissingTooth
+from gensig.sensing.agreement import agreement
+from gensig.systems.spur_pair import Run, Start, simulate_together
+
+SAMPLING_RATE = 51200.0
+PHASE = 0.3
+LIKELY = np.repeat([1e-6, 1e-2], 6) * np.tile([1, 1, 20, 1, 1, 20], 2)  # m, rad, m/s, rad/s: how much things move
+RECORDED = [0, 1, 3, 4]  # the channels' degrees of freedom
+MORE_DAMPED = {"mesh.damping_ratio": 0.0735}  # by a twentieth
+
+
+def equations(dynamics):
+    """y' as a function of t and y = (q, q'), and the matrix of its linear part without the mesh."""
+    system, direction, law = dynamics.system(), dynamics.approach_direction(), law_of(dynamics)
+    radius, speed = dynamics.table.pair.pinion.base_radius, dynamics.operating.speed
+    free = np.eye(12, k=6)
+    free[6:] = -np.hstack([system.stiffness, system.damping]) / system.mass[:, None]
+    pushed = np.concatenate([np.zeros(6), system.force / system.mass])
+    # motion of the mesh by state; state by normal force, friction force, its moments, force on the roll
+    seen, felt = np.zeros((4, 12)), np.zeros((12, 5))
+    seen[1, :6] = seen[2, 6:] = direction
+    seen[0, 2] = seen[3, 8] = radius
+    felt[6:, 0] = -direction
+    felt[[6, 9], 1] = 1, -1
+    felt[[8, 11, 8], [2, 3, 4]] = 1, 1, radius
+    felt[6:] /= system.mass[:, None]
+    start, rate = np.array([dynamics.start_roll, 0, 0, radius * speed]), np.array([radius * speed, 0, 0, 0])
+
+    def slope(t, y):
+        return free @ y + pushed + felt @ law(*(start + rate * t + seen @ y))[:5]
+
+    return slope, free
+
+
+def solved(slope, start, times, method, rtol):
+    """States at some times, (time, state)."""
+    return solve_ivp(
+        slope, (0.0, times[-1]), start, method=method, rtol=rtol, atol=10 * rtol * LIKELY, t_eval=times,
+        first_step=1e-7, max_step=2e-5,
+    ).y.T  # fmt: skip
+
+
+def at_rest(dynamics):
+    return np.concatenate([dynamics.static_start(0.0), np.zeros(6)])
+
+
+class TestFourMilliseconds:
+    """From rest, at every sample: three meshes, six of whose contacts come or go."""
+
+    N_SAMPLES = 204
+
+    @pytest.fixture(scope="class")
+    @classmethod
+    def exact(cls, xiamen, dynamics_of):
+        """Velocities, (sample, dof)."""
+        dynamics = dynamics_of(xiamen, phase=PHASE)
+        times = np.arange(cls.N_SAMPLES + 1) / SAMPLING_RATE
+        return solved(equations(dynamics)[0], at_rest(dynamics), times, "DOP853", 1e-11)[:, 6:]
+
+    @pytest.fixture(scope="class")
+    @classmethod
+    def error(cls, exact, dynamics_of):
+        """Largest relative error of a velocity over degrees of freedom, RMS over the samples."""
+
+        def measured(system, oversampling):
+            dynamics = dynamics_of(system, phase=PHASE)
+            start, step = at_rest(dynamics), 1 / (SAMPLING_RATE * oversampling)
+            _, v = trajectory(dynamics, start[:6], start[6:], step, cls.N_SAMPLES * oversampling)
+            return (np.linalg.norm(v[::oversampling] - exact, axis=0) / np.linalg.norm(exact, axis=0)).max()
+
+        return measured
+
+    @pytest.mark.parametrize(("oversampling", "limit"), [(5, 2e-4), (10, 4e-5), (20, 1e-5)])
+    def test_error(self, xiamen, error, oversampling, limit):
+        assert error(xiamen, oversampling) < limit
+
+    def test_order(self, xiamen, error):
+        """Two: a contact that comes or goes inside a step costs the square of the part it is taken in."""
+        assert math.log2(error(xiamen, 5) / error(xiamen, 20)) / 2 > 1.7
+
+    def test_another_machine_would_show(self, machine, error):
+        assert error(machine(MORE_DAMPED), 20) > 1e-3
+
+
+@dataclass(frozen=True, kw_only=True)
+class Case:
+    """A periodic motion: its period is a mesh period, or a turn of the pinion where a tooth of it is faulty."""
+
+    speed_rpm: float
+    faults: tuple
+    period: float  # s
+    n_periods: int  # of a record, a whole number of samples
+
+    @property
+    def changes(self):
+        return {"operating.speed_rpm": self.speed_rpm, "operating.duration_s": self.n_periods * self.period}
+
+    @property
+    def mesh_frequency(self):
+        return 23 * self.speed_rpm / 60
+
+    @property
+    def lines(self):
+        """Harmonics of the period from 20 Hz to 20 kHz."""
+        lines = np.arange(1, math.floor(20e3 * self.period) + 1)
+        return lines[lines >= 20 * self.period]
+
+
+CASES = {
+    "healthy": Case(speed_rpm=1800, faults=(), period=60 / 1800 / 23, n_periods=69),
+    "crack": Case(speed_rpm=6000, faults=(one("crack", tooth=3),), period=60 / 6000, n_periods=10),
+}
+
+
+def periodic_motion(dynamics, period, n_points):
+    """States over one period that ends where it began, (n_points + 1, 12): Newton's method on the map of the start.
+
+    The map's slope is that of the machine with its mesh held at mean stiffness. The drive holds the pinion's angle, so
+    that what is periodic turns at the set speed, and the period is known.
+    """
+    slope, free = equations(dynamics)
+    stiffness, direction, mass = dynamics.mean_mesh_stiffness(), dynamics.approach_direction(), dynamics.system().mass
+    damping = 2 * dynamics.table.options.damping_ratio * math.sqrt(stiffness * dynamics.equivalent_mass)
+    held = free.copy()
+    held[6:] -= np.outer(direction / mass, np.concatenate([stiffness * direction, damping * direction]))
+    returns = expm(held * period) - np.eye(12)
+    start, times = at_rest(dynamics), np.linspace(0.0, period, n_points + 1)
+    for rtol in (1e-5, 1e-5, 1e-6, 1e-8):
+        start = start - np.linalg.solve(returns, solved(slope, start, times, "LSODA", rtol)[-1] - start)
+    return solved(slope, start, times, "LSODA", 1e-8)
+
+
+class TestPeriodicMotion:
+    @pytest.fixture(scope="class", params=CASES)
+    @classmethod
+    def case(cls, request):
+        return CASES[request.param]
+
+    @pytest.fixture(scope="class")
+    @classmethod
+    def tile(cls, case, machine, dynamics_of):
+        dynamics = dynamics_of(machine(case.changes), case.faults, phase=PHASE)
+        return periodic_motion(dynamics, case.period, n_points=8192)
+
+    @pytest.fixture
+    def default(self, composed_config):
+        """Steps a sample."""
+        return composed_config["solver"]["oversampling"]
+
+    @pytest.fixture
+    def spectrum(self, case, machine):
+        """Complex amplitudes of a record's whole spectrum, (channel, line)."""
+
+        def found(oversampling, changes=None, phase=PHASE):
+            system = machine({**case.changes, **(changes or {})})
+            system = replace(system, solver=replace(system.solver, oversampling=oversampling, max_error=None))
+            start = Start(tooth_pinion=0, tooth_wheel=0, phase=phase)
+            return np.fft.rfft(system.simulate(case.faults, start=start).acceleration, norm="forward")
+
+        return found
+
+    @pytest.fixture
+    def compared(self, case, tile, spectrum):
+        """How late a record is against the tile, s, and the largest relative error of a channel's lines besides.
+
+        The drive is soft: a torque of 1e-7 of the set one turns the pinion on by what 1e-8 s do.
+        """
+        velocity = np.fft.rfft(tile[:-1, 6:], axis=0, norm="forward")[case.lines][:, RECORDED].T
+        turn = 2j * np.pi * case.lines / case.period
+        exact = turn * velocity
+
+        def measured(*record):
+            found = spectrum(*record)[:, case.n_periods * case.lines]
+            late = -np.vdot(turn * exact, found).real / np.linalg.norm(turn * exact) ** 2
+            off = found * np.exp(turn * late) - exact
+            return late, (np.linalg.norm(off, axis=1) / np.linalg.norm(exact, axis=1)).max()
+
+        return measured
+
+    def test_the_tile_closes(self, tile):
+        moved = np.ptp(tile, axis=0)
+        assert_allclose((tile[-1] - tile[0]) / moved, 0.0, rtol=0, atol=5e-4)
+
+    def test_it_turns_at_the_set_speed(self, case, tile):
+        assert abs(tile[:-1, 8].mean()) < 1e-8 * 2 * np.pi * case.speed_rpm / 60
+
+    def test_a_record_holds_nothing_else(self, case, spectrum, default):
+        found = spectrum(default)[:, 1 : math.floor(20e3 * case.period * case.n_periods)]
+        between = found.copy()
+        between[:, case.n_periods - 1 :: case.n_periods] = 0
+        assert np.all(np.linalg.norm(between, axis=1) < 3e-4 * np.linalg.norm(found, axis=1))
+
+    def test_a_record_at_the_default_oversampling(self, case, compared, default):
+        late, error = compared(default)
+        assert abs(late) * case.mesh_frequency < 1e-4
+        assert error < 1e-3
+
+    def test_a_record_at_ten_steps(self, compared):
+        assert compared(10)[1] < 2e-4
+
+    def test_another_machine_would_show(self, compared):
+        assert compared(10, MORE_DAMPED)[1] > 1e-2
+
+    def test_another_start_would_show(self, case, compared):
+        """One that lies 5e-4 mesh periods further on is early by as much, and nothing else."""
+        late, error = compared(10, {}, PHASE + 5e-4)
+        assert_allclose(late * case.mesh_frequency, -5e-4, rtol=0, atol=1e-4)
+        assert error < 2e-4
+
+
+class TestOutOfContact:
+    """Two teeth missing under 1 N m at 3600 r/min: out of contact for 8 % of the time."""
+
+    @pytest.fixture(scope="class")
+    @classmethod
+    def records(cls, machine):
+        """At five steps a sample, at twenty, and at five under a tenth more torque."""
+        missing = tuple(MissingTooth(gear="pinion", tooth=tooth) for tooth in (3, 4))
+        bouncing = {"operating.torque_nm": 1.0, "operating.speed_rpm": 3600, "operating.duration_s": 0.2,
+                    "solver.oversampling": 5, "solver.max_error": None}  # fmt: skip
+        changes = ({}, {"solver.oversampling": 20}, {"operating.torque_nm": 1.1})
+        return simulate_together([Run(system=machine({**bouncing, **change}), faults=missing) for change in changes])
+
+    def test_they_are(self, records):
+        assert min(record.contact_loss_fraction for record in records) > 0.05
+
+    def test_five_steps_agree_with_twenty(self, records):
+        coarse, fine, _ = (record.acceleration[None] for record in records)
+        assert agreement(coarse, fine, SAMPLING_RATE).agrees[0]
+
+    def test_another_torque_does_not(self, records):
+        _, fine, other = (record.acceleration[None] for record in records)
+        assert not agreement(other, fine, SAMPLING_RATE).agrees[0]
