@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+import numpy as np
+
 from gensig.dynamics import _layout as layout
 from gensig.dynamics._layout import BASE, CENTER, NOMINAL, at_row
 from gensig.dynamics._vector import inlined, load, spread, store, where_above, width
@@ -32,8 +34,9 @@ def set_out(group, time, q, drive, work, wide):
     n, n_dof = width(work), len(group.force) // width(work)
     exact, profile = group.exact, group.profile
     n_cells = len(profile) // (layout.N_PROFILE * n)
-    cell = min(max(int((time - group.profile_start) * group.cells_per_second), 0), n_cells - 1)
-    since = time - (group.profile_start + cell / group.cells_per_second)
+    cell = int(np.floor(time * group.cells_per_second)) - group.profile_first
+    cell = min(max(cell, 0), n_cells - 1)
+    since = time - (group.profile_first + cell) / group.cells_per_second
     for lane in range(n):
         at = cell * layout.N_PROFILE * n + lane
         speed, gain = profile[at + layout.NOMINAL_SPEED * n], profile[at + layout.NOMINAL_ACCELERATION * n]
@@ -51,7 +54,7 @@ def set_out(group, time, q, drive, work, wide):
     forces = drive + 4 * n
     for i in range(0, n_dof * n, n):
         held = center * load(group.held, i) + gain * load(group.carried, i)
-        store(work, forces + i, load(group.force, i) * torque - held)
+        store(work, forces + i, load(group.force, i) + load(group.set_force, i) * (torque - 1.0) - held)
 
 
 @inlined

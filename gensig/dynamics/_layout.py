@@ -70,10 +70,10 @@ class Group(NamedTuple):
     The machine is M q'' + C q' + K q = f + mesh forces; q is the deviation from nominal rotation and begins with pinion
     x, y, rotation, wheel x, y, rotation. The state is q less ``rest`` (dof, lane), a static equilibrium, so that it
     stays small. K and C stand as diagonals and as rows of what else there is (``other_first`` (dof + 1,),
-    ``other_column``). ``force`` is f and the mean mesh force, less what holds the rest; the mean mesh force is taken
-    off the mesh force again: large forces and torques balance before they are rounded. ``held`` is K times, and
-    ``carried`` M times, how far each degree of freedom turns with the pinion (``rotation``). ``profile`` (cell, 5,
-    lane) tells the nominal motion and the torque from ``profile_start`` s on.
+    ``other_column``). ``set_force`` is f and the mean mesh force, ``force`` the same less what holds the rest; the mean
+    mesh force is taken off the mesh force again: large forces and torques balance before they are rounded. ``held`` is
+    K times, and ``carried`` M times, how far each degree of freedom turns with the pinion (``rotation``). ``profile``
+    (cell, 5, lane) tells the nominal motion and the torque, cell ``profile_first`` first.
     """
 
     numbers: Any
@@ -93,12 +93,13 @@ class Group(NamedTuple):
     other_stiffness: Any
     other_damping: Any
     force: Any
+    set_force: Any
     rest: Any
     rotation: Any
     held: Any
     carried: Any
     profile: Any
-    profile_start: float
+    profile_first: int
     cells_per_second: float
 
 

@@ -166,6 +166,8 @@ def papers_law(numbers, first, last, slot, margin, ahead, approach, approach_rat
         position = load(work, (pair + POSITION) * n) + ahead
         inside = where_above(position, path - position, path - position, position)
         share = 0.5 * (1.0 + inside * at_row(numbers, PER_SWITCH_WIDTH))
+        # a pair that is not there is never in
+        share = where_above(load(work, (pair + STIFFNESS) * n), spread(work, 1e-20), share, spread(work, -1.0))
         if margin >= 0:
             store(work, (margin + k) * n, share)
         share = _clip(share, zero, one)

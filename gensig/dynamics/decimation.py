@@ -66,7 +66,9 @@ def decimator(oversampling: int) -> Decimator:
     middle = 0.5 * (PASS_SHARE + 0.5)
     frequency = np.append(np.linspace(0.0, middle, 65), [middle, nyquist])
     gain = np.append(1.0 / np.sinc(frequency[:65] / oversampling), [0.0, 0.0])
-    taps = firwin2(2 * margin * oversampling, frequency, gain, nfreqs=16385, window=("kaiser", beta), fs=2.0 * nyquist)
+    n_grid = max(16385, 1 + 2 ** math.ceil(math.log2(256 * oversampling)))
+    window = ("kaiser", beta)
+    taps = firwin2(2 * margin * oversampling, frequency, gain, nfreqs=n_grid, window=window, fs=2.0 * nyquist)
     return Decimator(taps, oversampling, margin)
 
 

@@ -29,6 +29,7 @@ CHECKED = 0.05  # s at the beginning of a record, integrated again at half the s
 FINEST = 64  # steps per sample that are tried where the error is too large
 SETTLED = 1e-4  # what is left of the start's transient, as a share
 STABILITY_LIMIT = 2.6  # |lambda| h of the classical RK4 on the imaginary axis is 2.83, on the real axis 2.79
+OUT_OF_BOUNDS = 1e6  # m, rad, m/s or rad/s: no machine; a motion that overflows may come back to finite numbers
 MOST_BYTES = 2**28  # of the samples of the records that are simulated side by side
 
 
@@ -198,8 +199,8 @@ def integrate(
         check=check,
         shaft_angle=angle[:, :-1],
         mean_speed=(angle[:, -1] - angle[:, 0]) * sampling_rate / n_samples,
-        contact_loss_fraction=run.lost / ((n_samples + 2 * low_pass.margin) * fine + 1),
-        finite=np.asarray(np.isfinite(run.state).all(axis=(0, 1))),
+        contact_loss_fraction=run.lost / ((n_samples + 2 * low_pass.margin - 1) * fine + 1),
+        finite=np.asarray((np.abs(run.state) < OUT_OF_BOUNDS).all(axis=(0, 1))),
     )
 
 

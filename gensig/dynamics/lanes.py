@@ -24,7 +24,6 @@ from gensig.dynamics._layout import (
 )
 from gensig.dynamics._vector import n_lanes
 from gensig.dynamics.pair import PairDynamics
-from gensig.dynamics.system import LumpedSystem
 from gensig.mesh.pair_table import GearTable, PairTable
 
 Array = NDArray[np.float64]
@@ -81,13 +80,16 @@ def pack(
     n_dof = mass.shape[1]
     coupled = np.any((stiffness != 0.0) | (damping != 0.0), axis=0) & ~np.eye(n_dof, dtype=bool)
     row, column = np.nonzero(coupled)
-    profile, profile_start, cells_per_second = _nominal(lanes, span)
+    profile, profile_first, cells_per_second = _nominal(lanes, span)
 
     def side_by_side(values: Array) -> NDArray[np.floating]:
         """(lane, row...) flat, one lane beside the other."""
         return np.ascontiguousarray(np.moveaxis(values, 0, -1), dtype=precision).ravel()
 
     diagonal = np.arange(n_dof)
+    set_force = np.stack(
+        [system.force - one.mesh_force * one.approach_direction() for system, one in zip(systems, lanes, strict=True)]
+    )
     options = lanes[0].table.options
     return Group(
         numbers=numbers.ravel(),
@@ -103,22 +105,23 @@ def pack(
         stiffness=side_by_side(stiffness[:, diagonal, diagonal]),
         damping=side_by_side(damping[:, diagonal, diagonal]),
         other_first=np.searchsorted(row, np.arange(n_dof + 1)),
-        other_column=column,
+        other_column=np.ascontiguousarray(column),
         other_stiffness=side_by_side(stiffness[:, row, column]),
         other_damping=side_by_side(damping[:, row, column]),
-        force=side_by_side(np.stack([*map(_force, lanes, systems, rests)])),
+        force=side_by_side(set_force - np.einsum("lij,lj->li", stiffness, np.stack(rests))),
+        set_force=side_by_side(set_force),
         rest=np.stack(rests, axis=-1),
         rotation=side_by_side(rotation),
         held=side_by_side(np.einsum("lij,lj->li", stiffness, rotation)),
         carried=side_by_side(mass * rotation),
         profile=profile,
-        profile_start=profile_start,
+        profile_first=profile_first,
         cells_per_second=cells_per_second,
     )
 
 
-def _nominal(lanes: Sequence[PairDynamics], span: tuple[float, float]) -> tuple[Array, float, float]:
-    """Nominal motion and torque by cells of time, (cell, 5, lane) flat, their first instant, and cells a second.
+def _nominal(lanes: Sequence[PairDynamics], span: tuple[float, float]) -> tuple[Array, int, float]:
+    """Nominal motion and torque by cells of time, (cell, 5, lane) flat, the number of the first, and cells a second.
 
     Speed and torque run straight through a cell; where neither changes there is one cell.
     """
@@ -126,18 +129,22 @@ def _nominal(lanes: Sequence[PairDynamics], span: tuple[float, float]) -> tuple[
     if steady:
         profile = np.zeros((1, N_PROFILE, len(lanes)))
         profile[0, NOMINAL_SPEED], profile[0, TORQUE] = [one.operating.speed for one in lanes], 1.0
-        return profile.ravel(), 0.0, 1.0
+        return profile.ravel(), 0, 1.0
     # cells begin at multiples of their length, so that the same instants have the same bits whatever the span
-    first, last = math.floor(span[0] * CELLS_PER_SECOND), math.ceil(span[1] * CELLS_PER_SECOND)
+    first = math.floor(span[0] * CELLS_PER_SECOND)
+    last = max(math.ceil(span[1] * CELLS_PER_SECOND), first + 1)
     edges = np.arange(first, last + 1) / CELLS_PER_SECOND
     profile = np.empty((last - first, N_PROFILE, len(lanes)))
     for lane, one in enumerate(lanes):
         nominal = one.nominal(edges)
         gain, slope = (np.diff(values) * CELLS_PER_SECOND for values in (nominal.speed, nominal.torque_factor))
-        profile[:, NOMINAL_ANGLE, lane], profile[:, NOMINAL_SPEED, lane] = nominal.angle[:-1], nominal.speed[:-1]
+        turned = 0.5 * (nominal.speed[1:] + nominal.speed[:-1]) / CELLS_PER_SECOND
+        before, after = turned[:-first], turned[-first:]
+        angle = np.concatenate([-np.cumsum(before[::-1])[::-1], [0.0], np.cumsum(after)])
+        profile[:, NOMINAL_ANGLE, lane], profile[:, NOMINAL_SPEED, lane] = angle[:-1], nominal.speed[:-1]
         profile[:, NOMINAL_ACCELERATION, lane] = gain
         profile[:, TORQUE, lane], profile[:, TORQUE_SLOPE, lane] = nominal.torque_factor[:-1], slope
-    return profile.ravel(), float(edges[0]), CELLS_PER_SECOND
+    return profile.ravel(), first, CELLS_PER_SECOND
 
 
 def _columns(side: GearTable) -> Array:
@@ -150,12 +157,6 @@ def at_step(group: Group, before: float, after: float) -> Group:
     numbers = group.numbers.copy().reshape(N_NUMBERS, -1)
     numbers[PER_SWITCH_WIDTH] *= before / after
     return group._replace(numbers=numbers.ravel())
-
-
-def _force(dynamics: PairDynamics, system: LumpedSystem, rest: Array) -> Array:
-    """Force on what leaves the rest, under the mean mesh force, (dof,)."""
-    force = system.force - dynamics.mesh_force * dynamics.approach_direction()
-    return np.asarray(force - system.stiffness @ rest)
 
 
 def _are_many(table: PairTable) -> bool:

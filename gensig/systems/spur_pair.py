@@ -59,8 +59,8 @@ FINEST_BOUNCING = 20  # steps per sample above which what bounces does not come 
 class CleanRecord:
     """Accelerations before noise, (channel, sample) m/s2 (rad/s2 for rotations), and what the run tells of itself.
 
-    ``shaft_angle`` (sample,) rad of the pinion since the first sample, ``mean_speed`` rad/s, ``integration_check`` one
-    of ``CHECKS``.
+    ``shaft_angle`` (sample,) rad of the pinion, from its nominal place at the first sample on, ``mean_speed`` rad/s,
+    ``integration_check`` one of ``CHECKS``.
     """
 
     acceleration: Array

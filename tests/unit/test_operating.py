@@ -145,9 +145,9 @@ class TestConfiguration:
             ([[0, math.nan], [1, 1]], ": point 0 = [0, nan]; give two finite numbers"),
             ([[0, 1], [math.inf, 1]], ": point 1 = [inf, 1]; give two finite numbers"),
             ([[0, 1], [2e6, 1]], ": point 1 = [2e+06, 1]; give a time within 1e+06 s and a finite factor"),
-            ([[0, 1], [0, 2]], ": the time 0 s follows 0 s; times must increase, by 0.0001 s or more"),
+            ([[0, 1], [0, 2]], ": the time 0 s follows 0 s; times must increase, by 0.001 s or more"),
             ([[0, 1], [1, 1], [0.5, 1]], ": the time 0.5 s follows 1 s; times must increase"),
-            ([[0, 1], [1e-5, 1]], ": the time 1e-05 s follows 0 s; times must increase, by 0.0001 s or more"),
+            ([[0, 1], [1e-5, 1]], ": the time 1e-05 s follows 0 s; times must increase, by 0.001 s or more"),
             ([[0, 1], [1, -0.5]], ": factor -0.5 must "),
         ],
     )

@@ -75,12 +75,15 @@ def row_of(plan: Plan, index: int, *, status: str = "ok") -> tuple[dict[str, np.
     return signals, values
 
 
-def write_shard(path: Path, plan: Plan, shard: int = 0, *, failed: int | None = None, **changes) -> ShardWriter:
+def write_shard(
+    path: Path, plan: Plan, shard: int = 0, *, failed: int | None = None, clean: bool = False, **changes
+) -> ShardWriter:
+    """With ``clean``, every record's signal is stored a second time as the one without noise, at half its size."""
     rows = plan.rows(shard)
     writer = ShardWriter(
         path,
         n_records=len(rows),
-        signals=SIGNALS,
+        signals=SIGNALS | ({"acceleration_clean": (2, 200)} if clean else {}),
         params=["crack_depth_mm"],
         attributes=changes.pop("attributes", ATTRIBUTES),
         **changes,
@@ -88,20 +91,31 @@ def write_shard(path: Path, plan: Plan, shard: int = 0, *, failed: int | None = 
     with writer:
         for row, index in enumerate(rows.tolist()):
             signals, values = row_of(plan, index, status="failed" if index == failed else "ok")
+            if clean and index != failed:
+                signals["acceleration_clean"] = signals["acceleration"] / 2
             if index == failed:
                 del signals["acceleration"]
             writer.write(row, signals, values)
     return writer
 
 
-def build(out: Path, plan: Plan, *, shards: range | None = None, close: bool = True, failed: int | None = None) -> Path:
+def build(
+    out: Path,
+    plan: Plan,
+    *,
+    shards: range | None = None,
+    close: bool = True,
+    failed: int | None = None,
+    clean: bool = False,
+    **storage: str,
+) -> Path:
     """A data-set folder; fewer shards or close=False make an interrupted one."""
     identity = identity_hash(CONFIG, "0.1.0")
     create_folder(
         out, config=CONFIG, overrides=["seed=7"], plan=plan, identity=identity, seed=7, generator_version="0.1.0"
     )
     for shard in shards if shards is not None else range(plan.n_shards):
-        writer = write_shard(shard_path(out, shard), plan, shard, failed=failed)
+        writer = write_shard(shard_path(out, shard), plan, shard, failed=failed, clean=clean, **storage)
         record_shard(out, shard, writer.sha256, writer.n_bytes, writer.n_failed)
     if close:
         finalize(out)

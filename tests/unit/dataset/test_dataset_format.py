@@ -6,10 +6,21 @@ from pathlib import Path
 import h5py
 import numpy as np
 import pytest
+from dataset_samples import build, row_of
 
 from gensig.dataset.layout import read_manifest
+from gensig.dataset.plan import Plan
 from gensig.dataset.reader import open_dataset
-from gensig.dataset.schema import COLUMNS, REQUIRED, REQUIRED_ATTRIBUTES, SCHEMA_VERSION, SIGNALS, Column, column_table
+from gensig.dataset.schema import (
+    COLUMNS,
+    REQUIRED,
+    REQUIRED_ATTRIBUTES,
+    SAMPLE_TYPES,
+    SCHEMA_VERSION,
+    SIGNALS,
+    Column,
+    column_table,
+)
 from gensig.errors import DatasetError
 
 TEXT = (Path(__file__).parents[3] / "docs" / "format.md").read_text(encoding="utf-8")
@@ -37,14 +48,17 @@ def test_shards_are_as_described(folder: Path) -> None:
         assert h5py.check_string_dtype(file["record_id"].dtype).encoding == "utf-8"
 
 
+@pytest.mark.parametrize("sample_type", SAMPLE_TYPES)
 @pytest.mark.parametrize("library", ["h5py", "gensig"])
-def test_python_examples_run(folder: Path, library: str, monkeypatch: pytest.MonkeyPatch) -> None:
+def test_python_examples_run(tmp_path: Path, plan: Plan, library: str, sample_type: str) -> None:
+    folder = build(tmp_path / "set", plan, sample_type=sample_type)
     examples = re.findall(r"```python\n(.*?)```", TEXT, re.DOTALL)
     (code,) = [example for example in examples if f"import {library}\n" in example]
     code = code.replace("DIR", str(folder)).replace("gensig.open_dataset", "open_dataset")
     names = {"open_dataset": open_dataset}
     exec(code, names)
-    assert np.asarray(names["signal"]).shape == ((2, 200) if library == "h5py" else (1, 200))
+    expected = row_of(plan, 0)[0]["acceleration"][: 2 if library == "h5py" else 1]
+    np.testing.assert_allclose(names["signal"], expected, rtol=0, atol=1e-4 if sample_type == "int16" else 0)
 
 
 def test_role_must_be_known() -> None:

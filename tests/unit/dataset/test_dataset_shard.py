@@ -17,7 +17,7 @@ from gensig.dataset.shard import ShardWriter
 from gensig.errors import DatasetError
 
 
-@pytest.mark.parametrize("compression", ["none", "gzip", "lzf"])
+@pytest.mark.parametrize("compression", ["none", "gzip", "lzf", "blosc2"])
 def test_what_goes_in_comes_out(tmp_path: Path, compression: str) -> None:
     plan = make_plan()
     path = tmp_path / "a.h5"
@@ -146,6 +146,8 @@ def test_missing_column_and_bad_signals_are_refused(tmp_path: Path) -> None:
         {"params": ["../x"]},
         {"params": ["a", "a"]},
         {"compression": "zip"},
+        {"sample_type": "int8"},
+        {"signals": {"acceleration": (2, 200), "acceleration_scale": (2,)}},
         {"attributes": {k: v for k, v in ATTRIBUTES.items() if k != "class_names"}},
         {"attributes": ATTRIBUTES | {"schema_version": 2}},
     ],
@@ -206,6 +208,10 @@ def _attribute(name: str, value: object) -> object:
         (_replace("torque_nm", data=np.zeros(9)), "has shape"),
         (_replace("torque_nm", data=np.zeros((10, 1))), "axes"),
         (_replace("label", data=np.zeros(10)), "has type"),
+        (_replace("acceleration", data=np.ones((10, 2, 200), "i4")), "wants float32 or int16"),
+        (_replace("acceleration", data=np.ones((10, 2, 200), "u2")), "wants float32 or int16"),
+        (_replace("acceleration", data=np.ones((10, 2, 200), "i2")), "no data set acceleration_scale"),
+        (_replace("acceleration", data=np.ones((10, 2, 200)), scaleoffset=2), "allowed are gzip, lzf and blosc2"),
         (_replace("label_name", data=["x"] * 10, dtype=h5py.string_dtype()), "has type object"),
         (_replace("label_name", data=np.zeros(10, dtype=[("a", "f8")])), "has type"),
         (_replace("acceleration", shape=(10, 2, 10**12), dtype="f4", chunks=(1, 2, 100)), "bomb"),

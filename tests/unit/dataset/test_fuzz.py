@@ -1,0 +1,122 @@
+"""Files from strangers: 300 of the mutants of ``python -m benchmarks.fuzz_campaign``, none of which may do harm."""
+
+import collections
+import os
+import time
+from concurrent.futures import ThreadPoolExecutor
+from pathlib import Path
+
+import h5py
+import pytest
+from dataset_samples import build, make_plan
+
+from benchmarks import _fuzz_judge
+from benchmarks._fuzz_judge import Verdict, verdicts
+from benchmarks._mutants import SECRET, STRUCTURES, Mutant
+from gensig.dataset.index import open_index
+from gensig.dataset.inspection import inspect
+from gensig.dataset.layout import shard_path
+from gensig.errors import DatasetError
+
+N_MUTANTS = 300
+# Entries of a manifest that verify compares with nothing; they decide neither what is read nor the sha256 of a record.
+NOT_COMPARED = ("manifest: another seed", "manifest: overrides not listed", "manifest: split not listed")
+
+
+@pytest.fixture(scope="module")
+def tiny(tmp_path_factory: pytest.TempPathFactory) -> Path:
+    plan = make_plan(n_records=4, records_per_shard=2, n_units=2, n_classes=2)
+    return build(tmp_path_factory.mktemp("tiny") / "set", plan)
+
+
+@pytest.fixture(scope="module")
+def found(tiny: Path, tmp_path_factory: pytest.TempPathFactory) -> list[Verdict]:
+    """Two processes at a time, half of the mutants each."""
+    scratch = tmp_path_factory.mktemp("mutants")
+    halves = [range(N_MUTANTS // 2), range(N_MUTANTS // 2, N_MUTANTS)]
+    with ThreadPoolExecutor(2) as pool:
+        parts = pool.map(lambda seeds: list(verdicts(tiny, scratch, seeds)), halves)
+    return [verdict for part in parts for verdict in part]
+
+
+def test_no_mutant_does_harm(found: list[Verdict]) -> None:
+    assert len(found) == N_MUTANTS
+    harmful = [verdict for verdict in found if verdict.fault and verdict.kind not in NOT_COMPARED]
+    assert [f"{verdict.seed} ({verdict.kind}): {verdict.fault}" for verdict in harmful] == []
+
+
+def test_every_forbidden_structure_was_tried_and_noticed(found: list[Verdict]) -> None:
+    noticed = collections.Counter(verdict.kind for verdict in found if verdict.noticed)
+    assert all(noticed[name] >= 2 for name in STRUCTURES)
+
+
+def _no_mutation(_folder: Path, _seed: int) -> Mutant:
+    return Mutant(kind="nothing", refused=True)
+
+
+def _die(_folder: Path) -> None:
+    os._exit(3)
+
+
+def _hang(_folder: Path) -> None:
+    time.sleep(60)
+
+
+def _crash(_folder: Path) -> None:
+    raise KeyError("x")
+
+
+@pytest.mark.parametrize(
+    ("reader", "message"),
+    [(_die, "died"), (_hang, "hung for 2 s"), (_crash, "read: KeyError"), (None, "must be refused")],
+)
+def test_the_judge_sees_harm(
+    tiny: Path, tmp_path: Path, reader: object, message: str, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    """A reader that dies, hangs, stumbles or takes everything is found, and the next mutant is tried all the same."""
+    monkeypatch.setattr(_fuzz_judge, "TIME_LIMIT", 2.0)
+    monkeypatch.setattr(_fuzz_judge, "mutate", _no_mutation)
+    monkeypatch.setattr(_fuzz_judge, "METHOD", "fork")  # the child must know the changes made here
+    if reader is not None:
+        monkeypatch.setattr(_fuzz_judge, "_read_all", reader)
+    result = list(verdicts(tiny, tmp_path, range(2)))
+    assert [verdict.seed for verdict in result] == [0, 1]
+    assert all(message in verdict.fault for verdict in result)
+
+
+def test_inspect_reads_no_other_file(tmp_path: Path) -> None:
+    """A value small enough to be shown may lie in another file, or be declared with a chunk of any size."""
+    (tmp_path / "secret.bin").write_bytes(SECRET)
+    path = tmp_path / "a.h5"
+    with h5py.File(path, "w") as file:
+        file.create_dataset("stolen", (1,), "i8", external=[(str(tmp_path / "secret.bin"), 0, 8)])
+        layout = h5py.VirtualLayout((1,), "i8")
+        layout[...] = h5py.VirtualSource(str(tmp_path / "other.h5"), "x", (1,))
+        file.create_virtual_dataset("seen", layout)
+        file.create_dataset("wide", (1,), "i8", maxshape=(None,), chunks=(10**8,), compression="gzip")
+    text = inspect(path)
+    assert str(int.from_bytes(SECRET[:8], "little")) not in text
+    assert "value" not in text
+    assert "data in another file" in text
+
+
+def test_index_shows_this_folder_only(folder: Path, tmp_path: Path) -> None:
+    with open_index(folder) as index:
+        assert index["acceleration"].shape == (36, 2, 200)
+    path = folder / "index.h5"
+    with h5py.File(path, "r+") as file:
+        del file["label"]
+        layout = h5py.VirtualLayout((36,), "i2")
+        layout[...] = h5py.VirtualSource("../other.h5", "label", (36,))
+        file.create_virtual_dataset("label", layout)
+    with pytest.raises(DatasetError, match="'label' does not show the shards of this folder"):
+        open_index(folder)
+    path.unlink()
+    path.symlink_to(shard_path(folder, 0))
+    with pytest.raises(DatasetError, match="does not show the shards"):
+        open_index(folder)
+    (tmp_path / "out.h5").write_bytes(b"")
+    path.unlink()
+    path.symlink_to(tmp_path / "out.h5")
+    with pytest.raises(DatasetError, match="leads out"):
+        open_index(folder)
