@@ -14,9 +14,7 @@ import numpy as np
 from numba import njit
 from numpy.typing import NDArray
 
-from gensig.dynamics import _mesh_kernels as rows
-from gensig.dynamics._kernels import SUBSTEPS
-from gensig.dynamics.pair import PairDynamics
+from benchmarks._mesh_numbers import MeshNumbers
 from gensig.dynamics.system import LumpedSystem
 from gensig.mesh.pair_table import FIRST_PITCH, N_PAIRS, PairTable
 
@@ -25,51 +23,8 @@ Array = NDArray[np.float64]
 KIND, POSITION, BITE, LOAD, TOTAL = range(5)  # rows of a mesh law's scratch
 TOLERANCE, MOST_ROUNDS = 1e-13, 60  # of Newton's method, relative to the load
 N_DOF, PINION_Y = 6, 1
+SUBSTEPS = 8  # of a step in which a pair takes up or lets go of its load
 _compiled: Any = functools.partial(njit, cache=True, error_model="numpy")()
-
-
-class MeshNumbers(NamedTuple):
-    """What the law needs of a gear mesh, by the names of ``_mesh_kernels.Group.numbers``."""
-
-    pinion_radius: float
-    pitch: float
-    nodes_per_meter: float
-    path: float
-    pitch_point: float
-    start_curvature: float
-    tangent_length: float
-    shared: float
-    damping: float
-    friction: float
-    friction_half_width: float
-    backlash: float
-    start_roll: float
-    speed: float
-    start_pinion: int
-    consistent: bool
-
-
-def mesh_numbers(dynamics: PairDynamics, step: float) -> MeshNumbers:
-    """The numbers of one machine, as gensig's own core takes them."""
-    values = dynamics.numbers(step)
-    return MeshNumbers(
-        pinion_radius=values[rows.PINION_RADIUS],
-        pitch=values[rows.PITCH],
-        nodes_per_meter=values[rows.NODES_PER_METER],
-        path=values[rows.PATH],
-        pitch_point=values[rows.PITCH_POINT],
-        start_curvature=values[rows.START_CURVATURE],
-        tangent_length=values[rows.TANGENT_LENGTH],
-        shared=values[rows.SHARED],
-        damping=values[rows.DAMPING],
-        friction=values[rows.FRICTION],
-        friction_half_width=1.0 / values[rows.PER_FRICTION_WIDTH],
-        backlash=values[rows.BACKLASH],
-        start_roll=values[rows.START_ROLL],
-        speed=values[rows.SPEED],
-        start_pinion=dynamics.start_tooth_pinion,
-        consistent=dynamics.table.options.roll_torque == "consistent",
-    )
 
 
 class Mesh(NamedTuple):
@@ -114,21 +69,46 @@ def _between(table, kind, j, x):
 
 
 @_compiled
-def _under_load(table, kind, x, load, mesh):
-    """A table's value under a load, and its derivative by ln(load)."""
-    y = (np.log(load) - mesh.first_log) * mesh.per_log
-    j = min(max(int(y), 0), table.shape[1] - 2)
-    low, high = _between(table, kind, j, x), _between(table, kind, j + 1, x)
-    return low + (y - j) * (high - low), (high - low) * mesh.per_log
+def _bent(table, slope, kind, j, x, per_meter):
+    """A value between the nodes of one row: slopes go straight there, values follow their integral."""
+    cell = min(max(int(x), 0), table.shape[2] - 2)
+    part = x - cell
+    bend = 0.5 * part * (1.0 - part) / per_meter * (slope[kind, j, cell + 1] - slope[kind, j, cell])
+    return table[kind, j, cell] + part * (table[kind, j, cell + 1] - table[kind, j, cell]) - bend
 
 
 @_compiled
-def _pair_load(mesh, kind, x, bite, guess):
+def _cell_of_load(load, mesh):
+    """Row of loads below a load, and how far the load is from there to the next."""
+    y = (np.log(load) - mesh.first_log) * mesh.per_log
+    j = min(max(int(y), 0), mesh.compliance.shape[1] - 2)
+    return j, y - j
+
+
+@_compiled
+def _compliance(mesh, kind, x, load, per_meter):
+    """Compliance of a pair under a load, and its derivative by ln(load)."""
+    j, part = _cell_of_load(load, mesh)
+    low = _bent(mesh.compliance, mesh.slope, kind, j, x, per_meter)
+    high = _bent(mesh.compliance, mesh.slope, kind, j + 1, x, per_meter)
+    return low + part * (high - low), (high - low) * mesh.per_log
+
+
+@_compiled
+def _slope(mesh, kind, x, load):
+    """Change of the compliance over position under a load, and its derivative by ln(load)."""
+    j, part = _cell_of_load(load, mesh)
+    low, high = _between(mesh.slope, kind, j, x), _between(mesh.slope, kind, j + 1, x)
+    return low + part * (high - low), (high - low) * mesh.per_log
+
+
+@_compiled
+def _pair_load(mesh, kind, x, bite, guess, per_meter):
     """Load at which compliance(load) load = bite, and the tangent stiffness there."""
     load = guess if guess > 0.0 else bite / _between(mesh.compliance, kind, 0, x)
     own, growth = 0.0, 0.0
     for _ in range(MOST_ROUNDS):
-        own, growth = _under_load(mesh.compliance, kind, x, load, mesh)
+        own, growth = _compliance(mesh, kind, x, load, per_meter)
         change = (bite - own * load) / (own + growth)
         load = max(load + change, 0.1 * load)
         if abs(change) <= TOLERANCE * load:
@@ -150,7 +130,7 @@ def share_load(mesh, m, roll, approach, work):
         work[KIND, k], work[POSITION, k], work[BITE, k] = kind, position, -np.inf
         if kind >= 0:
             x = (position - FIRST_PITCH * m.pitch) * m.nodes_per_meter
-            work[BITE, k] = approach - _between(mesh.gap, kind, 0, x)
+            work[BITE, k] = approach - _bent(mesh.gap, mesh.gap_slope, kind, 0, x, m.nodes_per_meter)
     total, stiffness = work[TOTAL, 0], 0.0
     for _ in range(MOST_ROUNDS):
         force, stiffness = 0.0, 0.0
@@ -160,7 +140,7 @@ def share_load(mesh, m, roll, approach, work):
                 work[LOAD, k] = 0.0
                 continue
             x = (work[POSITION, k] - FIRST_PITCH * m.pitch) * m.nodes_per_meter
-            work[LOAD, k], tangent = _pair_load(mesh, int(work[KIND, k]), x, bite, work[LOAD, k])
+            work[LOAD, k], tangent = _pair_load(mesh, int(work[KIND, k]), x, bite, work[LOAD, k], m.nodes_per_meter)
             force += work[LOAD, k]
             stiffness += tangent
         change = (force - total) / (1.0 + m.shared * stiffness)
@@ -204,7 +184,7 @@ def _rates(mesh, m, direction, mass, spring, damper, force, time, state, work):
         x = (position - FIRST_PITCH * m.pitch) * m.nodes_per_meter
         gap_slope = _between(mesh.gap_slope, kind, 0, x)
         # the slope of the energy, the integral of compliance(load) load over load, is what work balance asks for
-        slope, growth = _under_load(mesh.slope, kind, x, elastic, mesh)
+        slope, growth = _slope(mesh, kind, x, elastic)
         load = max(0.0, elastic * (1.0 + m.damping * (approach_rate - gap_slope * roll_rate)))
         normal += load
         n_loaded += load > 0.0
@@ -229,7 +209,7 @@ def _rates(mesh, m, direction, mass, spring, damper, force, time, state, work):
 
 @_compiled
 def _integrate(mesh, m, direction, mass, spring, damper, force, state, step, first_step, velocity):
-    """Classical RK4; a step in which a pair takes up or lets go of its load is taken again in parts, as gensig does.
+    """Classical RK4; a step in which a pair takes up or lets go of its load is taken again in parts.
 
     Fills ``velocity`` and returns the lowest approach.
     """

@@ -17,9 +17,11 @@ import numpy as np
 from numpy.typing import NDArray
 from scipy.optimize import minimize_scalar
 
-from benchmarks._contact_law_motion import Mesh, mesh_at_loads, mesh_numbers, motion, static_approach
+from benchmarks._contact_law_motion import Mesh, mesh_at_loads, motion, static_approach
+from benchmarks._mesh_numbers import mesh_numbers
 from gensig.config import read_request
 from gensig.dynamics._vector import LANES
+from gensig.dynamics.decimation import decimator
 from gensig.dynamics.integrator import settling_time
 from gensig.dynamics.pair import PairDynamics
 from gensig.dynamics.system import eigenvalues
@@ -28,9 +30,8 @@ from gensig.faults.registry import read_faults
 from gensig.mesh.face import slice_gaps
 from gensig.mesh.load_distribution import pair_states, static_mesh
 from gensig.mesh.pair_table import PairTable, flank_sides, pair_table
-from gensig.sensing.decimation import decimator
 from gensig.systems.registry import read_system
-from gensig.systems.spur_pair import SpurPair
+from gensig.systems.spur_pair import Run, SpurPair
 
 Array = NDArray[np.float64]
 
@@ -58,18 +59,7 @@ class Case:
     @property
     def dynamics(self) -> PairDynamics:
         """Perfect gears, tooth 0 of either entering at A at time 0: what ``SpurPair.simulate`` takes unasked."""
-        system, pair = self.system, self.system.pair
-        return PairDynamics(
-            table=system.mesh_table(self.faults),
-            pinion=system.pinion,
-            wheel=system.wheel,
-            operating=system.operating,
-            pinion_error=np.zeros(pair.pinion.n_teeth),
-            wheel_error=np.zeros(pair.wheel.n_teeth),
-            start_tooth_pinion=0,
-            start_tooth_wheel=0,
-            start_phase=0.0,
-        )
+        return Run(system=self.system, faults=self.faults).dynamics()
 
     @property
     def roll(self) -> Array:
@@ -147,7 +137,7 @@ def record(this: Case, law: str, *, oversampling: int = 8, n_loads: int = N_LOAD
     first = -(low_pass.margin + n_settle)
     velocity = motion(
         mesh_of(this, law, n_loads),
-        mesh_numbers(dynamics, step),
+        mesh_numbers(dynamics),
         dynamics.system(),
         dynamics.approach_direction(),
         dynamics.static_start(first / rate),
@@ -156,7 +146,7 @@ def record(this: Case, law: str, *, oversampling: int = 8, n_loads: int = N_LOAD
         n_steps=(n_settle + n_samples + 2 * low_pass.margin) * oversampling,
     )
     n_means = (n_samples + 2 * low_pass.margin) * oversampling + 1
-    means = np.repeat(np.diff(velocity)[None, -n_means:, None] / step, LANES, axis=2)
+    means = np.repeat(np.diff(velocity)[-n_means:, None, None] / step, LANES, axis=2)
     return last_turns(this, low_pass.apply(means)[0, 0])
 
 
@@ -170,7 +160,7 @@ def static(this: Case, law: str) -> tuple[Array, Array]:
     dynamics, roll = this.dynamics, this.roll
     approach, stiffness = np.empty_like(roll), np.empty_like(roll)
     highest = 4.0 * static_mesh(dynamics.table, pair_states(dynamics.table, roll), dynamics.mesh_force).approach.max()
-    numbers = mesh_numbers(dynamics, 1e-6)
+    numbers = mesh_numbers(dynamics)
     static_approach(mesh_of(this, law), numbers, roll, dynamics.mesh_force, highest, approach, stiffness)
     return approach, stiffness
 

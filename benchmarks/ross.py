@@ -1,8 +1,9 @@
-"""``python -m benchmarks.ross``: gensig's mesh beside ROSS's, quantity by quantity.
+"""``python -m benchmarks.ross``: gensig's mesh beside ROSS's, quantity by quantity, and what ROSS's motion costs.
 
 Makes ROSS its own virtual environment (about 1.5 GB, kept for the next run), asks it for its values, stores them with
 its version in ``tests/reference/data/ross.csv``, and prints both programs' values as Markdown tables. What the
-differences come from: ``docs/peers.md``.
+differences come from: ``docs/peers.md``. ROSS's ``run_time_response`` with the same gears is timed too; what it takes
+is stored in ``benchmarks/ross_time.json``.
 """
 
 from __future__ import annotations
@@ -10,6 +11,7 @@ from __future__ import annotations
 import argparse
 import csv
 import json
+import os
 import shlex
 import subprocess
 import sys
@@ -20,6 +22,8 @@ from pathlib import Path
 import numpy as np
 
 from benchmarks import _gensig_values as ours
+from benchmarks import _ross_time
+from gensig.execution.base import THREAD_VARIABLES
 
 ROOT = Path(__file__).resolve().parent.parent
 VALUES = ROOT / "tests" / "reference" / "data" / "ross.csv"
@@ -49,12 +53,17 @@ def main(arguments: Sequence[str] | None = None) -> int:
     try:
         if not options.stored:
             python = make_environment(options.env, options.ross_version, shlex.split(options.pip_args))
-            run_ross(python, options.output)
+            if not options.time_only:
+                run_ross(python, options.output)
+            time_ross(python)
         stored, version = read_values(options.output)
     except (PeerError, OSError) as error:
         print(f"benchmarks.ross: {error}", file=sys.stderr)
         return 1
-    print(f"ROSS {version}; ratios are gensig over ROSS\n")
+    print("\n".join(_ross_time.lines()))
+    if options.time_only:
+        return 0
+    print(f"\nROSS {version}; ratios are gensig over ROSS\n")
     for pair, values in stored.items():
         print("\n".join([f"### {pair}", "", *comparison(pair, values, every=options.all), ""]))
         print(
@@ -90,6 +99,16 @@ def run_ross(python: Path, output: Path) -> None:
         _run([str(python), "-I", str(script), str(asked), str(answered)], "ROSS gave no values")
         output.parent.mkdir(parents=True, exist_ok=True)
         output.write_bytes(answered.read_bytes())
+
+
+def time_ross(python: Path) -> None:
+    """Time ROSS's time response, on one thread, and store what it took."""
+    with tempfile.TemporaryDirectory() as folder:
+        asked, answered = Path(folder) / "job.json", Path(folder) / "time.json"
+        asked.write_text(json.dumps(_ross_time.job()))
+        script = Path(__file__).with_name("_ross_time_response.py")
+        _run([str(python), "-I", str(script), str(asked), str(answered)], "ROSS gave no time response")
+        _ross_time.store(json.loads(answered.read_text()))
 
 
 def read_values(path: Path) -> tuple[StoredValues, str]:
@@ -181,7 +200,8 @@ def _line(cells: Iterable[str]) -> str:
 
 
 def _run(command: Sequence[str], complaint: str) -> None:
-    result = subprocess.run(command, capture_output=True, text=True, check=False)
+    one_thread = {**os.environ, **dict.fromkeys(THREAD_VARIABLES, "1")}
+    result = subprocess.run(command, capture_output=True, text=True, check=False, env=one_thread)
     if result.returncode != 0:
         lines = [line.strip() for line in result.stderr.splitlines() if line.strip()] or ["no message"]
         said = next((line for line in reversed(lines) if line.startswith("ERROR")), lines[-1])
@@ -200,6 +220,7 @@ def _parser() -> argparse.ArgumentParser:
     parser.add_argument("--ross-version", default=VERSION, help="release to install (default: %(default)s)")
     parser.add_argument("--output", type=Path, default=VALUES, help="where ROSS's values are stored and read")
     parser.add_argument("--stored", action="store_true", help="compare with the stored values, without ROSS")
+    parser.add_argument("--time-only", action="store_true", help="only time the time response, or show what is stored")
     parser.add_argument("--all", action="store_true", help="print every point, not only A, C, E and three of a cycle")
     return parser
 

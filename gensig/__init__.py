@@ -48,14 +48,16 @@ def generate(*overrides: str, out: str | Path, config_dir: str | Path | None = N
     gensig.errors.GensigError    for anything that cannot be used, and where a shard could not be made
     """
     from gensig.config import read_request
-    from gensig.errors import SimulationError
-    from gensig.execution.local import n_workers
+    from gensig.errors import ConfigError, SimulationError
+    from gensig.execution.registry import read_executor
     from gensig.generation import begin_folder, run_folder
 
     request = read_request(overrides, config_dir=config_dir)
+    executor = read_executor(request.config["executor"])
+    if not executor.closes:
+        raise ConfigError("a task of an array job makes its share of a folder only; run it as `gensig generate`")
     begin_folder(request.config, request.overrides, Path(out))
-    workers = n_workers(request.config["executor"]["n_workers"])
-    _, problems = run_folder(Path(out), workers=workers, on_shard=lambda _progress: None)
+    _, problems = run_folder(Path(out), executor=executor, on_shard=lambda _progress: None)
     if problems:
         raise SimulationError(f"{out} is incomplete: {problems[0]}")
     return open_dataset(out)

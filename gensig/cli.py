@@ -52,14 +52,34 @@ def _stiffness(parser: argparse.ArgumentParser) -> None:
 
 def _simulate(parser: argparse.ArgumentParser) -> None:
     _overrides(parser)
+    parser.add_argument("--from", dest="folder", metavar="DIR", help="a record of this data set, made again")
+    parser.add_argument("--record", metavar="I", help="with --from: number or id of the record")
+    parser.add_argument("--twin", action="store_true", help="with --from: the same without its faults, noise included")
     parser.add_argument("--output", metavar="FILE", help="write the record: .h5 (a shard of one record) or .csv")
     parser.add_argument("--plot", metavar="FILE", help="write a figure: signal, spectrum, envelope spectrum")
 
 
-def _resume(parser: argparse.ArgumentParser) -> None:
+def _plan(parser: argparse.ArgumentParser) -> None:
+    _overrides(parser)
+    parser.add_argument("--freeze", action="store_true", help="make the folder out=DIR, ready for resume or array jobs")
+
+
+def _folder(parser: argparse.ArgumentParser) -> None:
     parser.add_argument("folder", metavar="DIR", help="folder of a data set")
+
+
+def _resume(parser: argparse.ArgumentParser) -> None:
+    _folder(parser)
+    parser.add_argument(
+        "overrides", nargs="*", metavar="OVERRIDES", help="executor=... and executor.key=...; other keys must agree"
+    )
     parser.add_argument("--workers", type=int, metavar="N", help="worker processes (default: one a core)")
     parser.add_argument("--quiet", action="store_true", help="print nothing but mistakes")
+
+
+def _reproduce(parser: argparse.ArgumentParser) -> None:
+    _folder(parser)
+    parser.add_argument("--records", type=int, default=10, metavar="N", help="records, spread evenly (default: 10)")
 
 
 def _inspect(parser: argparse.ArgumentParser) -> None:
@@ -75,6 +95,14 @@ def _validate(parser: argparse.ArgumentParser) -> None:
     parser.add_argument("--markdown", metavar="FILE", help="write the whole comparison as a Markdown page")
 
 
+def _export(parser: argparse.ArgumentParser) -> None:
+    parser.add_argument("folder", metavar="DIR", help="folder of a complete data set; it is left alone")
+    parser.add_argument("--to", required=True, metavar="FORMAT", help="hdf5, parquet, npz or wav")
+    parser.add_argument("--out", required=True, metavar="PATH", help="file (wav: folder) that does not exist yet")
+    parser.add_argument("--samples", action="store_true", help="parquet: time signals too, not only the labels")
+    parser.add_argument("--one-channel", action="store_true", help="wav: one file a channel, not one a record")
+
+
 VERBS: dict[str, Verb] = {
     "generate": Verb(
         "make a labelled data set",
@@ -85,12 +113,22 @@ VERBS: dict[str, Verb] = {
     ),
     "plan": Verb(
         "dry run: records, bytes, predicted time",
-        "gensig plan experiment=quickstart plan.n_records=2000",
+        "gensig plan experiment=quickstart plan.n_records=2000\n"
+        "  gensig plan experiment=quickstart out=runs/large --freeze",
         "gensig.commands.datasets:plan",
-        _overrides,
+        _plan,
     ),
     "resume": Verb(
-        "finish an interrupted data set", "gensig resume runs/quickstart", "gensig.commands.datasets:resume", _resume
+        "finish an interrupted data set",
+        "gensig resume runs/quickstart\n  gensig resume runs/quickstart executor=dask executor.n_workers=4",
+        "gensig.commands.datasets:resume",
+        _resume,
+    ),
+    "finalize": Verb(
+        "close a data set made by array jobs",
+        "gensig finalize runs/large",
+        "gensig.commands.datasets:finalize",
+        _folder,
     ),
     "verify": Verb(
         "is a data set whole and unaltered?",
@@ -98,15 +136,28 @@ VERBS: dict[str, Verb] = {
         "gensig.commands.datasets:verify",
         _verify,
     ),
+    "reproduce": Verb(
+        "simulate records of a data set again and compare",
+        "gensig reproduce runs/quickstart --records 20",
+        "gensig.commands.datasets:reproduce",
+        _reproduce,
+    ),
     "inspect": Verb(
         "what is in a data set or file",
         "gensig inspect runs/quickstart/shards/shard-00000.h5",
         "gensig.commands.datasets:inspect",
         _inspect,
     ),
+    "export": Verb(
+        "a data set as one HDF5 file, Parquet, npz or wav",
+        "gensig export runs/quickstart --to parquet --out quickstart.parquet",
+        "gensig.commands.export:export",
+        _export,
+    ),
     "simulate": Verb(
         "one record: signal, spectrum, figure",
-        "gensig simulate fault=missing_tooth operating.speed_rpm=1500 --plot missing.png --output missing.csv",
+        "gensig simulate fault=missing_tooth operating.speed_rpm=1500 --plot missing.png --output missing.csv\n"
+        "  gensig simulate --from runs/quickstart --record 7 --twin --output twin.h5",
         "gensig.commands.physics:simulate",
         _simulate,
     ),

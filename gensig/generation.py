@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import dataclasses
 import functools
 import json
 from collections.abc import Callable, Mapping, Sequence
@@ -9,22 +10,26 @@ from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
 
-from gensig.dataset.layout import read_config, shard_path
+from gensig.dataset.compression import COMPRESSIONS, creation_options
+from gensig.dataset.joining import joined_folder
+from gensig.dataset.layout import PLAN, ShardEntry, read_manifest, shard_path
 from gensig.dataset.manifest import (
     create_folder,
     finalize,
     identity_hash,
-    read_manifest,
     record_failed_shard,
     record_shard,
 )
-from gensig.dataset.plan import read_plan
-from gensig.dataset.shard import COMPRESSIONS, ShardWriter
-from gensig.errors import ConfigError, DatasetError
-from gensig.execution.local import ShardFailure, n_workers, run_shards
-from gensig.planning import make_plan
+from gensig.dataset.plan import Plan, read_plan
+from gensig.dataset.receipts import collect_receipts, read_receipt, receipt_path, write_receipt
+from gensig.dataset.schema import SAMPLE_TYPES
+from gensig.dataset.shard import ShardWriter
+from gensig.dynamics._vector import n_lanes
+from gensig.dynamics.decimation import usable_band
+from gensig.errors import ConfigError
+from gensig.execution.base import Executor, ShardFailure
+from gensig.planning import check_switches, make_plan
 from gensig.records import read_seed, simulate_records
-from gensig.sensing.decimation import usable_band
 from gensig.systems.registry import read_system
 from gensig.systems.spur_pair import SpurPair
 from gensig.units import from_si
@@ -48,13 +53,11 @@ def begin_folder(config: dict[str, Any], overrides: Sequence[str], out: Path) ->
     -------
     number of shards
     """
-    n_workers(config["executor"]["n_workers"])
-    if config["dataset"]["compression"] not in COMPRESSIONS:
-        raise ConfigError(
-            f"dataset.compression = {config['dataset']['compression']!r}; allowed: {', '.join(COMPRESSIONS)}"
-        )
-    if not isinstance(config["dataset"]["store_clean"], bool):
-        raise ConfigError(f"dataset.store_clean = {config['dataset']['store_clean']!r} must be true or false")
+    for key, allowed in (("compression", COMPRESSIONS), ("sample_type", SAMPLE_TYPES)):
+        if config["dataset"][key] not in allowed:
+            raise ConfigError(f"dataset.{key} = {config['dataset'][key]!r}; allowed: {', '.join(allowed)}")
+    creation_options(config["dataset"]["compression"])  # refuses one whose package is missing
+    check_switches(config)
     plan = make_plan(config)
     recorded = {**config, "out": None}
     create_folder(
@@ -69,40 +72,74 @@ def begin_folder(config: dict[str, Any], overrides: Sequence[str], out: Path) ->
     return plan.n_shards
 
 
-def run_folder(out: Path, *, workers: int, on_shard: Callable[[Progress], None]) -> tuple[int, list[str]]:
-    """Make the shards that a folder still lacks, then close it.
+def run_folder(
+    out: Path, *, executor: Executor, on_shard: Callable[[Progress], None], asked: Mapping[str, Any] | None = None
+) -> tuple[int, list[str]]:
+    """Make the shards that a folder still lacks, then close it; a task of an array job makes its share only.
+
+    Parameters
+    ----------
+    executor : where the shards are made; it decides no bit
+    on_shard : called for every shard that is finished or could not be made
+    asked : a configuration that must be the folder's in all that decides bits; None asks for nothing
 
     Returns
     -------
     number of failed records, and one line for each shard that could not be made; the folder is complete only if
     there is none
     """
-    manifest, config = read_manifest(out), read_config(out)
-    if manifest.identity != identity_hash(config, __version__):
-        raise DatasetError(
-            f"{out} was begun by gensig {manifest.generator_version} or its config.yaml was changed; this is gensig "
-            f"{__version__}: go on with that version, or start a new folder"
-        )
+    out = out.resolve()
+    joined_folder(out, asked=asked)
+    if executor.closes:
+        collect_receipts(out)
+    manifest = read_manifest(out)
     rows = [entry.rows for entry in manifest.shards]
-    open_shards = [index for index, entry in enumerate(manifest.shards) if entry.state != "done"]
-    n_done, n_failed = sum(rows) - sum(rows[index] for index in open_shards), manifest.n_failed
+    mine = executor.share(range(len(rows)))
+    entries = {index: manifest.shards[index] for index in mine}
+    if not executor.closes:
+        entries |= {index: entry for index in mine if (entry := read_receipt(out, index)) is not None}
+    missing = [index for index in mine if not _is_there(out, index, entries[index])]
+    n_records = sum(rows[index] for index in mine)
+    n_done = n_records - sum(rows[index] for index in missing)
+    n_failed = sum(entries[index].n_failed for index in mine if index not in missing)
     problems: list[str] = []
-    job = functools.partial(write_shard, out)
-    for index, result in run_shards(job, open_shards, workers=workers):
+    for index, result in executor.run(functools.partial(write_shard, out), missing):
         if isinstance(result, ShardFailure):
-            record_failed_shard(out, index)
             problems.append(f"shard {index}: {result.reason}")
-            on_shard(Progress(n_done=n_done, n_records=sum(rows), n_failed=n_failed, reason=problems[-1]))
-            continue
-        record_shard(out, index, result.sha256, result.n_bytes, result.n_failed)
-        n_done, n_failed = n_done + rows[index], n_failed + result.n_failed
-        on_shard(Progress(n_done=n_done, n_records=sum(rows), n_failed=n_failed, reason=""))
-    if not problems:
+            if executor.closes:
+                record_failed_shard(out, index)
+        else:
+            n_done, n_failed = n_done + rows[index], n_failed + result.n_failed
+            if executor.closes:
+                record_shard(out, index, result.sha256, result.n_bytes, result.n_failed)
+                receipt_path(out, index).unlink(missing_ok=True)
+        reason = problems[-1] if isinstance(result, ShardFailure) else ""
+        on_shard(Progress(n_done=n_done, n_records=n_records, n_failed=n_failed, reason=reason))
+    if executor.closes and not problems:
         finalize(out)
     return n_failed, problems
 
 
-BLOCK = 16  # records simulated and written at a time
+def _is_there(out: Path, index: int, entry: ShardEntry) -> bool:
+    """True for a shard that is done and whose file has not been lost or cut since."""
+    path = shard_path(out, index)
+    return entry.state == "done" and path.is_file() and path.stat().st_size == entry.bytes
+
+
+def close_folder(out: Path) -> int:
+    """Close a folder whose shards were made by tasks of an array job; returns the number of failed records.
+
+    Raises
+    ------
+    DatasetError    when a shard is missing, which is named
+    """
+    joined_folder(out)
+    collect_receipts(out)
+    finalize(out)
+    return read_manifest(out).n_failed
+
+
+MOST_BLOCK, BLOCK_BYTES = 64, 2**27  # records simulated and written at a time, and bytes of their samples
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -115,17 +152,39 @@ class WrittenShard:
 
 
 def write_shard(out: Path, shard_index: int) -> WrittenShard:
-    """Simulate and write one shard of a folder; its bits depend on nothing but the folder's plan and configuration."""
-    config, plan = read_config(out), read_plan(out / "plan.csv")
+    """Simulate and write one shard of a folder; its bits depend on nothing but the folder's plan and configuration.
+
+    Raises
+    ------
+    DatasetError    where the folder was begun by another version than that of this process
+    """
+    config, plan = _folder_inputs(out, (out / PLAN).stat().st_mtime_ns)
     indices = plan.rows(shard_index)
     params = [name.removeprefix("params/") for name in plan.columns if name.startswith("params/")]
     writer = open_shard(shard_path(out, shard_index), config, len(indices), params)
+    together = block_length(config)
     with writer:
-        for first in range(0, len(indices), BLOCK):
-            rows = [plan.record(int(index)) for index in indices[first : first + BLOCK]]
+        for first in range(0, len(indices), together):
+            rows = [plan.record(int(index)) for index in indices[first : first + together]]
             for row, record in enumerate(simulate_records(config, rows), start=first):
                 writer.write(row, record.signals, record.values)
-    return WrittenShard(sha256=writer.sha256, n_bytes=writer.n_bytes, n_failed=writer.n_failed)
+    written = WrittenShard(sha256=writer.sha256, n_bytes=writer.n_bytes, n_failed=writer.n_failed)
+    write_receipt(out, shard_index, rows=len(indices), **dataclasses.asdict(written))
+    return written
+
+
+@functools.lru_cache(maxsize=1)
+def _folder_inputs(out: Path, _changed: int) -> tuple[dict[str, Any], Plan]:
+    """Configuration and plan, read once by a process that makes many shards of one folder."""
+    _, config = joined_folder(out)
+    return config, read_plan(out / PLAN)
+
+
+def block_length(config: Mapping[str, Any]) -> int:
+    """Records that are simulated at a time: enough to fill the lanes with them and their twins, few enough to hold."""
+    system = read_system(config)
+    n_bytes = 8 * len(system.sensing.channels) * round(system.operating.duration * system.sensing.sampling_rate)
+    return max(n_lanes(system.solver.precision), min(MOST_BLOCK, BLOCK_BYTES // n_bytes))
 
 
 def open_shard(path: Path, config: Mapping[str, Any], n_records: int, params: Sequence[str]) -> ShardWriter:
@@ -141,6 +200,8 @@ def open_shard(path: Path, config: Mapping[str, Any], n_records: int, params: Se
     }
     if config["dataset"]["store_clean"]:
         shapes["acceleration_clean"] = (n_channels, n_samples)
+    if config["dataset"]["store_shaft_angle"]:
+        shapes["shaft_angle"] = (n_samples,)
     return ShardWriter(
         path,
         n_records=n_records,
@@ -148,6 +209,7 @@ def open_shard(path: Path, config: Mapping[str, Any], n_records: int, params: Se
         params=params,
         attributes=root_attributes(config, system),
         compression=config["dataset"]["compression"],
+        sample_type=config["dataset"]["sample_type"],
     )
 
 

@@ -1,24 +1,34 @@
-"""Verbs on data sets: generate, resume, plan, inspect, verify."""
+"""Verbs on data sets: generate, resume, finalize, plan, reproduce, inspect, verify."""
 
 from __future__ import annotations
 
 import sys
 import time
 from argparse import Namespace
+from collections.abc import Sequence
 from pathlib import Path
-from typing import Any
+from typing import TYPE_CHECKING, Any
+
+import yaml
 
 from gensig.commands.console import ShardProgress
-from gensig.compose import job_folders, sweep
+from gensig.compose import job_folders, override_keys, sweep
 from gensig.config import Request, read_request
+from gensig.dataset.atomic import read_text
 from gensig.dataset.inspection import inspect as inspect_path
+from gensig.dataset.layout import CONFIG_BYTES_LIMIT, MANIFEST, OVERRIDES
 from gensig.dataset.manifest import read_manifest, refuse_used
 from gensig.dataset.verify import verify as verify_folder
 from gensig.errors import ConfigError
 
+if TYPE_CHECKING:
+    from gensig.execution.base import Executor
+
 
 def generate(arguments: Namespace) -> int:
     """Make one data set, or with -m one for each combination of values."""
+    from gensig.execution.registry import read_executor
+
     jobs = sweep(arguments.overrides) if arguments.multirun else [arguments.overrides]
     requests = [read_request(job, config_dir=arguments.config_dir) for job in jobs]
     parents = {str(request.config["out"]) for request in requests}
@@ -26,41 +36,119 @@ def generate(arguments: Namespace) -> int:
         raise ConfigError("out is required: give out=DIR, a folder that does not exist or is empty")
     if len(parents) > 1:
         raise ConfigError("out must be one folder; with -m each data set gets a folder below it")
+    executors = [read_executor(request.config["executor"]) for request in requests]
+    if not executors[0].closes:
+        if arguments.multirun:
+            raise ConfigError("-m makes several data sets; an array job makes one: plan each with --freeze")
+        return _generate_share(executors[0], arguments)
     parent = Path(str(requests[0].config["out"])).expanduser()
     refuse_used(parent)
     folders = [parent / name for name in job_folders(jobs)] if arguments.multirun else [parent]
-    return max(_generate_one(request, folder, arguments) for request, folder in zip(requests, folders, strict=True))
+    return max(
+        _generate_one(request, folder, executor, arguments)
+        for request, folder, executor in zip(requests, folders, executors, strict=True)
+    )
 
 
-def _generate_one(request: Request, out: Path, arguments: Namespace) -> int:
-    from gensig.execution.local import n_workers
+def _generate_one(request: Request, out: Path, executor: Executor, arguments: Namespace) -> int:
     from gensig.generation import begin_folder, run_folder
 
     begin = time.monotonic()
     n_records = request.config["plan"]["n_records"]
-    workers = n_workers(request.config["executor"]["n_workers"])
     n_shards = begin_folder(request.config, request.overrides, out)
     if not arguments.quiet:
         print(f"{out}: making {n_records} records in {n_shards} shard(s)", file=sys.stderr, flush=True)
     with ShardProgress(quiet=arguments.quiet, n_records=n_records) as progress:
-        outcome = run_folder(out, workers=workers, on_shard=progress)
+        outcome = run_folder(out, executor=executor, on_shard=progress)
     return _closing_line(out, outcome, n_records, time.monotonic() - begin, arguments)
 
 
+def _generate_share(executor: Executor, arguments: Namespace) -> int:
+    """One task of an array job: its shards of a folder that was planned before."""
+    from gensig.generation import run_folder
+
+    out = Path(override_keys(arguments.overrides)["out"]).expanduser()
+    if not (out / MANIFEST).is_file():
+        raise ConfigError(
+            f"out={out}: a task joins a frozen folder; make it once with `gensig plan --freeze out={out}`"
+        )
+    begin = time.monotonic()
+    manifest = read_manifest(out)
+    n_records = sum(manifest.shards[index].rows for index in executor.share(range(len(manifest.shards))))
+    with ShardProgress(quiet=arguments.quiet, n_records=n_records) as progress:
+        n_failed, problems = run_folder(
+            out, executor=executor, on_shard=progress, asked=_asked(out, arguments.overrides, arguments.config_dir)
+        )
+    for problem in problems:
+        print(f"gensig: {problem}", file=sys.stderr)
+    if problems:
+        print("gensig: this task's share is incomplete; the same command tries again", file=sys.stderr)
+        return 1
+    if n_failed:
+        print(f"gensig: {n_failed} of {n_records} records failed and are marked so", file=sys.stderr)
+    if not arguments.quiet:
+        print(f"{out}: {n_records} records of this task in {time.monotonic() - begin:.1f} s; gensig finalize {out}")
+    return 0
+
+
+def _asked(out: Path, overrides: Sequence[str], config_dir: str | None = None) -> dict[str, Any] | None:
+    """The configuration that a folder's own words and those typed now make; None where they ask for no other bits."""
+    words = [word for word in overrides if not _is_free(word)]
+    if not words:
+        return None
+    keys = {_key(word) for word in words}
+    begun = [word for word in _recorded_words(out) if not _is_free(word) and _key(word) not in keys]
+    return read_request([*begun, *words], config_dir=config_dir).config
+
+
+def _key(word: str) -> str:
+    return word.lstrip("+~").partition("=")[0]
+
+
+def _is_free(word: str) -> bool:
+    """True for what may differ from one run on a folder to the next."""
+    return _key(word) in ("out", "executor") or _key(word).startswith("executor.")
+
+
+def _recorded_words(out: Path) -> list[str]:
+    """What was typed when the folder was begun."""
+    content = yaml.safe_load(read_text(out / OVERRIDES, limit=CONFIG_BYTES_LIMIT))
+    return [str(word) for word in content] if isinstance(content, list) else []
+
+
 def resume(arguments: Namespace) -> int:
-    """Finish an interrupted data set."""
-    from gensig.execution.local import n_workers
+    """Finish an interrupted data set, on the same or another executor."""
+    from gensig.execution.base import read_n_workers
+    from gensig.execution.local import LocalExecutor
+    from gensig.execution.registry import read_executor
     from gensig.generation import run_folder
 
     out = Path(arguments.folder)
     manifest = read_manifest(out)
+    free = [word for word in arguments.overrides if _is_free(word)]
+    executor = read_executor(read_request(free).config["executor"])
+    if arguments.workers is not None:
+        executor = LocalExecutor(n_workers=read_n_workers(arguments.workers))
+    asked = _asked(out, arguments.overrides)
     if manifest.is_complete:
         print(f"{out} is complete: {manifest.n_records} records")
         return 0
     begin = time.monotonic()
     with ShardProgress(quiet=arguments.quiet, n_records=manifest.n_records) as progress:
-        outcome = run_folder(out, workers=n_workers(arguments.workers), on_shard=progress)
+        outcome = run_folder(out, executor=executor, on_shard=progress, asked=asked)
     return _closing_line(out, outcome, manifest.n_records, time.monotonic() - begin, arguments)
+
+
+def finalize(arguments: Namespace) -> int:
+    """Close a data set whose shards were made by tasks of an array job."""
+    from gensig.generation import close_folder
+
+    out = Path(arguments.folder)
+    n_failed, n_records = close_folder(out), read_manifest(out).n_records
+    if n_failed:
+        print(f"gensig: {n_failed} of {n_records} records failed and are marked so in {out}", file=sys.stderr)
+    print(f"{out} is complete: {n_records} records")
+    return 1 if n_failed else 0
 
 
 def _closing_line(
@@ -80,39 +168,38 @@ def _closing_line(
 
 
 def plan(arguments: Namespace) -> int:
-    """Dry run: how many records, how many bytes, how long."""
-    from gensig.execution.local import n_workers
-    from gensig.generation import BLOCK
-    from gensig.planning import make_plan, record_bytes
-    from gensig.records import forget_twins, simulate_records
+    """Dry run: how many records, how many bytes, how long; with --freeze the folder is made, ready for array jobs."""
+    from gensig.generation import begin_folder
+    from gensig.prediction import predict
 
     request = read_request(arguments.overrides, config_dir=arguments.config_dir)
-    config = request.config
-    table = make_plan(config)
-    probe = [table.record(index) for index in range(min(BLOCK, table.n_records))]
-    simulate_records(config, probe[:1])  # compiles, or loads what was compiled
-    forget_twins()
-    begin = time.monotonic()
-    simulate_records(config, probe)
-    seconds = (time.monotonic() - begin) / len(probe)
-    workers = min(n_workers(config["executor"]["n_workers"]), table.n_shards)
-    n_bytes = table.n_records * record_bytes(config)
-    counts: dict[str, int] = {}
-    for name in table.columns["label_name"]:
-        counts[str(name)] = counts.get(str(name), 0) + 1
-    facts: dict[str, Any] = {
-        "records": table.n_records,
-        "classes": ", ".join(f"{name} {count}" for name, count in counts.items()),
-        "units": len(set(table.columns["unit_id"])),
-        "conditions": len(set(table.columns["condition_id"])),
-        "shards": f"{table.n_shards} of at most {max(table.shard_sizes())} records",
-        "bytes": f"{n_bytes:,} ({n_bytes / 1e6:.0f} MB)",
-        "time": f"about {max(1, round(seconds * table.n_records / workers))} s on {workers} worker(s), "
-        f"from {seconds:.2f} s a record measured now",
-    }
-    for name, value in facts.items():
+    out = request.config["out"]
+    if arguments.freeze:
+        if out is None:
+            raise ConfigError("--freeze makes a folder: give out=DIR, one that does not exist or is empty")
+        begin_folder(request.config, request.overrides, Path(str(out)).expanduser())
+        print(f"{out} is planned; gensig resume {out} makes it here, tasks with executor=slurm as an array job")
+    for name, value in predict(request.config).items():
         print(f"{name:<11}{value}")
     return 0
+
+
+def reproduce(arguments: Namespace) -> int:
+    """Simulate records again from what is recorded of them; the exit status is 0 only where they agree."""
+    from gensig.reproduction import ACCEPTED
+    from gensig.reproduction import reproduce as reproduce_records
+
+    if arguments.records < 1:
+        raise ConfigError(f"--records {arguments.records} must be at least 1")
+    found = reproduce_records(Path(arguments.folder), arguments.records)
+    for name, (recorded, present) in found.other.items():
+        print(f"made with {name} {recorded or 'unknown'}, here is {present or 'unknown'}")
+    print(f"{found.n_equal} of {found.n_records} records have the same bits")
+    if found.worst:
+        print(f"largest difference {found.largest:.2g} of the record's RMS, in {found.worst}")
+        accepted = f"{ACCEPTED:g} is accepted" if found.other else "here every bit must agree"
+        print(f"{found.n_refused} record(s) NOT reproduced; {accepted}")
+    return 1 if found.n_refused else 0
 
 
 def inspect(arguments: Namespace) -> int:

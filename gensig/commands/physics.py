@@ -6,7 +6,7 @@ import json
 import sys
 from argparse import Namespace
 from pathlib import Path
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 from numpy.typing import NDArray
@@ -17,6 +17,9 @@ from gensig.errors import ConfigError
 from gensig.faults.registry import read_faults, without_vary
 from gensig.systems.registry import read_system
 from gensig.systems.spur_pair import SpurPair, StiffnessCurves
+
+if TYPE_CHECKING:
+    from gensig.records import Record
 
 Array = NDArray[np.float64]
 
@@ -107,13 +110,35 @@ def simulate(arguments: Namespace) -> int:
 
     _check_file("--plot", arguments.plot, FIGURE_TYPES)
     _check_file("--output", arguments.output, RECORD_TYPES)
+    if arguments.folder is not None:
+        return _simulate_again(arguments)
+    if arguments.record is not None or arguments.twin:
+        raise ConfigError("--record and --twin are of a data set; give it with --from DIR")
     request = read_request(arguments.overrides, config_dir=arguments.config_dir)
     config = request.config
     name = config["fault"]["kind"]
     config["plan"] = {**config["plan"], "classes": [name], "n_records": 1, "n_units": 1, "n_gearboxes": 1, "vary": {}}
     config["classes"] = {name: without_vary(config["fault"])}
     row = make_plan(config).record(0)
-    record = simulate_record(config, row)
+    return _show(config, simulate_record(config, row), arguments)
+
+
+def _simulate_again(arguments: Namespace) -> int:
+    """A record of a data set made again, or with --twin without its faults."""
+    from gensig.records import simulate_record
+    from gensig.reproduction import recorded_row, simulate_twin
+
+    if arguments.overrides or arguments.config_dir:
+        raise ConfigError("--from takes everything from the data set; give no overrides and no --config-dir with it")
+    if arguments.record is None:
+        raise ConfigError("--from needs --record I, the number or id of a record")
+    config, row = recorded_row(Path(arguments.folder), arguments.record)
+    record = simulate_twin(config, row) if arguments.twin else simulate_record(config, row)
+    return _show(config, record, arguments)
+
+
+def _show(config: dict[str, Any], record: Record, arguments: Namespace) -> int:
+    """Write, plot and describe one record."""
     if record.values.get("status") == "failed":
         print(f"gensig: {record.values['status_reason']}", file=sys.stderr)
         return 1
@@ -129,7 +154,7 @@ def simulate(arguments: Namespace) -> int:
     return 0
 
 
-def _write_record(config: dict[str, Any], system: SpurPair, record: Any, output: str) -> None:
+def _write_record(config: dict[str, Any], system: SpurPair, record: Record, output: str) -> None:
     """One record as a shard of one row, or as a table with time and channels."""
     path = Path(output)
     if path.suffix != ".csv":

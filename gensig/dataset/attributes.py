@@ -47,9 +47,9 @@ def read_attributes(target: h5py.HLObject) -> dict:
     found: dict = {}
     for name in target.attrs:
         # A damaged name comes as bytes.
-        if not isinstance(name, str) or target.attrs.get_id(name).dtype.kind not in "Siuf":
+        kind = target.attrs.get_id(name).dtype.kind if isinstance(name, str) else ""
+        if kind not in ("S", "i", "u", "f"):
             continue
-        kind = target.attrs.get_id(name).dtype.kind
         value = np.asarray(target.attrs[name])
         found[name] = (decoded(value) if kind == "S" or value.dtype.kind == "O" else value).tolist()
     return found

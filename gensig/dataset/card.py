@@ -1,13 +1,15 @@
-"""The data card: README.md of a data-set folder, facts read from the files beside caveats that always hold."""
+"""The data card: README.md and croissant.json of a folder, facts from the files beside caveats that always hold."""
 
 import html
 import re
 from pathlib import Path
 
 import numpy as np
+import yaml
 
 from gensig.dataset.atomic import write_text
-from gensig.dataset.layout import CARD
+from gensig.dataset.croissant import CROISSANT, croissant_text
+from gensig.dataset.layout import CARD, SHARDS
 from gensig.dataset.reader import Dataset, open_dataset
 
 GEOMETRY = (
@@ -22,8 +24,14 @@ with gensig.open_dataset("PATH/TO/THIS/FOLDER") as data:
     signal = data.signals(0)                         # (channel, sample) float32, m/s^2
     parts = data.split("by_unit" if "by_unit" in data.protocols else data.protocols[0])
 ```
-Without gensig: every shard is plain HDF5, see `docs/format.md` of gensig.
+Without gensig: every shard is plain HDF5, see `docs/format.md` of gensig. Hugging Face `datasets` takes the folder
+as it is, `load_dataset("PATH/TO/THIS/FOLDER")`; its one split, `train`, is all records, and `splits/` says which are
+for training. `croissant.json` describes the files for machines.
 """
+
+# Limits that the Hugging Face hub knows; above the last one a card says more.
+SIZES = ((10**3, "n<1K"), (10**4, "1K<n<10K"), (10**5, "10K<n<100K"), (10**6, "100K<n<1M"), (10**7, "1M<n<10M"))
+TAGS = ("vibration", "gear", "fault-diagnosis", "condition-monitoring", "time-series", "synthetic", "simulation")
 
 LICENCE = """Data licence: CC BY 4.0 (https://creativecommons.org/licenses/by/4.0/): free to use, name the source.
 """
@@ -41,14 +49,16 @@ CAVEATS = """- The records are simulated. A model trained on them alone has prov
 
 
 def write_card(out: Path) -> None:
-    """Write `README.md` of a data-set folder whose shards are all done."""
+    """Write `README.md` and `croissant.json` of a data-set folder whose shards are all done."""
     with open_dataset(out, allow_incomplete=True) as data:
+        write_text(out / CROISSANT, croissant_text(data, CAVEATS))
         write_text(out / CARD, card_text(data))
 
 
 def card_text(data: Dataset) -> str:
-    """The card as Markdown; every text that comes from a file is escaped."""
+    """The card as Markdown after Hugging Face front matter; every text that comes from a file is escaped."""
     sections = [
+        front_matter(data),
         f"# {escape(data.folder.resolve().name)}",
         "Gear vibration, simulated and labelled by gensig " + escape(data.manifest.generator_version) + ".",
         _table(("fact", "value"), _facts(data)),
@@ -66,10 +76,28 @@ def card_text(data: Dataset) -> str:
     return "\n\n".join(section.strip() for section in sections) + "\n"
 
 
+def front_matter(data: Dataset) -> str:
+    """YAML that the Hugging Face hub and its `load_dataset` read: licence, tags, size, and where the records are."""
+    size = next((name for limit, name in SIZES if data.n_records < limit), "n>10M")
+    content = {
+        "pretty_name": plain(data.folder.resolve().name),
+        "license": "cc-by-4.0",
+        "task_categories": ["tabular-classification"],
+        "tags": [*TAGS, f"gensig-{plain(data.manifest.generator_version)}"],
+        "size_categories": [size],
+        "configs": [{"config_name": "default", "data_files": [{"split": "train", "path": f"{SHARDS}/*.h5"}]}],
+    }
+    return f"---\n{yaml.safe_dump(content, sort_keys=False, allow_unicode=True)}---"
+
+
+def plain(value: object) -> str:
+    """Printable text on one line."""
+    return "".join(c if c.isprintable() else " " for c in str(value))
+
+
 def escape(value: object) -> str:
     """Text for one Markdown table cell: no HTML, no markup, no line breaks, nothing invisible."""
-    plain = "".join(c if c.isprintable() else " " for c in str(value))
-    return re.sub(r"([\\`*_\[\]|#~!])", r"\\\1", html.escape(plain, quote=False))
+    return re.sub(r"([\\`*_\[\]|#~!])", r"\\\1", html.escape(plain(value), quote=False))
 
 
 def _table(header: tuple[str, ...], rows: list[tuple[object, ...]]) -> str:
@@ -99,6 +127,10 @@ def _facts(data: Dataset) -> list[tuple[object, ...]]:
     ]
     if "snr_db" in data.column_names:
         rows.append(("signal-to-noise ratio", value_range(data.column("snr_db"), "dB")))
+    if data.sample_type == "int16":
+        rows.append(("acceleration in the shards", "int16; times acceleration_scale of record and channel it is m/s^2"))
+    if data.compression != "none":
+        rows.append(("compression", data.compression + " (read with hdf5plugin)" * (data.compression == "blosc2")))
     rows += [("seed", data.manifest.seed), ("identity", data.manifest.identity)]
     return rows
 

@@ -7,7 +7,7 @@ from importlib import metadata
 from pathlib import Path
 from typing import Any
 
-PACKAGES = ("numpy", "scipy", "numba", "h5py", "gensig")
+PACKAGES = ("numpy", "scipy", "numba", "h5py", "hdf5plugin", "gensig")
 
 
 def environment() -> dict[str, Any]:

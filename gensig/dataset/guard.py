@@ -1,19 +1,23 @@
 """Opening a shard that may come from a stranger: checked before anything is read, and never trusted afterwards."""
 
+import math
 from pathlib import Path
 
 import h5py
 import numpy as np
 
 from gensig.dataset.attributes import HDF5_ERRORS, decoded, read_attributes
-from gensig.dataset.schema import COLUMNS, REQUIRED, REQUIRED_ATTRIBUTES, SCHEMA_VERSION, SIGNALS
+from gensig.dataset.compression import BLOSC2_CHUNK_LIMIT, BLOSC2_FILTER, filters, load_blosc2
+from gensig.dataset.schema import COLUMNS, REQUIRED, REQUIRED_ATTRIBUTES, SAMPLE_TYPES, SCALES, SCHEMA_VERSION, SIGNALS
 from gensig.errors import DatasetError
 
 # gzip reaches at most 1032:1; what declares more than this over what it stores is a bomb or was never written.
 EXPANSION_LIMIT = 1100
 ATTRIBUTES_LIMIT = 1000
 
-_FILTERS = {h5py.h5z.FILTER_DEFLATE, h5py.h5z.FILTER_SHUFFLE, h5py.h5z.FILTER_FLETCHER32, h5py.h5z.FILTER_LZF}
+_FILTERS = {
+    h5py.h5z.FILTER_DEFLATE, h5py.h5z.FILTER_SHUFFLE, h5py.h5z.FILTER_FLETCHER32, h5py.h5z.FILTER_LZF, BLOSC2_FILTER,
+}  # fmt: skip
 
 
 def open_file(path: Path) -> h5py.File:
@@ -41,13 +45,23 @@ def open_shard(path: Path, *, folder: Path | None = None) -> h5py.File:
     return file
 
 
+def same_file(path: Path) -> tuple[int, ...]:
+    """Numbers that change when a file or a link to it is replaced or written to; () where there is none."""
+    try:
+        found, link = path.stat(), path.lstat()
+    except OSError:
+        return ()
+    return (found.st_dev, found.st_ino, found.st_size, found.st_mtime_ns, found.st_ctime_ns, link.st_ino)
+
+
 def check_shard(file: h5py.File, path: Path) -> None:
     """Refuse, with one line, whatever a shard of format version 1 cannot contain.
 
     Raises
     ------
     DatasetError    for soft or external links, types that are no plain numbers or text, data outside the file, filters
-                    other than gzip and lzf, shapes larger than what is stored, missing columns, unequal row counts
+                    other than gzip, lzf and blosc2, shapes larger than what is stored, missing columns, unequal row
+                    counts, blosc2 without the package that reads it
     """
     try:
         found = datasets(file, path)
@@ -57,6 +71,8 @@ def check_shard(file: h5py.File, path: Path) -> None:
         n_records = row_count(found["record_id"])
         for name, data in found.items():
             _check_dataset(name, data, n_records, path)
+        for name, scale in SCALES.items():
+            _check_scale(found, name, scale, path)
         _check_attributes(file, path)
     except HDF5_ERRORS as error:
         raise DatasetError(f"{path} is damaged ({first_line(error)}); restore it from a copy") from error
@@ -70,8 +86,7 @@ def datasets(file: h5py.File, path: Path) -> dict[str, h5py.Dataset]:
         for key in group:
             if not isinstance(key, str):
                 raise DatasetError(f"{path}: the name {key!r} is no UTF-8 text; the file is damaged")
-            link = group.get(key, getlink=True)
-            if not isinstance(link, h5py.HardLink):
+            if group.id.links.get_info(key.encode()).type != h5py.h5l.TYPE_HARD:
                 raise DatasetError(f"{path}: '{_plain(prefix + key)}' is a link; a shard holds its own data only")
             item = group[key]
             if isinstance(item, h5py.Dataset):
@@ -92,28 +107,62 @@ def row_count(data: h5py.Dataset) -> int:
 
 def _check_dataset(name: str, data: h5py.Dataset, n_records: int, path: Path) -> None:
     label = f"{path}: data set '{_plain(name)}'"
-    if data.dtype.kind not in "Siuf" or data.dtype.subdtype is not None:
-        raise DatasetError(f"{label} has type {data.dtype}; allowed are numbers and text of fixed length")
+    dtype = data.dtype
+    if dtype.kind not in "Siuf" or dtype.subdtype is not None:
+        raise DatasetError(f"{label} has type {dtype}; allowed are numbers and text of fixed length")
     if data.is_virtual or data.external:
         raise DatasetError(f"{label} keeps its data in another file; a shard holds its own data only")
     if n_records == 0 or row_count(data) != n_records:
         raise DatasetError(f"{label} has shape {data.shape}, record_id has {n_records} rows; all must be equal, not 0")
-    properties = data.id.get_create_plist()
-    filters = {properties.get_filter(i)[0] for i in range(properties.get_nfilters())}
-    if not filters <= _FILTERS:
-        raise DatasetError(f"{label} uses HDF5 filter {sorted(filters - _FILTERS)}; allowed are gzip and lzf")
-    declared, stored = data.size * data.dtype.itemsize, data.id.get_storage_size()
-    chunk = int(np.prod(data.chunks, dtype=object)) * data.dtype.itemsize if data.chunks else 0
-    if max(declared, chunk) > stored * (EXPANSION_LIMIT if filters else 1):
-        raise DatasetError(f"{label} declares {declared} bytes and stores {stored}; it was never written or is a bomb")
+    used = filters(data)
+    if not used <= _FILTERS:
+        raise DatasetError(f"{label} uses HDF5 filter {sorted(used - _FILTERS)}; allowed are gzip, lzf and blosc2")
+    if BLOSC2_FILTER in used:
+        load_blosc2(f"{path} is compressed with blosc2; reading it")
+    if not _is_stored(data, used):
+        raise DatasetError(
+            f"{label} declares {data.size * dtype.itemsize} bytes and stores {data.id.get_storage_size()}; "
+            "it was never written or is a bomb"
+        )
     column = SIGNALS.get(name) or COLUMNS.get(name)
     if column is not None:
-        same_kind = data.dtype.kind == column.storage_dtype.kind
+        same_kind = dtype.kind == column.storage_dtype.kind
+        if name in SCALES and dtype.kind == "i":
+            same_kind = dtype.itemsize == 2
         if not same_kind or data.ndim != 1 + len(column.axes):
             raise DatasetError(
-                f"{label} has type {data.dtype} and {data.ndim} axes; format version 1 wants "
-                f"{column.dtype} and {1 + len(column.axes)}"
+                f"{label} has type {dtype} and {data.ndim} axes; format version 1 wants "
+                f"{' or '.join(SAMPLE_TYPES) if name in SCALES else column.dtype} and {1 + len(column.axes)}"
             )
+
+
+def holds_its_data(data: h5py.Dataset) -> bool:
+    """True for a data set whose values are all in its own file, in no more bytes than it declares."""
+    used = filters(data)
+    return not data.is_virtual and not data.external and used <= _FILTERS - {BLOSC2_FILTER} and _is_stored(data, used)
+
+
+def _is_stored(data: h5py.Dataset, used: set[int]) -> bool:
+    """False for what declares more than its bytes in the file can hold, in all or in one chunk."""
+    item, chunks = data.dtype.itemsize, data.chunks
+    chunk = math.prod(chunks) * item if chunks else 0
+    if BLOSC2_FILTER in used:
+        counts = (-(-length // step) for length, step in zip(data.shape, chunks, strict=True))
+        return chunk <= BLOSC2_CHUNK_LIMIT and data.id.get_num_chunks() == math.prod(counts)
+    limit = data.id.get_storage_size() * (EXPANSION_LIMIT if used else 1)
+    return max(data.size * item, chunk) <= limit
+
+
+def _check_scale(found: dict[str, h5py.Dataset], name: str, scale: str, path: Path) -> None:
+    """Refuse counts without their scale, one a record and channel."""
+    if name not in found or found[name].dtype.kind == "f":
+        return
+    if scale not in found:
+        raise DatasetError(f"{path}: {name} is int16 and there is no data set {scale}; its values are unknown")
+    if found[scale].shape != found[name].shape[:2]:
+        raise DatasetError(
+            f"{path}: {scale} has shape {found[scale].shape}, {name} has {found[name].shape[:2]} records and channels"
+        )
 
 
 def _check_attributes(file: h5py.File, path: Path) -> None:

@@ -7,7 +7,7 @@ import numpy as np
 
 from gensig.dataset.attributes import HDF5_ERRORS, read_attributes
 from gensig.dataset.card import value_range
-from gensig.dataset.guard import open_file
+from gensig.dataset.guard import holds_its_data, open_file
 from gensig.dataset.layout import MANIFEST, Manifest, read_manifest
 from gensig.dataset.reader import Dataset, open_dataset
 from gensig.errors import DatasetError
@@ -66,6 +66,8 @@ def _dataset_lines(data: Dataset) -> list[str]:
     lines = [
         f"  signal       acceleration ({len(data.channel_names)}, {data.n_samples}) float32, m/s^2, "
         f"{data.sampling_rate:g} Hz, {duration:g} s",
+        f"  stored as    {data.sample_type}{' with a scale' * (data.sample_type == 'int16')}, "
+        f"compression {data.compression}",
         f"  channels     {', '.join(map(_show, data.channel_names))}",
         f"  speed        {value_range(data.column('speed_rpm')[usable], 'r/min')}",
         f"  torque       {value_range(data.column('torque_nm')[usable], 'N m')}",
@@ -115,9 +117,9 @@ def _dataset_notes(data: h5py.Dataset) -> str:
     found = read_attributes(data)
     unit = found.pop("unit", "")
     unit = f", {_show(unit)}" if unit else ""
-    virtual = ", virtual" if data.is_virtual else ""
+    virtual = ", virtual" if data.is_virtual else ", data in another file, not read" if data.external else ""
     rest = "".join(f", {_show(name)}={_show(value)}" for name, value in found.items())
-    small = data.size is not None and data.size == 1 and data.dtype.kind in "iuf" and not data.is_virtual
+    small = data.size == 1 and data.dtype.kind in "iuf" and holds_its_data(data)
     return unit + virtual + rest + (f", value {data[()]}" if small else "")
 
 

@@ -4,7 +4,7 @@ import fcntl
 import hashlib
 import json
 import os
-from collections.abc import Iterator, Sequence
+from collections.abc import Iterator, Mapping, Sequence
 from contextlib import contextmanager, suppress
 from dataclasses import asdict, replace
 from pathlib import Path
@@ -38,16 +38,19 @@ from gensig.errors import DatasetError
 
 __all__ = [
     "create_folder",
+    "differing_keys",
     "finalize",
     "identity_hash",
     "read_manifest",
     "record_failed_shard",
     "record_shard",
+    "record_shards",
     "refuse_used",
 ]
 
 # These change where and how a data set is made, not one bit of it.
 NOT_IDENTITY = ("out", "executor", "verbosity")
+RECEIPT_SUFFIX = ".done"
 
 
 def identity_hash(config: dict[str, Any], generator_version: str) -> str:
@@ -64,6 +67,25 @@ def identity_hash(config: dict[str, Any], generator_version: str) -> str:
     }
     canonical = json.dumps(content, sort_keys=True, separators=(",", ":"), ensure_ascii=True)
     return hashlib.sha256(canonical.encode()).hexdigest()
+
+
+def differing_keys(one: Mapping[str, Any], other: Mapping[str, Any]) -> list[str]:
+    """Dotted keys that decide bits and whose values differ between two configurations, in order."""
+    ours, theirs = _leaves(one), _leaves(other)
+    absent = object()
+    return [key for key in sorted({*ours, *theirs}) if repr(ours.get(key, absent)) != repr(theirs.get(key, absent))]
+
+
+def _leaves(config: Mapping[str, Any], prefix: str = "") -> dict[str, Any]:
+    leaves: dict[str, Any] = {}
+    for key, value in config.items():
+        if not prefix and key in NOT_IDENTITY:
+            continue
+        if isinstance(value, Mapping) and value:
+            leaves.update(_leaves(value, f"{prefix}{key}."))
+        else:
+            leaves[f"{prefix}{key}"] = value
+    return leaves
 
 
 def create_folder(
@@ -148,25 +170,38 @@ def _make_folders(out: Path, made: list[Path]) -> None:
 
 def record_shard(out: Path, shard_index: int, sha256: str, bytes: int, n_failed: int) -> None:
     """Enter a finished shard, already under its final name, in the manifest; local processes may do so at once."""
-    if not shard_path(out, shard_index).is_file():
-        raise DatasetError(f"{shard_path(out, shard_index)} does not exist; a shard is written before it is recorded")
-    _update(out, shard_index, state="done", sha256=sha256, bytes=bytes, n_failed=n_failed)
+    _record(out, {shard_index: {"sha256": sha256, "bytes": bytes, "n_failed": n_failed}})
+
+
+def record_shards(out: Path, entries: Mapping[int, ShardEntry]) -> None:
+    """Enter finished shards in the manifest in one go."""
+    _record(
+        out, {i: {"sha256": one.sha256, "bytes": one.bytes, "n_failed": one.n_failed} for i, one in entries.items()}
+    )
+
+
+def _record(out: Path, facts: Mapping[int, Mapping[str, Any]]) -> None:
+    for index in facts:
+        if not shard_path(out, index).is_file():
+            raise DatasetError(f"{shard_path(out, index)} does not exist; a shard is written before it is recorded")
+    _update(out, {index: {"state": "done", **fact} for index, fact in facts.items()})
 
 
 def record_failed_shard(out: Path, shard_index: int) -> None:
     """Enter in the manifest that a shard could not be made; the data set cannot be closed until it is."""
-    _update(out, shard_index, state="failed", sha256="", bytes=0, n_failed=0)
+    _update(out, {shard_index: {"state": "failed", "sha256": "", "bytes": 0, "n_failed": 0}})
 
 
-def _update(out: Path, shard_index: int, **changes: Any) -> None:
+def _update(out: Path, changes: Mapping[int, Mapping[str, Any]]) -> None:
     with _locked(out):
         manifest = read_manifest(out)
-        if not 0 <= shard_index < len(manifest.shards):
-            raise DatasetError(f"shard {shard_index} does not exist; {out} has shards 0 to {len(manifest.shards) - 1}")
         if manifest.is_complete:
             raise DatasetError(f"{out} is complete and closed; make another data set to change anything")
         shards = list(manifest.shards)
-        shards[shard_index] = shard_entry(shard_index, asdict(shards[shard_index]) | changes)
+        for index, change in changes.items():
+            if not 0 <= index < len(shards):
+                raise DatasetError(f"shard {index} does not exist; {out} has shards 0 to {len(shards) - 1}")
+            shards[index] = shard_entry(index, {**asdict(shards[index]), **change})
         write_manifest(out, replace(manifest, shards=tuple(shards)))
 
 
@@ -197,12 +232,15 @@ def finalize(out: Path) -> None:
         manifest = read_manifest(out)
         if manifest.is_complete:
             return
+        missing = [entry for entry in manifest.shards if entry.state != "done"]
+        if missing:
+            named = ", ".join(f"{entry.name} is {entry.state}" for entry in missing[:3])
+            more = f" and {len(missing) - 3} more" if len(missing) > 3 else ""
+            raise DatasetError(
+                f"{out}: {manifest.n_done} of {len(manifest.shards)} shards are done, {named}{more}; run `gensig "
+                f"resume {out}` first"
+            )
         for i, entry in enumerate(manifest.shards):
-            if entry.state != "done":
-                raise DatasetError(
-                    f"{out}: {manifest.n_done} of {len(manifest.shards)} shards are done, {entry.name} is "
-                    f"{entry.state}; run `gensig resume {out}` first"
-                )
             path = shard_path(out, i)
             if not path.is_file() or path.stat().st_size != entry.bytes:
                 raise DatasetError(
@@ -223,10 +261,11 @@ def finalize(out: Path) -> None:
 
 
 def _remove_leftovers(out: Path) -> None:
-    """Remove temporary files of killed writers; every shard is done, so no writer is alive."""
+    """Remove temporary files and receipts of killed writers; every shard is done, so no writer is alive."""
     for folder in (out, out / SHARDS, out / SPLITS):
-        for path in folder.glob(f".*{TEMPORARY_SUFFIX}"):
-            path.unlink(missing_ok=True)
+        for suffix in (TEMPORARY_SUFFIX, RECEIPT_SUFFIX):
+            for path in folder.glob(f".*{suffix}"):
+                path.unlink(missing_ok=True)
 
 
 def file_digests(folder: Path, manifest: Manifest) -> Iterator[tuple[str, str, str]]:

@@ -2,7 +2,7 @@
 
 import os
 from collections import OrderedDict
-from collections.abc import Sequence
+from collections.abc import Iterator, Sequence
 from pathlib import Path
 from types import TracebackType
 from typing import Any
@@ -11,10 +11,13 @@ import h5py
 import numpy as np
 
 from gensig.dataset.attributes import HDF5_ERRORS, read_attributes
-from gensig.dataset.guard import datasets, first_line, open_shard, read_rows
+from gensig.dataset.compression import compression_of
+from gensig.dataset.guard import datasets, first_line, open_file, open_shard, read_rows, same_file
 from gensig.dataset.layout import PLAN, SPLITS, Manifest, read_manifest, shard_path
 from gensig.dataset.plan import Plan, read_plan
-from gensig.dataset.schema import SIGNALS
+from gensig.dataset.quantization import read_signal
+from gensig.dataset.schema import SCALES, SIGNALS
+from gensig.dataset.selection import Selection, StoredRecord, structured, unknown_name
 from gensig.dataset.splits import SUBSETS, read_split
 from gensig.errors import DatasetError
 
@@ -56,7 +59,8 @@ class Dataset:
     sampling_rate : float            Hz
     channel_names, class_names : list of text, in the order of the channel axis and of `label`
     attributes : dict                root attributes of the shards
-    column_names, protocols : list of text
+    sample_type, compression : str   how `signals` are stored: 'float32' or 'int16'; 'none', 'gzip', 'lzf' or 'blosc2'
+    column_names, signal_names, protocols : list of text
     usable : (record,) bool          False for failed records and those of missing shards
     """
 
@@ -71,17 +75,20 @@ class Dataset:
         self._columns: dict[str, np.ndarray] = {}
         self._plan: Plan | None = None
         self._files: OrderedDict[int, h5py.File] = OrderedDict()
+        self._checked: dict[int, tuple[int, ...]] = {}
         self._pid = os.getpid()
         first = self._file(first_done)
         self.attributes: dict[str, Any] = read_attributes(first)
         self.sampling_rate = float(self.attributes["sampling_rate_hz"])
         self.channel_names: list[str] = list(self.attributes["channel_names"])
         self.class_names: list[str] = list(self.attributes["class_names"])
+        self.sample_type = str(first["acceleration"].dtype.name)
+        self.compression = compression_of(first["acceleration"])
         self._shape: tuple[int, int] = first["acceleration"].shape[1:]
+        found = datasets(first, folder)
+        self.signal_names: list[str] = [name for name in SIGNALS if SIGNALS[name].is_bulk and name in found]
         self._types = {
-            name: (data.dtype, data.shape[1:])
-            for name, data in datasets(first, folder).items()
-            if not (name in SIGNALS and SIGNALS[name].is_bulk)
+            name: (data.dtype, data.shape[1:]) for name, data in found.items() if name not in self.signal_names
         }
 
     @property
@@ -112,6 +119,11 @@ class Dataset:
         return self._plan
 
     @property
+    def plan_table(self) -> np.ndarray:
+        """The plan as one structured array, (record,): a field a column, text, int64 or float64."""
+        return structured(self.plan.columns)
+
+    @property
     def protocols(self) -> list[str]:
         """Names that `split` takes."""
         return sorted(Path(name).stem for name in self.manifest.files if name.startswith(f"{SPLITS}/"))
@@ -122,24 +134,28 @@ class Dataset:
         Records of shards that are missing hold NaN, -1 or ''.
         """
         if name not in self._types:
-            raise DatasetError(
-                f"column {name!r} does not exist in {self.folder}; it has {', '.join(self.column_names)}"
-            )
+            raise unknown_name("column", name, self.column_names, self.folder)
         if name not in self._columns:
-            dtype, shape = self._types[name]
-            kind = dtype.kind
-            missing = np.array("" if kind == "S" else np.nan if kind == "f" else -1)
-            parts = []
-            for i, entry in enumerate(self.manifest.shards):
-                if entry.state == "done":
-                    parts.append(self._read_rows(i, name, shape))
-                else:
-                    part = np.full((entry.rows, *shape), missing)
-                    parts.append(part if kind == "S" else part.astype(dtype))
-            values = np.concatenate(parts)
+            values = np.concatenate([self.shard_column(shard, name) for shard in range(len(self.manifest.shards))])
             values.flags.writeable = False
             self._columns[name] = values
         return self._columns[name]
+
+    def shard_column(self, shard: int, name: str) -> np.ndarray:
+        """The part of `column` that one shard holds, (row, ...); read anew each time."""
+        if name not in self._types:
+            raise unknown_name("column", name, self.column_names, self.folder)
+        dtype, shape = self._types[name]
+        entry = self.manifest.shards[shard]
+        if entry.state == "done":
+            return self._read_rows(shard, name, shape)
+        if dtype.kind == "S":
+            return np.full((entry.rows, *shape), "")
+        return np.full((entry.rows, *shape), np.nan if dtype.kind == "f" else -1, dtype=dtype)
+
+    def first_record(self, shard: int) -> int:
+        """Number of the record in row 0 of a shard."""
+        return int(self._starts[shard])
 
     def signals(
         self,
@@ -150,7 +166,7 @@ class Dataset:
         *,
         name: str = "acceleration",
     ) -> np.ndarray:
-        """Acceleration of one record, (channel, sample) float32 in m/s^2.
+        """Acceleration of one record, (channel, sample) float32 in m/s^2, however it is stored.
 
         Parameters
         ----------
@@ -160,6 +176,36 @@ class Dataset:
         name : str             'acceleration' or 'acceleration_clean'
         """
         stop = self.n_samples if stop is None else stop
+        if name not in SCALES or name not in self.signal_names:
+            known = [known for known in self.signal_names if known in SCALES]
+            raise unknown_name("signal", name, known, self.folder)
+        shard, row = self._place(record_index, start, stop)
+        file = self._file(shard)
+        try:
+            block = read_signal(file, name, row, start, stop)
+        except HDF5_ERRORS as error:
+            raise self._unreadable(shard, error) from error
+        if block.shape != (len(self.channel_names), stop - start):
+            raise self._unreadable(shard, ValueError(f"{name} has another shape than in the other shards"))
+        return block if channels is None else block[[self._channel(channel) for channel in channels]]
+
+    def trace(self, record_index: int, name: str, start: int = 0, stop: int | None = None) -> np.ndarray:
+        """'tacho' or 'shaft_angle' of one record, (sample,), where the data set holds it."""
+        stop = self.n_samples if stop is None else stop
+        traces = [known for known in self.signal_names if known not in SCALES]
+        if name not in traces:
+            raise unknown_name("trace", name, traces or ["none"], self.folder)
+        shard, row = self._place(record_index, start, stop)
+        try:
+            values = self._file(shard)[name][row, start:stop]
+        except HDF5_ERRORS as error:
+            raise self._unreadable(shard, error) from error
+        if values.shape != (stop - start,):
+            raise self._unreadable(shard, ValueError(f"{name} has another shape than in the other shards"))
+        return values
+
+    def _place(self, record_index: int, start: int, stop: int) -> tuple[int, int]:
+        """Shard and row of a record; refuses records and samples that do not exist."""
         if not 0 <= record_index < self.n_records:
             raise DatasetError(f"record {record_index} does not exist; {self.folder} has 0 to {self.n_records - 1}")
         if not 0 <= start < stop <= self.n_samples:
@@ -167,22 +213,30 @@ class Dataset:
         shard = int(np.searchsorted(self._starts, record_index, side="right")) - 1
         if self.manifest.shards[shard].state != "done":
             raise DatasetError(f"record {record_index} is in {self.manifest.shards[shard].name}, which is not made yet")
-        file = self._file(shard)
-        if name not in ("acceleration", "acceleration_clean") or name not in file:
-            raise DatasetError(f"{self.folder} has no signal {name!r}; it has acceleration")
-        try:
-            block = file[name][record_index - int(self._starts[shard]), :, start:stop]
-        except HDF5_ERRORS as error:
-            raise self._unreadable(shard, error) from error
-        block = block.astype(np.float32, copy=False)
-        return block if channels is None else block[[self._channel(channel) for channel in channels]]
+        return shard, record_index - int(self._starts[shard])
+
+    def where(self, **conditions: Any) -> Selection:
+        """The records that meet all conditions; reads the columns named, no signal.
+
+        Parameters
+        ----------
+        conditions : column=value, where a column is one of `column_names` or of the plan, ``params/`` may be left out,
+            and ``fault`` means ``label_name``. A value is met by equality, a list by any of its values, a tuple
+            ``(low, high)`` by numbers from low to high, both included, None where a side is open. Names that are no
+            Python names go in as ``**{"params/x.y": (0, 1)}``.
+
+        Raises
+        ------
+        DatasetError    for a column that does not exist and for text that no record has, with the nearest names
+
+        >>> data.where(fault="crack", speed_rpm=(1000, 2000), status="ok")    # doctest: +SKIP
+        """
+        return Selection(self, np.arange(self.n_records)).where(**conditions)
 
     def split(self, protocol: str) -> SplitRows:
         """subset -> list of (record_index, start_fraction, stop_fraction); failed records are in it, see `usable`."""
         if protocol not in self.protocols:
-            raise DatasetError(
-                f"split {protocol!r} does not exist in {self.folder}; it has {', '.join(self.protocols)}"
-            )
+            raise unknown_name("split", protocol, self.protocols, self.folder)
         path = self.folder / SPLITS / f"{protocol}.csv"
         table = read_split(path)
         index = {record_id: i for i, record_id in enumerate(self.plan.columns["record_id"].tolist())}
@@ -214,6 +268,12 @@ class Dataset:
     def __len__(self) -> int:
         return self.n_records
 
+    def __getitem__(self, record_index: int) -> StoredRecord:
+        return self.where()[record_index]
+
+    def __iter__(self) -> Iterator[StoredRecord]:
+        return iter(self.where())
+
     def __getstate__(self) -> dict[str, Any]:
         return {**self.__dict__, "_files": OrderedDict()}
 
@@ -227,13 +287,23 @@ class Dataset:
         if shard in self._files:
             self._files.move_to_end(shard)
             return self._files[shard]
-        file = open_shard(shard_path(self.folder, shard), folder=self.folder)
+        file = self._open(shard_path(self.folder, shard), shard)
         if file["record_id"].shape[0] != self.manifest.shards[shard].rows:
             file.close()
             raise self._unreadable(shard, ValueError("another number of rows than the manifest says"))
         self._files[shard] = file
         if len(self._files) > MAX_OPEN_SHARDS:
             self._files.popitem(last=False)[1].close()
+        return file
+
+    def _open(self, path: Path, shard: int) -> h5py.File:
+        """Open a shard; one that was checked and has not changed since is not checked again."""
+        if shard in self._checked and self._checked[shard] == same_file(path):
+            return open_file(path)
+        before = same_file(path)
+        file = open_shard(path, folder=self.folder)
+        if before == same_file(path):
+            self._checked[shard] = before
         return file
 
     def _read_rows(self, shard: int, name: str, shape: tuple[int, ...]) -> np.ndarray:

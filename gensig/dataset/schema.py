@@ -92,6 +92,14 @@ COLUMNS: dict[str, Column] = _table(
     ("status_reason", "str256", "", "result", "why the record failed, cut to 256 bytes; empty when ok"),
     ("integration_error", "float64", "1", "result", "relative error of the time integration; NaN where not measured"),
     (
+        "integration_check",
+        "str16",
+        "",
+        "result",
+        "'error': below its limit; 'levels': teeth bounce, third-octave levels agree within 0.5 dB and indicators "
+        "within 5 %; 'unresolved'; 'none': not looked for",
+    ),
+    (
         "contact_loss_fraction",
         "float64",
         "1",
@@ -107,6 +115,10 @@ SIGNALS: dict[str, Column] = {
                description="what the sensors report, noise included"),
         Column(name="acceleration_clean", dtype="float32", unit="m/s^2", role="result", axes=("channel", "sample"),
                description="the same without noise (optional)"),
+        Column(name="acceleration_scale", dtype="float64", unit="m/s^2", role="result", axes=("channel",),
+               description="value of one count of acceleration, NaN in a failed record (only where that is int16)"),
+        Column(name="acceleration_clean_scale", dtype="float64", unit="m/s^2", role="result", axes=("channel",),
+               description="the same for acceleration_clean"),
         Column(name="tacho", dtype="float32", unit="1", role="result", axes=("sample",),
                description="once-per-revolution pulse of the driving shaft (optional)"),
         Column(name="shaft_angle", dtype="float64", unit="rad", role="result", axes=("sample",),
@@ -120,6 +132,10 @@ SIGNALS: dict[str, Column] = {
     )
 }  # fmt: skip
 
+# How time signals with a scale may be stored, and the column that holds the scale of each.
+SAMPLE_TYPES = ("float32", "int16")
+SCALES = {"acceleration": "acceleration_scale", "acceleration_clean": "acceleration_clean_scale"}
+
 # What a reader of version 1 may rely on; this list never grows, so that adding a column is no new version.
 REQUIRED = (
     "acceleration", "record_id", "label", "label_name", "severity", "gearbox_id", "specimen_id", "unit_id",
@@ -132,6 +148,7 @@ DEFAULTS: dict[str, str | float] = {
     "status": "ok",
     "status_reason": "",
     "integration_error": float("nan"),
+    "integration_check": "none",
     "contact_loss_fraction": float("nan"),
 }
 
@@ -156,6 +173,8 @@ def column_table() -> str:
     for column in (*SIGNALS.values(), *COLUMNS.values()):
         shape = ", ".join(("record", *column.axes))
         kind = f"UTF-8, {column.n_bytes} bytes" if column.is_text else column.dtype
+        if column.name in SCALES:
+            kind = " or ".join(SAMPLE_TYPES)
         name = f"`{column.name}`" + (" *" if column.name in REQUIRED else "")
         lines.append(f"| {name} | ({shape}) | {kind} | {column.unit} | {column.role} | {column.description} |")
     lines.append(

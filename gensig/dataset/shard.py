@@ -12,11 +12,22 @@ import h5py
 import numpy as np
 
 from gensig.dataset.attributes import Attribute, set_attribute
+from gensig.dataset.compression import BLOSC2_CHUNK_LIMIT, COMPRESSIONS, creation_options, fixed_settings
 from gensig.dataset.image import memory_file, publish_image
-from gensig.dataset.schema import COLUMNS, DEFAULTS, PARAMS, REQUIRED_ATTRIBUTES, SCHEMA_VERSION, SIGNALS, Column
+from gensig.dataset.quantization import quantized
+from gensig.dataset.schema import (
+    COLUMNS,
+    DEFAULTS,
+    PARAMS,
+    REQUIRED_ATTRIBUTES,
+    SAMPLE_TYPES,
+    SCALES,
+    SCHEMA_VERSION,
+    SIGNALS,
+    Column,
+)
 from gensig.errors import DatasetError
 
-COMPRESSIONS = ("none", "gzip", "lzf")
 _PARAM_NAME = re.compile(r"[A-Za-z_][A-Za-z0-9_.\-]*")
 
 
@@ -30,7 +41,8 @@ class ShardWriter:
     signals : name -> shape of one record's array, such as {"acceleration": (4, 51200), "noise_power": (4,)}
     params : list        names of the `params/<name>` columns
     attributes : dict    root attributes; `sampling_rate_hz`, `channel_names` and `class_names` are required
-    compression : str    'none', 'gzip' or 'lzf', for the time signals
+    compression : str    one of `COMPRESSIONS`, for the time signals
+    sample_type : str    'float32', or 'int16': accelerations become counts, and the writer adds their scales
 
     Attributes
     ----------
@@ -53,12 +65,15 @@ class ShardWriter:
         params: Sequence[str],
         attributes: Mapping[str, Attribute],
         compression: str = "none",
+        sample_type: str = "float32",
     ) -> None:
         self.path = Path(path)
         self.n_records = n_records
         self.signals = {name: tuple(shape) for name, shape in signals.items()}
         self.attributes = {"schema_version": SCHEMA_VERSION, **attributes}
         self.compression = compression
+        self.sample_type = sample_type
+        self.scales = {name: SCALES[name] for name in signals if name in SCALES and sample_type == "int16"}
         self.columns = dict(COLUMNS)
         for name in params:
             full_name = f"{PARAMS}/{name}"
@@ -66,6 +81,7 @@ class ShardWriter:
                 name=full_name, dtype="float64", unit="", role="condition", description="drawn or swept value"
             )
         _check_declaration(self, params)
+        self._options = creation_options(compression)
         self.sha256 = ""
         self.n_bytes = 0
         self.n_failed = 0
@@ -76,6 +92,7 @@ class ShardWriter:
                 for name, shape in self.signals.items()
                 if not SIGNALS[name].is_bulk
             },
+            **{scale: np.zeros((n_records, self.signals[name][0]), "<f8") for name, scale in self.scales.items()},
         }
         self._written = np.zeros(n_records, dtype=bool)
         self._file: h5py.File | None = None
@@ -125,8 +142,11 @@ class ShardWriter:
         failed = encoded["status"] == b"failed"
         arrays = {name: self._signal(name, signals, failed=failed) for name in self.signals}
         for name, array in arrays.items():
+            if name in self.scales:
+                array, self._rows[self.scales[name]][row] = quantized(array)
             if SIGNALS[name].is_bulk:
-                self._file[name][row] = array
+                with fixed_settings():
+                    self._file[name][row] = array
             else:
                 self._rows[name][row] = array
         for name, value in encoded.items():
@@ -156,6 +176,7 @@ class ShardWriter:
     def _create_bulk(self, name: str, shape: tuple[int, ...]) -> None:
         assert self._file is not None
         column = SIGNALS[name]
+        scale = self.scales.get(name)
         properties = h5py.h5p.create(h5py.h5p.DATASET_CREATE)
         if self.compression == "none":
             # Space is laid out now, in row order, and not filled first: every row is written anyway.
@@ -164,14 +185,15 @@ class ShardWriter:
         data = self._file.create_dataset(
             name,
             shape=(self.n_records, *shape),
-            dtype=column.storage_dtype,
+            dtype=column.storage_dtype if scale is None else "<i2",
             chunks=(1, *shape),
-            compression=None if self.compression == "none" else self.compression,
-            shuffle=True if self.compression != "none" else None,
             track_times=False,
             dcpl=properties,
+            **self._options,
         )
-        set_attribute(data, "unit", column.unit)
+        set_attribute(data, "unit", column.unit if scale is None else "1")
+        if scale is not None:
+            set_attribute(data, "scale", scale)
 
     def _refuse_unknown(self, given: Mapping, known: Mapping) -> None:
         for name in given:
@@ -194,7 +216,8 @@ class ShardWriter:
             data = self._file.create_dataset(name, data=rows, dtype=column.storage_dtype, track_times=False)
             set_attribute(data, "unit", column.unit)
         self.n_failed = int(np.count_nonzero(self._rows["status"] == b"failed"))
-        self.sha256, self.n_bytes = publish_image(self._file, self.path)
+        with fixed_settings():  # HDF5 compresses what is in its cache now
+            self.sha256, self.n_bytes = publish_image(self._file, self.path)
 
     def _close(self) -> None:
         file, self._file = self._file, None
@@ -205,16 +228,25 @@ class ShardWriter:
 def _check_declaration(writer: ShardWriter, params: Sequence[str]) -> None:
     """Refuse what could not be read back."""
     name = writer.path.name
-    if writer.compression not in COMPRESSIONS:
-        raise DatasetError(
-            f"{name}: compression '{writer.compression}' is unknown; allowed are {', '.join(COMPRESSIONS)}"
-        )
+    for key, given, known in (
+        ("compression", writer.compression, COMPRESSIONS),
+        ("sample_type", writer.sample_type, SAMPLE_TYPES),
+    ):
+        if given not in known:
+            raise DatasetError(f"{name}: {key} '{given}' is unknown; allowed are {', '.join(known)}")
     if writer.n_records < 1:
         raise DatasetError(f"{name}: {writer.n_records} records; a shard needs at least 1")
     for signal, shape in writer.signals.items():
-        if signal not in SIGNALS or len(shape) != len(SIGNALS[signal].axes) or min(shape) < 1:
-            allowed = ", ".join(f"{key} ({', '.join(column.axes)})" for key, column in SIGNALS.items())
+        own = {key: column for key, column in SIGNALS.items() if key not in SCALES.values()}
+        if signal not in own or len(shape) != len(own[signal].axes) or min(shape) < 1:
+            allowed = ", ".join(f"{key} ({', '.join(column.axes)})" for key, column in own.items())
             raise DatasetError(f"{name}: signal {signal} of shape {shape} is not allowed; allowed are {allowed}")
+        n_bytes = math.prod(shape) * own[signal].n_bytes
+        if writer.compression == "blosc2" and n_bytes > BLOSC2_CHUNK_LIMIT:
+            raise DatasetError(
+                f"{name}: a record's {signal} has {n_bytes} bytes, blosc2 takes {BLOSC2_CHUNK_LIMIT}; make shorter "
+                "records or choose another compression"
+            )
     missing = [key for key in REQUIRED_ATTRIBUTES if key not in writer.attributes]
     if missing or "acceleration" not in writer.signals:
         raise DatasetError(

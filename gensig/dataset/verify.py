@@ -10,10 +10,22 @@ from gensig.dataset.atomic import sha256_file
 from gensig.dataset.attributes import HDF5_ERRORS, read_attributes
 from gensig.dataset.guard import datasets, first_line, open_shard, read_rows
 from gensig.dataset.inspection import inspect
-from gensig.dataset.layout import CONFIG, INDEX, PLAN, SHARDS, Manifest, ShardEntry, read_config, read_manifest
+from gensig.dataset.layout import (
+    CONFIG,
+    INDEX,
+    OVERRIDES,
+    PLAN,
+    SHARDS,
+    SPLITS,
+    Manifest,
+    ShardEntry,
+    read_config,
+    read_manifest,
+)
 from gensig.dataset.manifest import file_digests, identity_hash
 from gensig.dataset.plan import Plan, read_plan
-from gensig.dataset.schema import COLUMNS
+from gensig.dataset.quantization import is_scale, read_signal
+from gensig.dataset.schema import COLUMNS, SCALES
 from gensig.errors import DatasetError
 
 __all__ = ["VerifyResult", "inspect", "verify"]
@@ -38,7 +50,7 @@ class VerifyResult:
 
 
 def verify(folder: Path, *, quick: bool = False) -> VerifyResult:
-    """Check a data-set folder: state, sha256, sizes, row counts, schema, plan against rows, finite values.
+    """Check a data-set folder: state, sha256, sizes, row counts, schema, plan against rows, scales, finite values.
 
     Parameters
     ----------
@@ -94,9 +106,14 @@ def _state(folder: Path, manifest: Manifest) -> list[str]:
             f"incomplete: {manifest.n_done} of {len(manifest.shards)} shards are done and the data set was "
             f"never closed; run `gensig resume {folder}`"
         )
-    needed = [CONFIG, PLAN, *([INDEX] if manifest.is_complete else [])]
+    needed = [CONFIG, PLAN, OVERRIDES, *([INDEX] if manifest.is_complete else [])]
     problems += [f"the manifest does not list {name}; it is damaged" for name in needed if name not in manifest.files]
     problems += [f"{name} is missing" for name in manifest.files if not (folder / name).is_file()]
+    if manifest.is_complete:
+        found = sorted(f"{SPLITS}/{path.name}" for path in (folder / SPLITS).glob("*"))
+        problems += [
+            f"{name!a} is extra: the manifest does not list it" for name in found if name not in manifest.files
+        ]
     return problems
 
 
@@ -119,8 +136,11 @@ def _beside_shards(folder: Path, manifest: Manifest) -> tuple[list[str], Plan | 
         if actual and actual != recorded
     ]
     try:
-        if identity_hash(read_config(folder), manifest.generator_version) != manifest.identity:
+        config = read_config(folder)
+        if identity_hash(config, manifest.generator_version) != manifest.identity:
             problems.append(f"{CONFIG} and the identity in the manifest do not belong together; one was altered")
+        if "seed" in config and config["seed"] != manifest.seed:
+            problems.append(f"{CONFIG} has seed {config['seed']!r} and the manifest {manifest.seed}; one was altered")
     except DatasetError as error:
         problems.append(str(error))
     try:
@@ -169,7 +189,7 @@ def _description_differs(file: h5py.File, path: Path, reference: dict) -> list[s
 
 
 def _rows_differ(file: h5py.File, entry: ShardEntry, plan: Plan | None, start: int) -> list[str]:
-    """Row count, rows against the plan, failed records, finite signals."""
+    """Row count, rows against the plan, failed records, scales, finite signals."""
     name = entry.name
     n = file["record_id"].shape[0]
     if n != entry.rows:
@@ -193,7 +213,23 @@ def _rows_differ(file: h5py.File, entry: ShardEntry, plan: Plan | None, start: i
     failed = read_rows(file["status"]) != "ok"
     if int(failed.sum()) != entry.n_failed:
         problems.append(f"{name} has {int(failed.sum())} failed records, recorded are {entry.n_failed}")
-    for row in np.flatnonzero(~failed):
-        if not np.isfinite(file["acceleration"][int(row)]).all():
-            problems.append(f"{name} row {row}: acceleration is not finite, but its status is ok")
+    for row, is_failed in enumerate(failed.tolist()):
+        problems += [f"{name} row {row}: {problem}" for problem in _signal_problems(file, row, failed=is_failed)]
+    return problems
+
+
+def _signal_problems(file: h5py.File, row: int, *, failed: bool) -> list[str]:
+    """Scales that are none, and signals that are not finite although the record did not fail."""
+    problems = []
+    for name, scale_name in SCALES.items():
+        if name not in file:
+            continue
+        if file[name].dtype.kind == "i":
+            scale = file[scale_name][row]
+            wrong = ~(is_scale(scale) | (np.isnan(scale) & failed))
+            if wrong.any():
+                problems.append(f"{scale_name} is {scale[wrong][0]}; it must be positive and finite")
+                continue
+        if not failed and not np.isfinite(read_signal(file, name, row)).all():
+            problems.append(f"{name} is not finite, but its status is ok")
     return problems

@@ -1,96 +1,119 @@
-"""Shards on processes of this machine; a process that dies is replaced and only its shards run again."""
+"""Shards on processes of this machine; a process that dies is replaced and only its shard runs again."""
 
 from __future__ import annotations
 
 import multiprocessing
 import os
 import signal
+import threading
+from collections import Counter, deque
 from collections.abc import Callable, Iterator, Sequence
 from concurrent.futures import FIRST_COMPLETED, Future, ProcessPoolExecutor, wait
 from concurrent.futures.process import BrokenProcessPool
-from typing import TypeVar
+from contextlib import contextmanager
+from dataclasses import dataclass
+from multiprocessing import connection, resource_tracker
+from typing import Any
 
-from gensig.errors import ConfigError
-
-T = TypeVar("T")
-
-TRIES = 3
-THREAD_VARIABLES = ("OMP_NUM_THREADS", "OPENBLAS_NUM_THREADS", "MKL_NUM_THREADS", "NUMBA_NUM_THREADS")
+from gensig.execution.base import THREAD_VARIABLES, TRIES, Executor, ShardFailure, T, guarded
 
 
-class ShardFailure:
-    """What is left of a shard whose worker died or raised: its number and the reason."""
+@dataclass(frozen=True, slots=True, kw_only=True)
+class LocalExecutor(Executor):
+    """Processes of this machine; with one worker, or one shard, everything runs in this process."""
 
-    def __init__(self, shard_index: int, reason: str) -> None:
-        self.shard_index = shard_index
-        self.reason = reason
+    n_workers: int
 
+    @property
+    def n_processes(self) -> int:
+        """Shards that are made at a time."""
+        return self.n_workers
 
-def n_workers(requested: int | None) -> int:
-    """Number of worker processes: as asked, else one a usable core."""
-    if requested is None:
-        return len(os.sched_getaffinity(0)) if hasattr(os, "sched_getaffinity") else os.cpu_count() or 1
-    if isinstance(requested, bool) or not isinstance(requested, int) or requested < 1:
-        raise ConfigError(f"executor.n_workers = {requested!r} must be a whole number of at least 1, or null")
-    return requested
-
-
-def run_shards(
-    job: Callable[[int], T], shard_indices: Sequence[int], *, workers: int
-) -> Iterator[tuple[int, T | ShardFailure]]:
-    """Run ``job`` for every shard and yield results as they come.
-
-    ``job`` must be picklable; it receives the shard's number. An exception of the job is yielded as a failure and
-    not tried again (it would come again); a worker that dies takes the shards it had in hand back into the queue, up to
-    three times each. With one worker, or one shard, everything runs in this process.
-    """
-    pending = list(shard_indices)
-    if workers == 1 or len(pending) <= 1:
-        for index in pending:
-            yield index, _guarded(job, index)
-        return
-    tries = dict.fromkeys(pending, 0)
-    while pending:
-        pool = _pool(min(workers, len(pending)))
-        futures: dict[Future[T | ShardFailure], int] = {pool.submit(_guarded, job, index): index for index in pending}
-        pending = []
+    def run(self, job: Callable[[int], T], shard_indices: Sequence[int]) -> Iterator[tuple[int, T | ShardFailure]]:
+        """See ``Executor.run``."""
+        if self.n_workers == 1 or len(shard_indices) <= 1:
+            for index in shard_indices:
+                yield index, guarded(job, index)
+            return
+        strangers = set(multiprocessing.active_children())
+        waiting, tries = deque(shard_indices), Counter[int]()
+        # A pool a worker: when one dies, it is known which shard it had in hand.
+        idle = [_worker() for _ in range(min(self.n_workers, len(waiting)))]
+        at_work: dict[Future[T | ShardFailure], tuple[ProcessPoolExecutor, int]] = {}
         try:
-            open_futures = set(futures)
-            while open_futures:
-                done, open_futures = wait(open_futures, return_when=FIRST_COMPLETED)
-                for future in done:
-                    index = futures[future]
+            while waiting or at_work:
+                while waiting and idle:
+                    worker, index = idle.pop(), waiting.popleft()
+                    worker, future = _submit(worker, job, index)
+                    at_work[future] = worker, index
+                for future in wait(at_work, return_when=FIRST_COMPLETED).done:
+                    worker, index = at_work.pop(future)
                     try:
-                        yield index, future.result()
+                        result = future.result()
                     except BrokenProcessPool:
+                        worker.shutdown(wait=False)
+                        worker = _worker()
                         tries[index] += 1
                         if tries[index] < TRIES:
-                            pending.append(index)
-                        else:
-                            yield index, ShardFailure(index, f"its worker process died {TRIES} times")
+                            waiting.append(index)
+                            idle.append(worker)
+                            continue
+                        result = ShardFailure(reason=f"its worker process died {TRIES} times")
+                    idle.append(worker)
+                    yield index, result
         except BaseException:
-            # interrupted: what is half done is a temporary file that nobody will mistake for a shard
-            pool.shutdown(wait=False, cancel_futures=True)
-            for process in multiprocessing.active_children():
+            # Interrupted: what is half done is a temporary file that nobody will mistake for a shard.
+            for process in set(multiprocessing.active_children()) - strangers:
                 process.terminate()
             raise
-        pool.shutdown()
+        finally:
+            for worker in [*idle, *(pool for pool, _ in at_work.values())]:
+                worker.shutdown(cancel_futures=True)
 
 
-def _pool(workers: int) -> ProcessPoolExecutor:
+def _worker() -> ProcessPoolExecutor:
+    """A pool of one process, which starts with its first job."""
     for name in THREAD_VARIABLES:
         os.environ.setdefault(name, "1")
     context = multiprocessing.get_context("spawn")
-    return ProcessPoolExecutor(workers, mp_context=context, initializer=_ignore_interrupt)
+    return ProcessPoolExecutor(1, mp_context=context, initializer=_begin_worker)
 
 
-def _ignore_interrupt() -> None:
-    """Ctrl-C is the parent's to answer."""
-    signal.signal(signal.SIGINT, signal.SIG_IGN)
+def _submit(
+    worker: ProcessPoolExecutor, job: Callable[[int], T], index: int
+) -> tuple[ProcessPoolExecutor, Future[T | ShardFailure]]:
+    """Give a worker a job; one that died while it had none is replaced first."""
+    with _interrupts_held():
+        try:
+            return worker, worker.submit(guarded, job, index)
+        except BrokenProcessPool:
+            worker.shutdown(wait=False)
+            worker = _worker()
+            return worker, worker.submit(guarded, job, index)
 
 
-def _guarded(job: Callable[[int], T], index: int) -> T | ShardFailure:
+@contextmanager
+def _interrupts_held() -> Iterator[None]:
+    """Processes that start in this block never see Ctrl-C, not even while they import: it is the parent's to answer."""
+    if not hasattr(signal, "pthread_sigmask"):
+        yield
+        return
+    resource_tracker.ensure_running()  # would lift the mask when it starts by itself
+    before = signal.pthread_sigmask(signal.SIG_BLOCK, {signal.SIGINT})
     try:
-        return job(index)
-    except Exception as error:
-        return ShardFailure(index, " ".join(f"{type(error).__name__}: {error}".split()))
+        yield
+    finally:
+        signal.pthread_sigmask(signal.SIG_SETMASK, before)
+
+
+def _begin_worker() -> None:
+    """Leave Ctrl-C to the parent, and end when the parent ends: a killed one would leave workers waiting for ever."""
+    signal.signal(signal.SIGINT, signal.SIG_IGN)
+    parent = multiprocessing.parent_process()
+    if parent is not None:
+        threading.Thread(target=_end_with, args=(parent.sentinel,), daemon=True).start()
+
+
+def _end_with(sentinel: Any) -> None:
+    connection.wait([sentinel])
+    os._exit(1)

@@ -1,0 +1,94 @@
+"""Data sets as ``gensig generate`` makes them, timed: CPU time of one process by stage, wall time of several."""
+
+from __future__ import annotations
+
+import tempfile
+import time
+from pathlib import Path
+from typing import Any
+
+from benchmarks._rates import quickstart
+from benchmarks._stages import EQUATIONS, INTEGRATION, LOW_PASS, NOISE, STAGES, TABLES, WRITING, Stages
+from gensig import records
+from gensig.dynamics import pair
+from gensig.execution.local import LocalExecutor
+from gensig.generation import begin_folder, run_folder
+from gensig.systems import spur_pair
+
+SHARD = 25  # records, as in the experiment
+N_SHARDS, SHARDS_A_WORKER = 2, 3
+
+
+def data_set(precision: str, n_shards: int) -> dict[str, Any]:
+    """Configuration of a quickstart data set: 1 s, four channels, a fault, speed, load and noise of its own each."""
+    config, _ = quickstart(n_shards * SHARD, f"solver.precision={precision}", f"dataset.records_per_shard={SHARD}")
+    return config
+
+
+def by_stage(precision: str, runs: int) -> dict[str, float]:
+    """CPU milliseconds of a record by stage and in all, and rates of one process; the best of several runs."""
+    config = data_set(precision, N_SHARDS)
+    n_records = N_SHARDS * SHARD
+    n_samples = round(config["operating"]["duration_s"] * config["sensing"]["sampling_rate_hz"])
+    found: list[Stages] = []
+    wall: list[float] = []
+    for _ in range(runs):
+        # what would not be there for records that have not been made before
+        records.forget_twins()
+        spur_pair._mesh_table.cache_clear()
+        pair._mean_mesh_stiffness.cache_clear()
+        with tempfile.TemporaryDirectory() as folder:
+            begin_folder(config, [], Path(folder) / "set")
+            stages, start = Stages(), time.perf_counter()
+            with stages.watching(n_samples):
+                _complete(Path(folder) / "set", workers=1)
+            wall.append(time.perf_counter() - start)
+            found.append(stages)
+    best = min(found, key=lambda stages: sum(stages.seconds.values()))
+    best.separate_low_pass(precision, len(config["sensing"]["channels"]), runs)
+    spent = {name: best.seconds[name] / n_records * 1e3 for name in STAGES}
+    total, integration = sum(spent.values()), sum(spent[name] for name in INTEGRATION)
+    for_twins = (1.0 - n_records / best.n_runs) * (spent[EQUATIONS] + integration + spent[LOW_PASS])
+    return {
+        **{f"{name}, ms a record": value for name, value in spent.items()},
+        "all, ms a record": total,
+        "of which for the healthy twins that noise is set by": for_twins,
+        "share of integration": integration / total,
+        "share of mesh tables": spent[TABLES] / total,
+        "share of low-pass": spent[LOW_PASS] / total,
+        "share of noise and labels": spent[NOISE] / total,
+        "share of HDF5 writing": spent[WRITING] / total,
+        "runs a record: itself and its part of a healthy twin": best.n_runs / n_records,
+        "runs made again at half the step, a record": best.n_repeated / n_records,
+        "records per core-s": 1e3 / total,
+        wall_name(1): n_records / min(wall),
+    }
+
+
+def wall_name(workers: int) -> str:
+    """Name of the figure of so many workers."""
+    return f"records a second of wall time, {workers} worker{'s' if workers > 1 else ''}"
+
+
+def wall_rates(precision: str, workers: int, runs: int) -> dict[str, float]:
+    """Records a second of wall time: once every worker has finished its first shard, and of the whole data set."""
+    n_shards = SHARDS_A_WORKER * workers
+    config, whole, running = data_set(precision, n_shards), [], []
+    for _ in range(runs):
+        with tempfile.TemporaryDirectory() as folder:
+            begin_folder(config, [], Path(folder) / "set")
+            start = time.perf_counter()
+            ends = _complete(Path(folder) / "set", workers=workers)
+            whole.append(n_shards * SHARD / (time.perf_counter() - start))
+        running.append((n_shards - workers) * SHARD / (ends[-1] - ends[workers - 1]))
+    return {wall_name(workers): max(running), f"{wall_name(workers)}, with their start": max(whole)}
+
+
+def _complete(out: Path, *, workers: int) -> list[float]:
+    """Make every shard; the times at which they were finished."""
+    ends: list[float] = []
+    executor = LocalExecutor(n_workers=workers)
+    n_failed, problems = run_folder(out, executor=executor, on_shard=lambda _: ends.append(time.perf_counter()))
+    if n_failed or problems:
+        raise AssertionError(f"{n_failed} records failed, problems: {problems}")
+    return ends

@@ -1,0 +1,143 @@
+"""What becomes of a mutant: everything that reads is tried, in a process whose death, delay and hunger are seen."""
+
+from __future__ import annotations
+
+import json
+import multiprocessing
+import resource
+import shutil
+from collections.abc import Callable, Iterator
+from dataclasses import dataclass
+from multiprocessing.connection import Connection
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+
+from benchmarks._mutants import Mutant, mutate
+from gensig.dataset.index import open_index
+from gensig.dataset.inspection import inspect
+from gensig.dataset.layout import read_manifest
+from gensig.dataset.reader import open_dataset
+from gensig.dataset.verify import verify
+from gensig.errors import DatasetError
+
+METHOD = "spawn"
+TIME_LIMIT = 60.0  # s a mutant, on a machine that does other things too
+MEMORY_LIMIT = 400 * 1024**2  # bytes a mutant may add; the sets are far below 1 MB
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class Verdict:
+    """One mutant: ``fault`` is empty where gensig behaved, else what it did."""
+
+    seed: int
+    kind: str
+    fault: str
+    noticed: bool
+
+
+def judge(folder: Path, mutant: Mutant, whole: dict[str, Any]) -> tuple[str, bool]:
+    """The fault ('' for none), and whether anything refused or named the change."""
+    lines: list[str] = []
+    faults: list[str] = []
+
+    def attempt(name: str, work: Callable[[], Any]) -> bool:
+        try:
+            work()
+        except DatasetError as error:
+            lines.append(str(error))
+            return False
+        except Exception as error:
+            faults.append(f"{name}: {type(error).__name__}: {str(error)[:200]}")
+        return True
+
+    checked = attempt("verify", lambda: lines.extend(verify(folder).problems))
+    attempt("verify --quick", lambda: verify(folder, quick=True))
+    attempt("inspect", lambda: inspect(folder))
+    attempt("open_index", lambda: open_index(folder).close())
+    read = attempt("read", lambda: _read_all(folder))
+    for path in sorted((folder / "shards").iterdir()):
+        attempt("inspect a shard", lambda path=path: inspect(path))
+    if any("\n" in line for line in lines):
+        faults.append("a message of more than one line")
+    if mutant.refused and read:
+        faults.append("read without complaint what must be refused")
+    if any((folder / name).exists() or (folder.parent / name).exists() for name in ("evil", "evil.wav")):
+        faults.append("wrote a file")
+    noticed = bool(lines) or not checked
+    if not noticed and not mutant.forged and _meaning(folder) != whole:
+        faults.append("accepted in silence")
+    return "; ".join(faults), noticed
+
+
+def _read_all(folder: Path) -> None:
+    with open_dataset(folder, allow_incomplete=True) as data:
+        for name in data.column_names:
+            values = data.column(name)
+            if len(values) != data.n_records or values.dtype.kind not in "Uif":
+                raise TypeError(f"column {name} has type {values.dtype} and {len(values)} rows")
+        for index in range(data.n_records):
+            for name in data.signal_names:
+                block = data.signals(index, name=name)
+                if block.dtype != np.float32 or block.shape != (len(data.channel_names), data.n_samples):
+                    raise TypeError(f"{name} has type {block.dtype} and shape {block.shape}")
+        len(data.where(speed_rpm=(0, 1e4)))
+        if len(data.plan_table) != data.n_records:
+            raise TypeError("the plan has another length")
+        for protocol in data.protocols:
+            data.split(protocol)
+
+
+def _meaning(folder: Path) -> dict[str, Any]:
+    """What a manifest says, less what decides nothing."""
+    content = json.loads((folder / "manifest.json").read_text(encoding="utf-8"))
+    known = read_manifest(folder).__slots__
+    return {name: value for name, value in content.items() if name in known and name != "environment"}
+
+
+def _work(template: Path, scratch: Path, seeds: range, pipe: Connection) -> None:
+    resource.setrlimit(resource.RLIMIT_CORE, (0, 0))
+    whole = _meaning(template)
+    for seed in seeds:
+        folder = scratch / f"mutant-{seed}" / "set"
+        shutil.copytree(template, folder)
+        mutant = mutate(folder, seed)
+        pipe.send((seed, mutant.kind, None, False))
+        before = resource.getrusage(resource.RUSAGE_SELF).ru_maxrss
+        fault, noticed = judge(folder, mutant, whole)
+        grown = (resource.getrusage(resource.RUSAGE_SELF).ru_maxrss - before) * 1024
+        if grown > MEMORY_LIMIT:
+            fault += f"; took {grown} bytes of memory"
+        pipe.send((seed, mutant.kind, fault, noticed))
+        shutil.rmtree(folder.parent)
+
+
+def verdicts(template: Path, scratch: Path, seeds: range) -> Iterator[Verdict]:
+    """A verdict a seed; a process that dies or hangs is one too, and another takes over behind it."""
+    context = multiprocessing.get_context(METHOD)
+    while len(seeds):
+        here, there = context.Pipe(duplex=False)
+        worker = context.Process(target=_work, args=(template, scratch, seeds, there))
+        worker.start()
+        there.close()
+        seed, kind, fault = seeds[0], "not begun", "died"
+        while True:
+            try:
+                if not here.poll(TIME_LIMIT):
+                    fault = f"hung for {TIME_LIMIT:g} s"
+                    break
+                seed, kind, outcome, noticed = here.recv()
+            except EOFError:
+                break
+            if outcome is not None:
+                yield Verdict(seed=seed, kind=kind, fault=outcome, noticed=noticed)
+                seeds = range(seed + 1, seeds.stop)
+                if not len(seeds):
+                    worker.join()
+                    return
+        worker.kill()
+        worker.join()
+        fault = fault if fault != "died" else f"died, exit status {worker.exitcode}"
+        yield Verdict(seed=seeds[0], kind=kind, fault=fault, noticed=False)
+        seeds = range(seeds[0] + 1, seeds.stop)

@@ -1,0 +1,57 @@
+"""What all benchmarks share: the machine by name, the least of several runs, and where figures go."""
+
+from __future__ import annotations
+
+import json
+import os
+import time
+from collections.abc import Callable, Mapping
+from pathlib import Path
+from typing import Any
+
+from llvmlite.binding import get_host_cpu_name
+
+from gensig.dataset.environment import environment
+
+Figures = Mapping[str, Mapping[str, float]]  # section: name: value
+
+
+def machine() -> dict[str, Any]:
+    """Processor, cores, how busy they are already, and the versions of what runs."""
+    usable = len(os.sched_getaffinity(0)) if hasattr(os, "sched_getaffinity") else os.cpu_count()
+    load = round(os.getloadavg()[0], 2) if hasattr(os, "getloadavg") else None
+    return {**environment(), "cpu_target": get_host_cpu_name(), "cores": usable, "load_at_start": load}
+
+
+def print_machine(found: Mapping[str, Any]) -> None:
+    """One line of the machine, one of the versions, and a warning where others keep it busy."""
+    print(
+        f"{found['cpu_model']} ({found['cpu_target']}), {found['cores']} cores, load {found['load_at_start']} at start"
+    )
+    print(", ".join(f"{name} {found[name]}" for name in ("python", "numpy", "numba", "scipy", "h5py", "gensig")))
+    if (found["load_at_start"] or 0.0) > 0.5:
+        print("This machine is busy with something else: all rates are too low, ratios are rough.")
+
+
+def least(work: Callable[[], Any], runs: int) -> float:
+    """Least CPU time of several runs, s."""
+    found = []
+    for _ in range(runs):
+        start = time.process_time()
+        work()
+        found.append(time.process_time() - start)
+    return min(found)
+
+
+def print_figures(section: str, values: Mapping[str, float], *columns: Callable[[float], str]) -> None:
+    """One section of a table; further columns are functions of the value."""
+    print(f"\n{section}")
+    for name, value in values.items():
+        cells = "".join(f"{column(value):>20}" for column in columns)
+        print(f"  {name:<64}{value:>12.4g}{cells}")
+
+
+def write_json(path: str | None, named: Mapping[str, Any], figures: Figures) -> None:
+    """The machine and the figures, to compare runs by; no file without a path."""
+    if path:
+        Path(path).write_text(json.dumps({"machine": named, **figures}, indent=1) + "\n", encoding="utf-8")

@@ -1,0 +1,159 @@
+"""Simulated seconds per second of one core: the compiled core, scalar Numba, and scipy on the same equations."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+from scipy.integrate import solve_ivp
+
+from benchmarks import _scalar
+from benchmarks._measure import least
+from gensig.config import read_request
+from gensig.dynamics import _kernels, integrator
+from gensig.dynamics._layout import N_LAW
+from gensig.dynamics._vector import LANES, n_lanes
+from gensig.dynamics.decimation import decimator, in_band_error
+from gensig.dynamics.lanes import pack
+from gensig.dynamics.pair import PairDynamics
+from gensig.planning import make_plan
+from gensig.records import _row_run, _row_values, record_system
+
+Array = NDArray[np.float64]
+
+SAMPLING_RATE = 51200.0
+CHANNELS = np.arange(4)  # x and y of both gears
+SETTLING, TIMED = 0.02, 0.1  # s
+PER_CALL = 1280  # steps, so that what is stored stays in the cache
+SAME_OVERSAMPLING, SAME = 16, 1e-3  # steps per sample at which both codes must agree, and how well
+SCIPY = ("RK45", "DOP853", "LSODA")
+SCIPY_SECONDS, SCIPY_RTOL, SCIPY_ATOL = 0.01, 1e-6, 1e-12
+
+
+def quickstart(n_records: int, *words: str) -> tuple[dict[str, Any], list[dict[str, Any]]]:
+    """Configuration and first rows of the quickstart experiment: four classes, each record its own fault and load."""
+    config = read_request(["experiment=quickstart", f"plan.n_records={n_records}", *words]).config
+    plan = make_plan(config)
+    return config, [plan.record(place) for place in range(n_records)]
+
+
+def machines(*words: str, n: int = n_lanes("float32")) -> list[PairDynamics]:
+    """The machines of as many quickstart records."""
+    config, rows = quickstart(n, *words)
+    return [_row_run(config, record_system(config, _row_values(row)), row).dynamics() for row in rows]
+
+
+def kernel_rate(lanes: list[PairDynamics], oversampling: int, precision: str, runs: int) -> float:
+    """The product's integrator with the mean accelerations of four channels, tables already packed."""
+    step = 1.0 / (SAMPLING_RATE * oversampling)
+    group, n_settling = pack(lanes, step, precision), round(SETTLING / step)
+    settled = integrator._Run(integrator.fill_lanes(lanes, precision), CHANNELS, precision)
+    for lane, dynamics in enumerate(integrator.fill_lanes(lanes, precision)):
+        settled.begin(group, lane, dynamics.static_start(0.0))
+    settled.advance(group, step, 0, n_settling)
+    n_calls = round(TIMED / step / PER_CALL)
+    means, nothing = np.empty(PER_CALL * len(CHANNELS) * settled.n_lanes, dtype=precision), np.empty(0)
+
+    def work() -> None:
+        run = settled.again()
+        state = run.state.ravel()
+        for call in range(n_calls):
+            _kernels.integrate(
+                group, state, run.lost, run.fresh, step, n_settling + call * PER_CALL, PER_CALL, CHANNELS, means, 0,
+                nothing, -1, 1, run.work, run.wide, run.near,
+            )  # fmt: skip
+            run.fresh[:] = 0.0
+
+    return len(lanes) * n_calls * PER_CALL * step / least(work, runs)
+
+
+def scalar_run(dynamics: PairDynamics, oversampling: int, seconds: float) -> tuple[Array, Array]:
+    """State (2, dof) and mean accelerations (step, channel) of the scalar code, from rest at time 0."""
+    step = 1.0 / (SAMPLING_RATE * oversampling)
+    state = np.array([dynamics.static_start(0.0), np.zeros(len(dynamics.dofs))])
+    means = np.empty((round(seconds / step), len(CHANNELS)))
+    machine = _scalar.machine(dynamics)
+    lowest = _scalar.integrate(machine, state, step, 0, len(means), CHANNELS, means)
+    if lowest < -machine.mesh.backlash:
+        raise ValueError(f"the approach fell to {lowest:.3g} m, to the back flanks, which the scalar code has not")
+    return state, means
+
+
+def scalar_rate(all_of: list[PairDynamics], oversampling: int, runs: int) -> float:
+    """Scalar Numba, one record after the other, with the same four channels."""
+    step, spent = 1.0 / (SAMPLING_RATE * oversampling), 0.0
+    means = np.empty((round(TIMED / step), len(CHANNELS)))
+    for dynamics in all_of:
+        machine, (settled, _) = _scalar.machine(dynamics), scalar_run(dynamics, oversampling, SETTLING)
+        first = round(SETTLING / step)
+
+        def work(machine: Any = machine, settled: Array = settled, first: int = first) -> None:
+            _scalar.integrate(machine, settled.copy(), step, first, len(means), CHANNELS, means)
+
+        spent += least(work, runs)
+    return len(all_of) * len(means) * step / spent
+
+
+def difference(all_of: list[PairDynamics], oversampling: int) -> float:
+    """Largest relative difference of both codes' accelerations, 20 Hz to 20 kHz, over 20 ms from the same start."""
+    step, low_pass = 1.0 / (SAMPLING_RATE * oversampling), decimator(oversampling)
+    n_steps = (round(SETTLING * SAMPLING_RATE) + 2 * low_pass.margin) * oversampling + 1
+    group, run = pack(all_of, step), integrator._Run(all_of, CHANNELS, "float64")
+    for lane, dynamics in enumerate(all_of):
+        run.begin(group, lane, dynamics.static_start(0.0))
+    ours = np.empty((n_steps, len(CHANNELS), LANES))
+    _kernels.integrate(
+        group, run.state.ravel(), run.lost, run.fresh, step, 0, n_steps, CHANNELS, ours.ravel(), 0, np.empty(0), -1, 1,
+        run.work, run.wide, run.near,
+    )  # fmt: skip
+    theirs = np.stack([scalar_run(one, oversampling, n_steps * step)[1] for one in all_of], axis=-1)
+    return float(in_band_error(low_pass.apply(theirs), low_pass.apply(ours), SAMPLING_RATE).max())
+
+
+def check_same_law(all_of: list[PairDynamics]) -> float:
+    """The difference at a step fine enough for either, refused where it is none of the step's."""
+    found = difference(all_of, SAME_OVERSAMPLING)
+    if not found < SAME:
+        raise AssertionError(f"scalar code and compiled core differ by {found:.2g} at x{SAME_OVERSAMPLING}: two laws")
+    return found
+
+
+def scipy_rates(dynamics: PairDynamics, runs: int) -> dict[str, float]:
+    """``solve_ivp`` at rtol 1e-6 from a settled state on, by method.
+
+    The right-hand side is the scalar code, compiled whole with the machine in it; once more it is NumPy around the
+    product's own compiled law, as one would write it without.
+    """
+    settled = scalar_run(dynamics, SAME_OVERSAMPLING, SETTLING)[0].ravel()
+    compiled, plain = _scalar.right_hand_side(_scalar.machine(dynamics)), _numpy_right_hand_side(dynamics)
+    if not np.allclose(compiled(SETTLING, settled), plain(SETTLING, settled), rtol=1e-6, atol=1e-6):
+        raise AssertionError("the right-hand sides given to solve_ivp differ: two laws")
+
+    def rate(slope: Callable[[float, Array], Array], method: str) -> float:
+        span = (SETTLING, SETTLING + SCIPY_SECONDS)
+        given = {"method": method, "rtol": SCIPY_RTOL, "atol": SCIPY_ATOL}
+        return SCIPY_SECONDS / least(lambda: solve_ivp(slope, span, settled, **given), runs)
+
+    found = {f"solve_ivp {method}, right-hand side compiled": rate(compiled, method) for method in SCIPY}
+    return {**found, "solve_ivp RK45, NumPy around the compiled law": rate(plain, "RK45")}
+
+
+def _numpy_right_hand_side(dynamics: PairDynamics) -> Callable[[float, Array], Array]:
+    group, system, direction = pack([dynamics], 1e-6), dynamics.system(), dynamics.approach_direction()
+    n_dof, scratch = len(system.mass), _kernels.scratch(len(system.mass), 0)
+    motion, found = np.empty((4, LANES)), np.empty((N_LAW, LANES))
+    radius, speed = dynamics.table.pair.pinion.base_radius, dynamics.operating.speed
+
+    def slope(time: float, state: Array) -> Array:
+        q, v = state[:n_dof], state[n_dof:]
+        roll = dynamics.start_roll + radius * (speed * time + q[2])
+        motion[:] = np.array([roll, direction @ q, direction @ v, radius * (speed + v[2])])[:, None]
+        _kernels.law_at(group, motion.ravel(), *scratch, found.ravel())
+        normal, friction, moment_p, moment_w, along = found[:5, 0]
+        force = system.force - system.stiffness @ q - system.damping @ v - normal * direction
+        force[:6] += friction, 0.0, moment_p + radius * along, -friction, 0.0, moment_w
+        return np.concatenate([v, force / system.mass])
+
+    return slope

@@ -1,0 +1,145 @@
+"""Where the CPU time of ``gensig generate`` goes: the product's own functions, each with a clock around it."""
+
+from __future__ import annotations
+
+import functools
+import time
+from collections.abc import Callable, Iterator
+from contextlib import ExitStack, contextmanager
+from typing import Any
+from unittest import mock
+
+import numpy as np
+
+from benchmarks._measure import least
+from gensig import generation, records
+from gensig.dataset.shard import ShardWriter
+from gensig.dynamics import _kernels, integrator
+from gensig.dynamics.decimation import Decimator, decimator
+from gensig.systems import spur_pair
+
+PLAN, TABLES, EQUATIONS = "machine and plan row", "mesh tables", "equations and packing"
+SETTLING, RECORDING, CHECKING = "integration: settling", "integration: recording", "integration: error check"
+LOW_PASS, NOISE, WRITING, OTHER = "low-pass", "noise and labels", "HDF5 writing", "other"
+INTEGRATION = (SETTLING, RECORDING, CHECKING)
+STAGES = (PLAN, TABLES, EQUATIONS, *INTEGRATION, LOW_PASS, NOISE, WRITING, OTHER)
+CLOCKED: tuple[tuple[Any, str, str], ...] = (
+    (generation, "read_plan", PLAN),
+    (records, "record_system", PLAN),
+    (records, "_row_run", PLAN),
+    (records, "_twin_run", PLAN),
+    (spur_pair, "_mesh_table", TABLES),
+    (spur_pair.Run, "dynamics", EQUATIONS),
+    (spur_pair, "settling_oversampling", EQUATIONS),
+    (integrator, "settling_time", EQUATIONS),
+    (integrator, "pack", EQUATIONS),
+    (integrator.PairDynamics, "static_start", EQUATIONS),
+    (integrator._Run, "advance", SETTLING),
+    (integrator._Run, "record", RECORDING),
+    (spur_pair, "_checks", CHECKING),
+    (records, "_finish", NOISE),
+    (generation, "open_shard", WRITING),
+    (ShardWriter, "__enter__", WRITING),
+    (ShardWriter, "write", WRITING),
+    (ShardWriter, "__exit__", WRITING),
+)
+
+
+class Stages:
+    """CPU seconds by stage, each without what it calls of other stages, and how much there was to do.
+
+    ``n_samples`` counts rows of output samples by oversampling; ``n_runs`` the records, twins and repetitions.
+    """
+
+    def __init__(self) -> None:
+        self.seconds = dict.fromkeys(STAGES, 0.0)
+        self.n_samples: dict[tuple[int, str], int] = {}
+        self.n_runs = self.n_repeated = 0
+        self._open: list[str] = []
+        self._since = time.process_time()
+
+    @contextmanager
+    def stage(self, name: str) -> Iterator[None]:
+        """What runs inside belongs to this stage."""
+        self._turn()
+        self._open.append(name)
+        try:
+            yield
+        finally:
+            self._turn()
+            self._open.pop()
+
+    def _turn(self) -> None:
+        now = time.process_time()
+        self.seconds[self._open[-1] if self._open else OTHER] += now - self._since
+        self._since = now
+
+    @contextmanager
+    def watching(self, n_whole: int) -> Iterator[None]:
+        """Clock the product's functions; recordings of fewer samples than ``n_whole`` are those of the error check."""
+        counted = self._counted(spur_pair.simulate_together)
+        with ExitStack() as patches:
+            for owner in (spur_pair, records):
+                patches.enter_context(mock.patch.object(owner, "simulate_together", counted))
+            for owner, name, stage in CLOCKED:
+                clocked = self._clocked(getattr(owner, name), stage, n_whole)
+                patches.enter_context(mock.patch.object(owner, name, clocked))
+            with self.stage(OTHER):
+                yield
+
+    def _counted(self, simulate: Callable[..., Any]) -> Callable[..., Any]:
+        depth = [0]
+
+        @functools.wraps(simulate)
+        def counted(runs: Any) -> Any:
+            if depth[0]:
+                self.n_repeated += len(runs)
+            else:
+                self.n_runs += len(runs)
+            depth[0] += 1
+            try:
+                return simulate(runs)
+            finally:
+                depth[0] -= 1
+
+        return counted
+
+    def _clocked(self, function: Callable[..., Any], stage: str, n_whole: int) -> Callable[..., Any]:
+        @functools.wraps(function)
+        def clocked(*given: Any, **named: Any) -> Any:
+            name = stage
+            if stage == RECORDING:
+                low_pass, n_samples = _low_pass_of(*given, **named)
+                name = RECORDING if n_samples == n_whole else CHECKING
+                key = low_pass.oversampling, name
+                self.n_samples[key] = self.n_samples.get(key, 0) + n_samples
+            with self.stage(name):
+                return function(*given, **named)
+
+        return clocked
+
+    def separate_low_pass(self, precision: str, n_channels: int, runs: int) -> None:
+        """Move what the low-pass costs from the integration, in which it is compiled, to its own stage."""
+        for (oversampling, stage), n_samples in self.n_samples.items():
+            spent = n_samples * low_pass_seconds(oversampling, precision, n_channels, runs)
+            self.seconds[stage] -= spent
+            self.seconds[LOW_PASS] += spent
+
+
+def _low_pass_of(_run: Any, _group: Any, _step: float, low_pass: Decimator, n_samples: int) -> tuple[Decimator, int]:
+    return low_pass, n_samples
+
+
+def low_pass_seconds(oversampling: int, precision: str, n_channels: int, runs: int) -> float:
+    """CPU seconds of the low-pass for one output sample of a whole group, block by block as in the product."""
+    low_pass, block = decimator(oversampling), _kernels.BLOCK
+    width = n_channels * _kernels.n_lanes(precision)
+    means = np.zeros(_kernels.mean_rows(len(low_pass.taps), oversampling) * width, dtype=precision)
+    out, again = np.empty(block * width, dtype=precision), 50
+
+    def work() -> None:
+        for _ in range(again):
+            _kernels.low_pass(means, 0, low_pass.taps, oversampling, n_channels, block, out, 0)
+
+    work()
+    return least(work, runs) / (again * block)

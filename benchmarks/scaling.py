@@ -1,0 +1,184 @@
+"""What cost and memory grow with: ``python -m benchmarks.scaling``.
+
+CPU seconds of one core, the least of several runs, against the duration of records, their number, the number of
+distinct teeth, and the degrees of freedom; peak memory of the process that makes a data set, against its size.
+``--json FILE`` writes the figures.
+"""
+
+from __future__ import annotations
+
+import argparse
+import json
+import subprocess
+import sys
+import time
+from collections.abc import Callable, Sequence
+from dataclasses import replace
+from functools import partial
+
+import numpy as np
+
+from benchmarks._measure import least, machine, print_machine, write_json
+from gensig.config import read_request
+from gensig.dynamics._vector import LANES
+from gensig.errors import SimulationError
+from gensig.faults.registry import read_faults
+from gensig.systems import spur_pair
+from gensig.systems.registry import read_system
+from gensig.systems.spur_pair import Run, Start, simulate_together
+
+DURATIONS = (0.05, 0.16, 0.5, 1.6, 5.0, 16.0, 50.0)  # s
+COUNTS = (8, 80, 800, 8000)  # records
+# without twins, whose number depends on how records fall into shards, and with little settling
+SHORT = (
+    "operating.duration_s=0.02",
+    "operating.drive_frequency_hz=50",
+    "sensing.channels=[pinion_y]",
+    "sensing.snr_reference=record",
+    "plan.n_units=4",
+)
+LONG, LONG_COUNTS = ("operating.duration_s=1",), (32, 160, 320)
+TEETH = (1, 2, 4, 8, 16, 23)
+ROTORS = {6: (), 7: ("system.motor.inertia_kg_m2=1e-3",)}
+ROTORS[8] = (*ROTORS[7], "system.load.inertia_kg_m2=1e-2")
+# makes a data set in a process of its own; tells CPU seconds, from the plan to the last byte, and its peak memory
+WORKER = """
+import json, resource, sys, tempfile, time
+from pathlib import Path
+from gensig.config import read_request
+from gensig.execution.local import LocalExecutor
+from gensig.generation import begin_folder, run_folder
+def spent(n_records, out):
+    request = read_request([*sys.argv[2:], f"plan.n_records={n_records}"])
+    begun = time.process_time()
+    begin_folder(request.config, request.overrides, out)
+    n_failed, problems = run_folder(out, executor=LocalExecutor(n_workers=1), on_shard=lambda _: None)
+    assert not (n_failed or problems), problems
+    return time.process_time() - begun
+with tempfile.TemporaryDirectory() as folder:
+    spent(4, Path(folder) / "warm")
+    told = spent(int(sys.argv[1]), Path(folder) / "set")
+peak = resource.getrusage(resource.RUSAGE_SELF).ru_maxrss * (1 if sys.platform == "darwin" else 1024)
+print(json.dumps([told, peak]))
+"""
+
+
+def side_by_side(*words: str, channels: str = "[pinion_y]") -> list[Run]:
+    """A group's records of one machine, each from a start of its own."""
+    config = read_request([f"sensing.channels={channels}", *words]).config
+    system, faults = read_system(config), tuple(read_faults(config["fault"]))
+    starts = [Start(tooth_pinion=lane, tooth_wheel=lane, phase=0.0) for lane in range(LANES)]
+    return [Run(system=system, faults=faults, start=start) for start in starts]
+
+
+def simulate(runs: Sequence[Run]) -> None:
+    """Simulate, and refuse what failed."""
+    for record in simulate_together(runs):
+        if isinstance(record, SimulationError):
+            raise record
+
+
+def against_duration(runs: int) -> dict[str, float]:
+    """CPU seconds of a group by duration, and how far from a straight line with a constant for the settling."""
+    found, group = [], side_by_side()
+    simulate(group)
+    for duration in DURATIONS:
+        operating = replace(group[0].system.operating, duration=duration)
+        timed = [replace(run, system=replace(run.system, operating=operating)) for run in group]
+        found.append(least(partial(simulate, timed), runs if duration < 5.0 else 1))
+    values = dict(zip((f"{duration:g} s" for duration in DURATIONS), found, strict=True))
+    return {**values, **straight("second", DURATIONS, found, LANES)}
+
+
+def straight(unit: str, sizes: Sequence[float], found: Sequence[float], per: int = 1) -> dict[str, float]:
+    """Constant and slope of the line through measured costs, and the largest relative distance from it."""
+    x, y = np.asarray(sizes, dtype=np.float64), np.asarray(found)
+    (constant, slope), *_ = np.linalg.lstsq(np.stack([1.0 / y, x / y], axis=1), np.ones_like(y), rcond=None)
+    return {
+        f"straight line through all: for no {unit}, ms": constant / per * 1e3,
+        f"straight line through all: for each {unit} more, ms": slope / per * 1e3,
+        "largest distance from that line, %": 100.0 * float(np.abs((constant + slope * x) / y - 1.0).max()),
+    }
+
+
+def against_number(runs: int) -> tuple[dict[str, float], dict[str, float]]:
+    """CPU milliseconds a record and peak memory in MB, by the number of records of a data set."""
+    cost, memory, found = {}, {}, []
+    for n_records in COUNTS:
+        told = [in_own_process(n_records, *SHORT) for _ in range(runs if n_records < 1000 else 1)]
+        found.append(min(spent for spent, _ in told))
+        cost[f"{n_records} short records"] = found[-1] / n_records * 1e3
+        memory[f"{n_records} short records"] = max(peak for _, peak in told) / 1e6
+    cost |= straight("record", COUNTS, found)
+    for n_records in LONG_COUNTS:
+        spent, peak = in_own_process(n_records, *LONG)
+        cost[f"{n_records} records of 1 s and four channels"] = spent / n_records * 1e3
+        memory[f"{n_records} records of 1 s and four channels"] = peak / 1e6
+    return cost, memory
+
+
+def in_own_process(n_records: int, *words: str) -> tuple[float, float]:
+    """CPU seconds of one quickstart data set with compiled code loaded, and the process's peak memory in bytes."""
+    given = [sys.executable, "-c", WORKER, str(n_records), "experiment=quickstart", "dataset.records_per_shard=null"]
+    told = subprocess.run([*given, *words], check=True, capture_output=True, text=True).stdout
+    spent, peak = json.loads(told.splitlines()[-1])
+    return spent, peak
+
+
+def against_teeth(runs: int) -> tuple[dict[str, float], dict[str, float]]:
+    """CPU milliseconds of a table, and of a group's second without it, by the number of pitted pinion teeth."""
+    tables, motion = {}, {}
+    for n_teeth in TEETH:
+        teeth = list(range(n_teeth))
+        group = side_by_side("operating.duration_s=0.2", "fault=distributed_pitting", f"fault.tooth={teeth}")
+
+        def table(group: list[Run] = group) -> None:
+            spur_pair._mesh_table.cache_clear()
+            group[0].dynamics()
+
+        table()
+        simulate(group)
+        name = f"{n_teeth} distinct pitted {'tooth' if n_teeth == 1 else 'teeth'}"
+        tables[name] = least(table, runs) * 1e3
+        motion[name] = least(partial(simulate, group), runs) / LANES * 1e3
+    return {**tables, **straight("tooth", TEETH, [value / 1e3 for value in tables.values()])}, motion
+
+
+def against_freedom(runs: int) -> dict[str, float]:
+    """CPU milliseconds a record of 1 s by degrees of freedom: with a motor, and with a load too."""
+    found = {}
+    for n_dof, words in ROTORS.items():
+        group = side_by_side("operating.duration_s=1", *words, channels="[pinion_x,pinion_y,wheel_x,wheel_y]")
+        simulate(group)
+        found[f"{n_dof} degrees of freedom"] = least(partial(simulate, group), runs) / LANES * 1e3
+    return found
+
+
+def main() -> None:
+    """Measure and print."""
+    parser = argparse.ArgumentParser(prog="python -m benchmarks.scaling", description=__doc__.split("\n")[0])
+    parser.add_argument("--runs", type=int, default=3, help="the least of so many (default 3)")
+    parser.add_argument("--json", help="also write the figures to this file")
+    arguments = parser.parse_args()
+    named, begun = machine(), time.perf_counter()
+    print_machine(named)
+    sections: dict[str, dict[str, float]] = {}
+
+    def show(measure: Callable[[int], dict[str, float] | tuple[dict[str, float], ...]], *titles: str) -> None:
+        found = measure(arguments.runs)
+        for title, values in zip(titles, found if isinstance(found, tuple) else (found,), strict=True):
+            sections[title] = values
+            print(f"\n{title}")
+            for name, value in values.items():
+                print(f"  {name:<64}{value:>12.4g}", flush=True)
+
+    show(against_duration, f"duration of {LANES} records, one channel: CPU s")
+    show(against_freedom, "degrees of freedom, 1 s and four channels: CPU ms a record")
+    show(against_teeth, "distinct teeth: CPU ms of a table", "distinct teeth: CPU ms a record of 0.2 s, table known")
+    show(against_number, "number of records: CPU ms a record", "number of records: peak memory of the process, MB")
+    print(f"\n{time.perf_counter() - begun:.0f} s")
+    write_json(arguments.json, named, sections)
+
+
+if __name__ == "__main__":
+    main()

@@ -1,0 +1,80 @@
+"""What every executor promises: a job is run for each shard, and what came of it is told as it comes."""
+
+from __future__ import annotations
+
+import os
+from abc import ABC, abstractmethod
+from collections.abc import Callable, Iterator, Sequence
+from dataclasses import dataclass
+from typing import Any, TypeVar
+
+from gensig.errors import ConfigError
+
+T = TypeVar("T")
+
+TRIES = 3  # times a shard is begun before the death of its worker is held against it
+THREAD_VARIABLES = ("OMP_NUM_THREADS", "OPENBLAS_NUM_THREADS", "MKL_NUM_THREADS", "NUMBA_NUM_THREADS")
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class ShardFailure:
+    """What is left of a shard whose worker died or whose job raised."""
+
+    reason: str
+
+
+class Executor(ABC):
+    """Where shards are computed; it decides no bit of them.
+
+    Attributes
+    ----------
+    closes : bool    True where one call makes every shard, so that the data set can be closed afterwards
+    """
+
+    closes = True
+
+    @abstractmethod
+    def run(self, job: Callable[[int], T], shard_indices: Sequence[int]) -> Iterator[tuple[int, T | ShardFailure]]:
+        """Run ``job`` for the shards and yield each shard's number and result as they come.
+
+        ``job`` must be picklable and safe to run twice. An exception that it raises is yielded as a failure and not
+        tried again, because it would come again; a worker that dies is replaced, and the shard that it had in hand is
+        begun again, up to ``TRIES`` times in all.
+        """
+
+    def share(self, shard_indices: Sequence[int]) -> list[int]:
+        """The shards that ``run`` makes of those given."""
+        return list(shard_indices)
+
+    @property
+    @abstractmethod
+    def n_processes(self) -> int:
+        """Shards that are made at a time."""
+
+
+def guarded(job: Callable[[int], T], index: int) -> T | ShardFailure:
+    """Run a job; an exception becomes a failure of one line."""
+    try:
+        return job(index)
+    except Exception as error:
+        return ShardFailure(reason=one_line(error))
+
+
+def one_line(error: BaseException) -> str:
+    """Kind and message of an error."""
+    return " ".join(f"{type(error).__name__}: {error}".split())
+
+
+def read_n_workers(requested: Any) -> int:
+    """Number of worker processes: as asked, else one a usable core."""
+    if requested is None:
+        return len(os.sched_getaffinity(0)) if hasattr(os, "sched_getaffinity") else os.cpu_count() or 1
+    return whole_number("n_workers", requested, at_least=1)
+
+
+def whole_number(key: str, value: Any, *, at_least: int) -> int:
+    """Check a whole number among the keys of ``executor``."""
+    if isinstance(value, bool) or not isinstance(value, int) or value < at_least:
+        null = ", or null" if key == "n_workers" else ""
+        raise ConfigError(f"executor.{key} = {value!r} must be a whole number of at least {at_least}{null}")
+    return value

@@ -1,0 +1,77 @@
+"""How large a data set will be and how long it will take, from a few records made now."""
+
+from __future__ import annotations
+
+import math
+import tempfile
+import time
+from collections import Counter
+from collections.abc import Mapping
+from pathlib import Path
+from typing import Any
+
+from gensig.dataset.plan import Plan, plan_text
+from gensig.execution.base import read_n_workers
+from gensig.generation import block_length, open_shard
+from gensig.planning import make_plan
+from gensig.records import Record, forget_twins, simulate_records
+
+N_INDEXED = 2600  # bytes of index.h5 for each shard, of all its columns
+
+
+def predict(config: Mapping[str, Any]) -> dict[str, str]:
+    """Facts of a data set that is not made yet, by name, as text.
+
+    A block of its first records is simulated and stored in a temporary folder. Time is that of a machine like this one
+    with as many workers; start-up is counted for the workers of this machine.
+    """
+    started = time.process_time()  # what a process spends before its first record
+    table = make_plan(config)
+    first = table.rows(0)[: block_length(config)]
+    probe = [table.record(int(index)) for index in first]
+    begin = time.monotonic()
+    simulate_records(config, probe[:1])  # compiles, or loads what was compiled
+    workers = min(_n_processes(config), table.n_shards)
+    # Workers import once more what this process has imported, and load what was compiled.
+    start_up = started * (1 if workers == 1 else 2) + time.monotonic() - begin
+    forget_twins()
+    begin = time.monotonic()
+    records = simulate_records(config, probe)
+    n_bytes = _stored_bytes(config, table, records)
+    seconds = time.monotonic() - begin
+    rounds = math.ceil(table.n_shards / workers)
+    whole = seconds * max(table.shard_sizes()) / len(probe)
+    spread = table.n_records / max(table.shard_sizes()) / workers
+    total = start_up + whole * (rounds if rounds < 2 * spread else spread)
+    classes = Counter(str(name) for name in table.columns["label_name"])
+    return {
+        "records": f"{table.n_records}",
+        "classes": ", ".join(f"{name} {count}" for name, count in classes.items()),
+        "units": f"{len(set(table.columns['unit_id']))}",
+        "conditions": f"{len(set(table.columns['condition_id']))}",
+        "shards": f"{table.n_shards} of at most {max(table.shard_sizes())} records",
+        "bytes": f"{n_bytes:,} ({n_bytes / 1e6:.3g} MB)",
+        "time": f"about {max(1, round(total))} s on {workers} worker(s), from {seconds / len(probe):.3g} s a record "
+        "measured now",
+    }
+
+
+def _n_processes(config: Mapping[str, Any]) -> int:
+    """Shards made at a time, also where the rest of ``executor`` is not known yet."""
+    return read_n_workers(config["executor"]["n_workers"]) * (config["executor"].get("shard_count") or 1)
+
+
+def _stored_bytes(config: Mapping[str, Any], table: Plan, records: list[Record]) -> int:
+    """Bytes of all shards, of plan and index, from two shards of different length."""
+    params = [name.removeprefix("params/") for name in table.columns if name.startswith("params/")]
+    sizes = []
+    with tempfile.TemporaryDirectory() as folder:
+        for n in (1, len(records)):
+            with open_shard(Path(folder) / f"{n}.h5", config, n, params) as writer:
+                for row, record in enumerate(records[:n]):
+                    writer.write(row, record.signals, record.values)
+            sizes.append(writer.n_bytes)
+    one, many = sizes
+    per_record = (many - one) / (len(records) - 1) if len(records) > 1 else one
+    shards = table.n_shards * (one - per_record) + table.n_records * per_record
+    return round(shards + len(plan_text(table)) + N_INDEXED * table.n_shards)

@@ -1,0 +1,248 @@
+"""Kills, Ctrl-C, full disks, closed folders, changed settings: nothing looks whole that is not, and resume mends it."""
+
+import json
+import os
+import resource
+import shutil
+import signal
+import subprocess
+import sys
+import time
+from collections.abc import Callable, Iterator
+from contextlib import contextmanager, suppress
+from pathlib import Path
+
+import pytest
+import yaml
+from small_sets import TINY, contents, make
+
+from gensig.cli import main
+from gensig.dataset.layout import read_manifest, shard_path
+from gensig.dataset.receipts import receipt_path, write_receipt
+from gensig.dataset.verify import verify
+
+ROOT = Path(__file__).parents[2]
+
+
+@pytest.fixture(scope="module")
+def reference(tmp_path_factory: pytest.TempPathFactory) -> Path:
+    return make(tmp_path_factory.mktemp("reference") / "data")
+
+
+@pytest.fixture
+def begun(reference: Path, tmp_path: Path) -> Path:
+    """The reference as an interrupted run leaves it: shards 0 and 1 done, shard 2 unfinished."""
+    out = tmp_path / "data"
+    shutil.copytree(reference, out)
+    content = json.loads((out / "manifest.json").read_text())
+    content["state"] = "incomplete"
+    del content["files"]["index.h5"]
+    for entry in content["shards"][2:]:
+        entry.update(state="planned", sha256="", bytes=0)
+        (out / "shards" / entry["name"]).unlink()
+    (out / "manifest.json").write_text(json.dumps(content))
+    (out / "index.h5").unlink()
+    (out / "shards" / ".shard-00002.h5.99-abc.tmp").write_bytes(b"half of it")
+    assert not verify(out).complete
+    return out
+
+
+def resume(out: Path, *words: str) -> int:
+    """In this process, unless the words choose an executor."""
+    own = () if any(word.startswith("executor") for word in words) else ("--workers", "1")
+    return main(["resume", "--quiet", str(out), *words, *own])
+
+
+def test_killed_at_random_moments_it_ends_byte_equal() -> None:
+    command = [sys.executable, "-m", "benchmarks.kill_campaign", "--kills", "5", "--seed", str(time.time_ns())]
+    result = subprocess.run(command, cwd=ROOT, capture_output=True, text=True, check=False)
+    assert result.returncode == 0, f"{command}\n{result.stdout}{result.stderr}"
+
+
+def alive_in_group(group: int) -> list[str]:
+    """Commands of a process group that still run."""
+    found = []
+    for path in Path("/proc").glob("[0-9]*/stat"):
+        with suppress(OSError):
+            state, _, own_group = path.read_text().rpartition(")")[2].split()[:3]
+            if int(own_group) == group and state != "Z":
+                found.append((path.parent / "cmdline").read_bytes().decode())
+    return found
+
+
+def test_interrupt_from_a_terminal_reaches_all_processes_and_is_one_line(reference: Path, tmp_path: Path) -> None:
+    out = tmp_path / "data"
+    command = [sys.executable, "-m", "gensig.cli", "generate", "--quiet", *TINY, "executor.n_workers=2", f"out={out}"]
+    process = subprocess.Popen(command, stderr=subprocess.PIPE, text=True, start_new_session=True)
+    while not (out / "manifest.json").is_file():
+        assert process.poll() is None
+        time.sleep(0.01)
+    time.sleep(0.3)  # its workers are importing now
+    os.killpg(process.pid, signal.SIGINT)
+    _, said = process.communicate(timeout=60)
+    assert process.returncode == 130
+    assert [line[:20] for line in said.splitlines()] == ["gensig: interrupted;"]
+    deadline = time.monotonic() + 10.0
+    while left := alive_in_group(process.pid):
+        assert time.monotonic() < deadline, left
+        time.sleep(0.05)
+    assert not verify(out).complete
+    assert resume(out) == 0
+    assert contents(out) == contents(reference)
+
+
+@contextmanager
+def small_disk(folder: Path) -> Iterator[Callable[[int], None] | None]:
+    """A disk of its own that can be enlarged; None where none can be mounted."""
+    folder.mkdir()
+    mounted = subprocess.run(
+        ["mount", "-t", "tmpfs", "-o", "size=100k", "tmpfs", str(folder)], capture_output=True, check=False
+    )
+    if mounted.returncode:
+        yield None
+        return
+    try:
+        yield lambda size: subprocess.run(["mount", "-o", f"remount,size={size}", str(folder)], check=True)
+    finally:
+        subprocess.run(["umount", str(folder)], check=True)
+
+
+def test_full_disk_is_mended_by_space_and_resume(
+    reference: Path, tmp_path: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    disk = tmp_path / "disk"
+    out = disk / "data"
+    with small_disk(disk) as enlarge:
+        words = ["generate", "--quiet", *TINY, "executor.n_workers=1", f"out={out}"]
+        if enlarge is not None:
+            status, said = main(words), capsys.readouterr().err
+        else:  # no right to mount: no file of a shard's size can be written
+            before = resource.getrlimit(resource.RLIMIT_FSIZE)
+            signal.signal(signal.SIGXFSZ, signal.SIG_IGN)
+            resource.setrlimit(resource.RLIMIT_FSIZE, (20_000, before[1]))
+            try:
+                status, said = main(words), capsys.readouterr().err
+            finally:
+                resource.setrlimit(resource.RLIMIT_FSIZE, before)
+        assert status in (1, 2)
+        assert "cannot write" in said
+        assert not verify(out).complete
+        assert not list(out.rglob("*.tmp"))
+        if enlarge is not None:
+            enlarge(4 * 1024**2)
+        assert resume(out) == 0
+        assert contents(out) == contents(reference)
+
+
+@contextmanager
+def closed(folder: Path) -> Iterator[None]:
+    """A folder that may not be written, not even by root."""
+    is_root = os.geteuid() == 0
+    if is_root:
+        changed = shutil.which("chattr") and subprocess.run(["chattr", "+i", folder], capture_output=True, check=False)
+        if not changed or changed.returncode:
+            pytest.skip("root writes everywhere on this file system")
+    else:
+        folder.chmod(0o500)
+    try:
+        yield
+    finally:
+        if is_root:
+            subprocess.run(["chattr", "-i", folder], check=True)
+        else:
+            folder.chmod(0o700)
+
+
+@pytest.mark.parametrize("part", [".", "shards"])
+def test_closed_folder_is_one_line_and_changes_nothing(
+    begun: Path, reference: Path, part: str, capsys: pytest.CaptureFixture[str]
+) -> None:
+    before = contents(begun)
+    with closed(begun / part):
+        assert resume(begun) in (1, 2)
+    said = capsys.readouterr().err
+    assert "cannot write" in said
+    assert "Traceback" not in said
+    assert not verify(begun).complete
+    assert {name: content for name, content in contents(begun).items() if name in before} == before
+    assert resume(begun) == 0
+    assert contents(begun) == contents(reference)
+
+
+def test_resume_on_another_executor_is_byte_equal(begun: Path, reference: Path) -> None:
+    assert resume(begun, "executor=local", "executor.n_workers=2", "seed=0") == 0
+    assert contents(begun) == contents(reference)
+
+
+def change_config(out: Path) -> None:
+    path = out / "config.yaml"
+    content = yaml.safe_load(path.read_text())
+    content["operating"]["torque_nm"] = 21.5
+    path.write_text(yaml.safe_dump(content))
+
+
+def change_version(out: Path) -> None:
+    content = json.loads((out / "manifest.json").read_text())
+    content["generator_version"] = "0.0.1"
+    (out / "manifest.json").write_text(json.dumps(content))
+
+
+def change_plan(out: Path) -> None:
+    path = out / "plan.csv"
+    path.write_text(path.read_text().replace("unit-0001", "unit-0002"))
+
+
+@pytest.mark.parametrize(
+    ("change", "words", "hints"),
+    [
+        (change_config, (), ("operating.torque_nm",)),
+        (change_version, (), ("0.0.1",)),
+        (change_plan, (), ("plan.csv",)),
+        (lambda out: None, ("seed=3", "mesh.damping_ratio=0.1"), ("mesh.damping_ratio", "seed")),
+    ],
+)
+def test_resume_with_another_identity_is_refused(
+    begun: Path, change: Callable, words: tuple[str, ...], hints: tuple[str, ...], capsys: pytest.CaptureFixture[str]
+) -> None:
+    change(begun)
+    before = {path: path.read_bytes() for path in begun.rglob("*") if path.is_file()}
+    assert resume(begun, *words) == 2
+    (line,) = capsys.readouterr().err.splitlines()
+    assert all(hint in line for hint in hints)
+    assert {path: path.read_bytes() for path in begun.rglob("*") if path.is_file()} == before
+
+
+def test_resume_without_the_compression_is_refused_before_anything_runs(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
+) -> None:
+    out = tmp_path / "data"
+    assert main(["plan", "--freeze", *TINY, "dataset.compression=blosc2", f"out={out}"]) == 0
+    monkeypatch.setitem(sys.modules, "hdf5plugin", None)
+    capsys.readouterr()
+    assert resume(out) == 2
+    (line,) = capsys.readouterr().err.splitlines()
+    assert "gensig[blosc2]" in line
+    assert not any((out / "shards").iterdir())
+
+
+def test_a_shard_lost_since_is_made_again(begun: Path, reference: Path) -> None:
+    shard_path(begun, 0).unlink()
+    shard_path(begun, 1).write_bytes(shard_path(begun, 1).read_bytes()[:-1])
+    assert resume(begun) == 0
+    assert contents(begun) == contents(reference)
+
+
+@pytest.mark.parametrize("damage", ["none", "cut shard", "no json", "other rows"])
+def test_receipts_are_taken_only_of_whole_shards(begun: Path, reference: Path, damage: str) -> None:
+    entry = read_manifest(reference).shards[2]
+    shutil.copy(shard_path(reference, 2), shard_path(begun, 2))
+    rows = 2 if damage == "other rows" else 1
+    write_receipt(begun, 2, rows=rows, sha256=entry.sha256, n_bytes=entry.bytes, n_failed=0)
+    if damage == "cut shard":
+        shard_path(begun, 2).write_bytes(b"short")
+    if damage == "no json":
+        receipt_path(begun, 2).write_text("{")
+    before = shard_path(begun, 2).stat().st_ino
+    assert resume(begun) == 0
+    assert (shard_path(begun, 2).stat().st_ino == before) == (damage == "none")
+    assert contents(begun) == contents(reference)

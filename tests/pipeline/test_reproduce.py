@@ -1,0 +1,106 @@
+"""Records made once more from a data set: the same bits, and a twin that differs by the fault alone."""
+
+import json
+import shutil
+from pathlib import Path
+
+import h5py
+import numpy as np
+import pytest
+from small_sets import make
+
+from gensig.cli import main
+
+SET = ("dataset.records_per_shard=4", "dataset.store_clean=true")
+
+
+@pytest.fixture(scope="module")
+def reference(tmp_path_factory: pytest.TempPathFactory) -> Path:
+    vary = "plan.vary={operating.speed_rpm:{distribution:uniform,low:1200,high:2400}}"
+    return make(tmp_path_factory.mktemp("reference") / "data", *SET, vary)
+
+
+def reproduce(folder: Path, capsys: pytest.CaptureFixture[str], *words: str) -> tuple[int, str]:
+    capsys.readouterr()
+    return main(["reproduce", str(folder), *words]), capsys.readouterr().out
+
+
+def test_every_record_has_the_same_bits(reference: Path, capsys: pytest.CaptureFixture[str]) -> None:
+    assert reproduce(reference, capsys) == (0, "6 of 6 records have the same bits\n")
+    assert reproduce(reference, capsys, "--records", "2") == (0, "2 of 2 records have the same bits\n")
+
+
+def alter(reference: Path, out: Path, part: float, environment: dict[str, str]) -> Path:
+    """A copy with one sample of one record off by a part of its RMS, as if made elsewhere."""
+    shutil.copytree(reference, out)
+    content = json.loads((out / "manifest.json").read_text())
+    content["environment"] |= environment
+    (out / "manifest.json").write_text(json.dumps(content))
+    with h5py.File(out / "shards" / "shard-00001.h5", "r+") as file:
+        signal = file["acceleration"][1, 0]
+        place = int(np.argmin(np.abs(signal)))  # where single precision resolves least
+        signal[place] += part * np.sqrt(np.mean(np.square(signal, dtype=np.float64)))
+        file["acceleration"][1, 0] = signal
+    return out
+
+
+ELSEWHERE = {"cpu_model": "Another CPU"}
+
+
+@pytest.mark.parametrize(("part", "environment", "status"), [(5e-7, {}, 1), (5e-7, ELSEWHERE, 0), (2e-6, ELSEWHERE, 1)])
+def test_a_difference_is_accepted_only_elsewhere_and_up_to_1e_6(
+    reference: Path, tmp_path: Path, capsys: pytest.CaptureFixture[str], part: float, environment: dict, status: int
+) -> None:
+    folder = alter(reference, tmp_path / "data", part, environment)
+    found, said = reproduce(folder, capsys)
+    assert found == status
+    assert "5 of 6 records have the same bits" in said
+    assert f"largest difference {part:.2g} of the record's RMS, in r000005" in said
+    assert ("made with cpu_model Another CPU" in said) == bool(environment)
+
+
+def read_one(path: Path) -> dict[str, np.ndarray]:
+    with h5py.File(path) as file:
+        return {name: file[name][0] for name in file if isinstance(file[name], h5py.Dataset)}
+
+
+@pytest.mark.parametrize("noise", ["healthy_twin", "record"])
+def test_record_and_twin_differ_by_the_fault_alone(reference: Path, tmp_path: Path, noise: str) -> None:
+    folder = reference
+    if noise == "record":
+        folder = make(tmp_path / "data", *SET, "sensing.snr_reference=record", "sensing.snr_db=20")
+    with h5py.File(folder / "shards" / "shard-00000.h5") as file:
+        faulty = int(np.flatnonzero(file["label_name"].asstr()[:] == "crack")[0])
+        stored = {name: file[name][faulty] for name in ("acceleration", "acceleration_clean", "noise_power")}
+    words = ["simulate", "--from", str(folder), "--record", str(faulty), "--output"]
+    assert main([*words, str(tmp_path / "again.h5")]) == 0
+    assert main([*words, str(tmp_path / "twin.h5"), "--twin"]) == 0
+    again, twin = read_one(tmp_path / "again.h5"), read_one(tmp_path / "twin.h5")
+    for name, values in stored.items():
+        assert np.array_equal(again[name], values), name
+    for name in ("unit_id", "condition_id", "start_tooth_pinion", "start_phase", "speed_set_rpm", "noise_power"):
+        assert np.array_equal(twin[name], again[name]), name
+    assert again["severity"] > 0.0
+    assert twin["severity"] == 0.0
+    assert twin["faults_json"] == b"[]"
+    assert not np.array_equal(twin["acceleration_clean"], again["acceleration_clean"])
+    level = np.sqrt(np.mean(np.square(stored["acceleration"], dtype=np.float64)))
+    residuals = [again[name].astype(float) - twin[name] for name in ("acceleration", "acceleration_clean")]
+    np.testing.assert_allclose(*residuals, rtol=0.0, atol=3e-6 * level)
+
+
+@pytest.mark.parametrize(
+    ("words", "hint"),
+    [
+        (["--from", "@"], "--record"),
+        (["--from", "@", "--record", "6"], "0 to 5"),
+        (["--from", "@", "--record", "1", "seed=3"], "no overrides"),
+        (["--twin"], "--from DIR"),
+    ],
+)
+def test_a_mistake_is_one_line(
+    reference: Path, words: list[str], hint: str, capsys: pytest.CaptureFixture[str]
+) -> None:
+    assert main(["simulate", *(word.replace("@", str(reference)) for word in words)]) == 2
+    (line,) = capsys.readouterr().err.splitlines()
+    assert hint in line
