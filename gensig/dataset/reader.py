@@ -275,7 +275,8 @@ class Dataset:
         return iter(self.where())
 
     def __getstate__(self) -> dict[str, Any]:
-        return {**self.__dict__, "_files": OrderedDict()}
+        # another process checks for itself: that is also what makes HDF5 know the filters there
+        return {**self.__dict__, "_files": OrderedDict(), "_checked": {}}
 
     def __repr__(self) -> str:
         return f"Dataset({str(self.folder)!r}, {self.n_records} records, classes {self.class_names})"
