@@ -38,14 +38,15 @@ GOALS = {
 
 
 def kernels(runs: int) -> dict[str, float]:
-    """Rates of the integrators alone, and how far scalar code and compiled core differ."""
+    """Rates of the integrators alone."""
     lanes = _rates.machines()
-    eight, repeats = lanes[:LANES], 5 * runs  # short runs: many cost little, and one is less disturbed
-    found = {f"compiled core float64 x{n}": _rates.kernel_rate(eight, n, "float64", repeats) for n in (4, 5, 8)}
-    found["compiled core float64 x5, one of the lanes in use"] = _rates.kernel_rate(eight[:1], 5, "float64", repeats)
-    found[KERNEL.format("float32")] = _rates.kernel_rate(lanes, 5, "float32", repeats)
-    found[SCALAR] = _rates.scalar_rate(eight, 5, repeats)
-    found |= _rates.scipy_rates(eight[0], runs)
+    eight = lanes[:LANES]
+    works = {f"compiled core float64 x{oversampling}": _rates.kernel(eight, oversampling) for oversampling in (4, 5, 8)}
+    works["compiled core float64 x5, one of the lanes in use"] = _rates.kernel(eight[:1], 5)
+    works[KERNEL.format("float32")] = _rates.kernel(lanes, 5, "float32")
+    works[SCALAR] = _rates.scalar(eight, 5)
+    works |= _rates.scipy_works(eight[0])
+    found = _rates.rates(works, 4 * runs)  # they are short: many turns cost little, and one of them is undisturbed
     if (ross := stored_rate()) is not None:
         found["ROSS run_time_response x1, as stored, by way of scalar Numba"] = ross * found[SCALAR]
     return found

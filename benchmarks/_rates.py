@@ -10,7 +10,7 @@ from numpy.typing import NDArray
 from scipy.integrate import solve_ivp
 
 from benchmarks import _scalar
-from benchmarks._measure import least
+from benchmarks._measure import in_turn
 from gensig.config import read_request
 from gensig.dynamics import _kernels, integrator
 from gensig.dynamics._layout import N_LAW
@@ -22,6 +22,8 @@ from gensig.planning import make_plan
 from gensig.records import _row_run, _row_values, record_system
 
 Array = NDArray[np.float64]
+Work = tuple[Callable[[], Any], float]  # what to time, and the seconds that it simulates
+RightHandSide = Callable[[float, Array], Array]
 
 SAMPLING_RATE = 51200.0
 CHANNELS = np.arange(4)  # x and y of both gears
@@ -45,7 +47,13 @@ def machines(*words: str, n: int = n_lanes("float32")) -> list[PairDynamics]:
     return [_row_run(config, record_system(config, _row_values(row)), row).dynamics() for row in rows]
 
 
-def kernel_rate(lanes: list[PairDynamics], oversampling: int, precision: str, runs: int) -> float:
+def rates(works: dict[str, Work], runs: int) -> dict[str, float]:
+    """Simulated seconds per CPU second of each work, which take turns."""
+    spent = in_turn({name: work for name, (work, _) in works.items()}, runs)
+    return {name: seconds / spent[name] for name, (_, seconds) in works.items()}
+
+
+def kernel(lanes: list[PairDynamics], oversampling: int, precision: str = "float64") -> Work:
     """The product's integrator with the mean accelerations of four channels, tables already packed."""
     step = 1.0 / (SAMPLING_RATE * oversampling)
     group, n_settling = pack(lanes, step, precision), round(SETTLING / step)
@@ -66,7 +74,7 @@ def kernel_rate(lanes: list[PairDynamics], oversampling: int, precision: str, ru
             )  # fmt: skip
             run.fresh[:] = 0.0
 
-    return len(lanes) * n_calls * PER_CALL * step / least(work, runs)
+    return work, len(lanes) * n_calls * PER_CALL * step
 
 
 def scalar_run(dynamics: PairDynamics, oversampling: int, seconds: float) -> tuple[Array, Array]:
@@ -81,19 +89,17 @@ def scalar_run(dynamics: PairDynamics, oversampling: int, seconds: float) -> tup
     return state, means
 
 
-def scalar_rate(all_of: list[PairDynamics], oversampling: int, runs: int) -> float:
-    """Scalar Numba, one record after the other, with the same four channels."""
-    step, spent = 1.0 / (SAMPLING_RATE * oversampling), 0.0
-    means = np.empty((round(TIMED / step), len(CHANNELS)))
-    for dynamics in all_of:
-        machine, (settled, _) = _scalar.machine(dynamics), scalar_run(dynamics, oversampling, SETTLING)
-        first = round(SETTLING / step)
+def scalar(all_of: list[PairDynamics], oversampling: int) -> Work:
+    """Scalar Numba, one settled record after the other, with the same four channels."""
+    step = 1.0 / (SAMPLING_RATE * oversampling)
+    means, first = np.empty((round(TIMED / step), len(CHANNELS))), round(SETTLING / step)
+    settled = [(_scalar.machine(one), scalar_run(one, oversampling, SETTLING)[0]) for one in all_of]
 
-        def work(machine: Any = machine, settled: Array = settled, first: int = first) -> None:
-            _scalar.integrate(machine, settled.copy(), step, first, len(means), CHANNELS, means)
+    def work() -> None:
+        for machine, state in settled:
+            _scalar.integrate(machine, state.copy(), step, first, len(means), CHANNELS, means)
 
-        spent += least(work, runs)
-    return len(all_of) * len(means) * step / spent
+    return work, len(all_of) * len(means) * step
 
 
 def difference(all_of: list[PairDynamics], oversampling: int) -> float:
@@ -120,7 +126,7 @@ def check_same_law(all_of: list[PairDynamics]) -> float:
     return found
 
 
-def scipy_rates(dynamics: PairDynamics, runs: int) -> dict[str, float]:
+def scipy_works(dynamics: PairDynamics) -> dict[str, Work]:
     """``solve_ivp`` at rtol 1e-6 from a settled state on, by method.
 
     The right-hand side is the scalar code, compiled whole with the machine in it; once more it is NumPy around the
@@ -131,16 +137,16 @@ def scipy_rates(dynamics: PairDynamics, runs: int) -> dict[str, float]:
     if not np.allclose(compiled(SETTLING, settled), plain(SETTLING, settled), rtol=1e-6, atol=1e-6):
         raise AssertionError("the right-hand sides given to solve_ivp differ: two laws")
 
-    def rate(slope: Callable[[float, Array], Array], method: str) -> float:
+    def solve(slope: RightHandSide, method: str) -> Work:
         span = (SETTLING, SETTLING + SCIPY_SECONDS)
         given = {"method": method, "rtol": SCIPY_RTOL, "atol": SCIPY_ATOL}
-        return SCIPY_SECONDS / least(lambda: solve_ivp(slope, span, settled, **given), runs)
+        return lambda: solve_ivp(slope, span, settled, **given), SCIPY_SECONDS
 
-    found = {f"solve_ivp {method}, right-hand side compiled": rate(compiled, method) for method in SCIPY}
-    return {**found, "solve_ivp RK45, NumPy around the compiled law": rate(plain, "RK45")}
+    found = {f"solve_ivp {method}, right-hand side compiled": solve(compiled, method) for method in SCIPY}
+    return {**found, "solve_ivp RK45, NumPy around the compiled law": solve(plain, "RK45")}
 
 
-def _numpy_right_hand_side(dynamics: PairDynamics) -> Callable[[float, Array], Array]:
+def _numpy_right_hand_side(dynamics: PairDynamics) -> RightHandSide:
     group, system, direction = pack([dynamics], 1e-6), dynamics.system(), dynamics.approach_direction()
     n_dof, scratch = len(system.mass), _kernels.scratch(len(system.mass), 0)
     motion, found = np.empty((4, LANES)), np.empty((N_LAW, LANES))

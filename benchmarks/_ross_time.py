@@ -43,7 +43,7 @@ def job() -> dict[str, Any]:
 
 def store(told: dict[str, Any]) -> None:
     """Keep what ROSS took, with what the scalar code takes here and now."""
-    scalar = _rates.scalar_rate(_rates.machines(n=8), OVERSAMPLING, 5 * RUNS)
+    scalar = _rates.rates({"": _rates.scalar(_rates.machines(n=8), OVERSAMPLING)}, 5 * RUNS)[""]
     found = {
         **told,
         "ross_simulated_s_per_core_s": told["simulated_s"] / told["cpu_s"],

@@ -9,16 +9,18 @@ from __future__ import annotations
 
 import argparse
 import json
+import resource
 import subprocess
 import sys
 import time
 from collections.abc import Callable, Sequence
 from dataclasses import replace
 from functools import partial
+from pathlib import Path
 
 import numpy as np
 
-from benchmarks._measure import least, machine, print_machine, write_json
+from benchmarks._measure import in_turn, machine, print_machine, write_json
 from gensig.config import read_request
 from gensig.dynamics._vector import LANES
 from gensig.errors import SimulationError
@@ -43,7 +45,7 @@ ROTORS = {6: (), 7: ("system.motor.inertia_kg_m2=1e-3",)}
 ROTORS[8] = (*ROTORS[7], "system.load.inertia_kg_m2=1e-2")
 # makes a data set in a process of its own; tells CPU seconds, from the plan to the last byte, and its peak memory
 WORKER = """
-import json, resource, sys, tempfile, time
+import json, sys, tempfile, time
 from pathlib import Path
 from gensig.config import read_request
 from gensig.execution.local import LocalExecutor
@@ -58,9 +60,18 @@ def spent(n_records, out):
 with tempfile.TemporaryDirectory() as folder:
     spent(4, Path(folder) / "warm")
     told = spent(int(sys.argv[1]), Path(folder) / "set")
-peak = resource.getrusage(resource.RUSAGE_SELF).ru_maxrss * (1 if sys.platform == "darwin" else 1024)
-print(json.dumps([told, peak]))
+from benchmarks.scaling import peak_memory
+print(json.dumps([told, peak_memory()]))
 """
+
+
+def peak_memory() -> int:
+    """Most bytes of memory that this process ever held."""
+    status = Path("/proc/self/status")
+    if status.exists():  # what getrusage tells is that of the process that started this one, if it held more
+        lines = status.read_text(encoding="utf-8").splitlines()
+        return next(int(line.split()[1]) * 1024 for line in lines if line.startswith("VmHWM:"))
+    return resource.getrusage(resource.RUSAGE_SELF).ru_maxrss * (1 if sys.platform == "darwin" else 1024)
 
 
 def side_by_side(*words: str, channels: str = "[pinion_y]") -> list[Run]:
@@ -80,14 +91,14 @@ def simulate(runs: Sequence[Run]) -> None:
 
 def against_duration(runs: int) -> dict[str, float]:
     """CPU seconds of a group by duration, and how far from a straight line with a constant for the settling."""
-    found, group = [], side_by_side()
-    simulate(group)
+    group, works = side_by_side(), {}
     for duration in DURATIONS:
         operating = replace(group[0].system.operating, duration=duration)
         timed = [replace(run, system=replace(run.system, operating=operating)) for run in group]
-        found.append(least(partial(simulate, timed), runs if duration < 5.0 else 1))
-    values = dict(zip((f"{duration:g} s" for duration in DURATIONS), found, strict=True))
-    return {**values, **straight("second", DURATIONS, found, LANES)}
+        works[f"{duration:g} s"] = partial(simulate, timed)
+    simulate(group)
+    found = in_turn(works, runs)
+    return {**found, **straight("second", DURATIONS, list(found.values()), LANES)}
 
 
 def straight(unit: str, sizes: Sequence[float], found: Sequence[float], per: int = 1) -> dict[str, float]:
@@ -126,32 +137,35 @@ def in_own_process(n_records: int, *words: str) -> tuple[float, float]:
 
 
 def against_teeth(runs: int) -> tuple[dict[str, float], dict[str, float]]:
-    """CPU milliseconds of a table, and of a group's second without it, by the number of pitted pinion teeth."""
-    tables, motion = {}, {}
+    """CPU milliseconds of a table, and of a record without it, by the number of pitted pinion teeth."""
+    tables, motions = {}, {}
+
+    def table(run: Run) -> None:
+        spur_pair._mesh_table.cache_clear()
+        run.dynamics()
+
     for n_teeth in TEETH:
         teeth = list(range(n_teeth))
         group = side_by_side("operating.duration_s=0.2", "fault=distributed_pitting", f"fault.tooth={teeth}")
-
-        def table(group: list[Run] = group) -> None:
-            spur_pair._mesh_table.cache_clear()
-            group[0].dynamics()
-
-        table()
-        simulate(group)
         name = f"{n_teeth} distinct pitted {'tooth' if n_teeth == 1 else 'teeth'}"
-        tables[name] = least(table, runs) * 1e3
-        motion[name] = least(partial(simulate, group), runs) / LANES * 1e3
-    return {**tables, **straight("tooth", TEETH, [value / 1e3 for value in tables.values()])}, motion
+        tables[name], motions[name] = partial(table, group[0]), partial(simulate, group)
+        table(group[0])
+    spent = in_turn(tables, runs)
+    for motion in motions.values():
+        motion()
+    found = {name: value / LANES * 1e3 for name, value in in_turn(motions, runs).items()}
+    line = straight("tooth", TEETH, list(spent.values()))
+    return {**{name: value * 1e3 for name, value in spent.items()}, **line}, found
 
 
 def against_freedom(runs: int) -> dict[str, float]:
     """CPU milliseconds a record of 1 s by degrees of freedom: with a motor, and with a load too."""
-    found = {}
+    works = {}
     for n_dof, words in ROTORS.items():
         group = side_by_side("operating.duration_s=1", *words, channels="[pinion_x,pinion_y,wheel_x,wheel_y]")
-        simulate(group)
-        found[f"{n_dof} degrees of freedom"] = least(partial(simulate, group), runs) / LANES * 1e3
-    return found
+        simulate(group[:1])
+        works[f"{n_dof} degrees of freedom"] = partial(simulate, group)
+    return {name: value / LANES * 1e3 for name, value in in_turn(works, runs).items()}
 
 
 def main() -> None:
@@ -172,10 +186,10 @@ def main() -> None:
             for name, value in values.items():
                 print(f"  {name:<64}{value:>12.4g}", flush=True)
 
+    show(against_number, "number of records: CPU ms a record", "number of records: peak memory of the process, MB")
     show(against_duration, f"duration of {LANES} records, one channel: CPU s")
     show(against_freedom, "degrees of freedom, 1 s and four channels: CPU ms a record")
     show(against_teeth, "distinct teeth: CPU ms of a table", "distinct teeth: CPU ms a record of 0.2 s, table known")
-    show(against_number, "number of records: CPU ms a record", "number of records: peak memory of the process, MB")
     print(f"\n{time.perf_counter() - begun:.0f} s")
     write_json(arguments.json, named, sections)
 
