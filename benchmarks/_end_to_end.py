@@ -10,7 +10,6 @@ from typing import Any
 from benchmarks._rates import quickstart
 from benchmarks._stages import EQUATIONS, INTEGRATION, LOW_PASS, NOISE, STAGES, TABLES, WRITING, Stages
 from gensig import records
-from gensig.dynamics import pair
 from gensig.execution.local import LocalExecutor
 from gensig.generation import begin_folder, run_folder
 from gensig.systems import spur_pair
@@ -36,7 +35,6 @@ def by_stage(precision: str, runs: int) -> dict[str, float]:
         # what would not be there for records that have not been made before
         records.forget_twins()
         spur_pair._mesh_table.cache_clear()
-        pair._mean_mesh_stiffness.cache_clear()
         with tempfile.TemporaryDirectory() as folder:
             begin_folder(config, [], Path(folder) / "set")
             stages, start = Stages(), time.perf_counter()

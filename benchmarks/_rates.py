@@ -19,7 +19,7 @@ from gensig.dynamics.decimation import decimator, in_band_error
 from gensig.dynamics.lanes import pack
 from gensig.dynamics.pair import PairDynamics
 from gensig.planning import make_plan
-from gensig.records import _row_run, _row_values, record_system
+from gensig.records import row_run, row_values, record_system
 
 Array = NDArray[np.float64]
 Work = tuple[Callable[[], Any], float]  # what to time, and the seconds that it simulates
@@ -44,7 +44,7 @@ def quickstart(n_records: int, *words: str) -> tuple[dict[str, Any], list[dict[s
 def machines(*words: str, n: int = n_lanes("float32")) -> list[PairDynamics]:
     """The machines of as many quickstart records."""
     config, rows = quickstart(n, *words)
-    return [_row_run(config, record_system(config, _row_values(row)), row).dynamics() for row in rows]
+    return [row_run(config, record_system(config, row_values(row)), row).dynamics() for row in rows]
 
 
 def rates(works: dict[str, Work], runs: int) -> dict[str, float]:

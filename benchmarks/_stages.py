@@ -26,8 +26,8 @@ STAGES = (PLAN, TABLES, EQUATIONS, *INTEGRATION, LOW_PASS, NOISE, WRITING, OTHER
 CLOCKED: tuple[tuple[Any, str, str], ...] = (
     (generation, "read_plan", PLAN),
     (records, "record_system", PLAN),
-    (records, "_row_run", PLAN),
-    (records, "_twin_run", PLAN),
+    (records, "row_run", PLAN),
+    (records, "_twin_start", PLAN),
     (spur_pair, "_mesh_table", TABLES),
     (spur_pair.Run, "dynamics", EQUATIONS),
     (spur_pair, "settling_oversampling", EQUATIONS),

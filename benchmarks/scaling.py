@@ -1,7 +1,7 @@
 """What cost and memory grow with: ``python -m benchmarks.scaling``.
 
 CPU seconds of one core, the least of several runs, against the duration of records, their number, the number of
-distinct teeth, and the degrees of freedom; peak memory of the process that makes a data set, against its size.
+distinct teeth, and the degrees of freedom; peak memory of the processes that make a data set, against its size.
 ``--json FILE`` writes the figures.
 """
 
@@ -12,6 +12,7 @@ import json
 import resource
 import subprocess
 import sys
+import tempfile
 import time
 from collections.abc import Callable, Sequence
 from dataclasses import replace
@@ -24,13 +25,16 @@ from benchmarks._measure import in_turn, machine, print_machine, write_json
 from gensig.config import read_request
 from gensig.dynamics._vector import LANES
 from gensig.errors import SimulationError
+from gensig.execution.local import LocalExecutor
 from gensig.faults.registry import read_faults
+from gensig.generation import begin_folder, run_folder, write_shard
 from gensig.systems import spur_pair
 from gensig.systems.registry import read_system
 from gensig.systems.spur_pair import Run, Start, simulate_together
 
 DURATIONS = (0.05, 0.16, 0.5, 1.6, 5.0, 16.0, 50.0)  # s
 COUNTS = (8, 80, 800, 8000)  # records
+QUICKSTART = ("experiment=quickstart", "dataset.records_per_shard=null")
 # without twins, whose number depends on how records fall into shards, and with little settling
 SHORT = (
     "operating.duration_s=0.02",
@@ -39,30 +43,12 @@ SHORT = (
     "sensing.snr_reference=record",
     "plan.n_units=4",
 )
-LONG, LONG_COUNTS = ("operating.duration_s=1",), (32, 160, 320)
+LONG, LONG_COUNTS = ("operating.duration_s=1",), (80, 800, 8000)
 TEETH = (1, 2, 4, 8, 16, 23)
 ROTORS = {6: (), 7: ("system.motor.inertia_kg_m2=1e-3",)}
 ROTORS[8] = (*ROTORS[7], "system.load.inertia_kg_m2=1e-2")
-# makes a data set in a process of its own; tells CPU seconds, from the plan to the last byte, and its peak memory
-WORKER = """
-import json, sys, tempfile, time
-from pathlib import Path
-from gensig.config import read_request
-from gensig.execution.local import LocalExecutor
-from gensig.generation import begin_folder, run_folder
-def spent(n_records, out):
-    request = read_request([*sys.argv[2:], f"plan.n_records={n_records}"])
-    begun = time.process_time()
-    begin_folder(request.config, request.overrides, out)
-    n_failed, problems = run_folder(out, executor=LocalExecutor(n_workers=1), on_shard=lambda _: None)
-    assert not (n_failed or problems), problems
-    return time.process_time() - begun
-with tempfile.TemporaryDirectory() as folder:
-    spent(4, Path(folder) / "warm")
-    told = spent(int(sys.argv[1]), Path(folder) / "set")
-from benchmarks.scaling import peak_memory
-print(json.dumps([told, peak_memory()]))
-"""
+# a process of its own makes a data set, or of a planned one the first shard, as a worker does
+ALONE = "import sys; from benchmarks import scaling; scaling.{}(*sys.argv[1:])"
 
 
 def peak_memory() -> int:
@@ -72,6 +58,50 @@ def peak_memory() -> int:
         lines = status.read_text(encoding="utf-8").splitlines()
         return next(int(line.split()[1]) * 1024 for line in lines if line.startswith("VmHWM:"))
     return resource.getrusage(resource.RUSAGE_SELF).ru_maxrss * (1 if sys.platform == "darwin" else 1024)
+
+
+def make_set(n_records: str, *words: str) -> None:
+    """Print the CPU seconds of a data set, from its plan to its last byte, and the peak memory; for a process alone."""
+    with tempfile.TemporaryDirectory() as folder:
+        _begin(Path(folder) / "warm", "8", *words)
+        _finish(Path(folder) / "warm")
+        begun = time.process_time()
+        _begin(Path(folder) / "set", n_records, *words)
+        _finish(Path(folder) / "set")
+        print(json.dumps([time.process_time() - begun, peak_memory()]))
+
+
+def make_plan(n_records: str, out: str, *words: str) -> None:
+    """Begin a data set and print the CPU seconds and the peak memory; for a process alone."""
+    begun = time.process_time()
+    _begin(Path(out), n_records, *words)
+    print(json.dumps([time.process_time() - begun, peak_memory()]))
+
+
+def make_shard(out: str) -> None:
+    """Make the first shard of a data set and print the CPU seconds and the peak memory; for a process alone."""
+    begun = time.process_time()
+    write_shard(Path(out), 0)
+    print(json.dumps([time.process_time() - begun, peak_memory()]))
+
+
+def _begin(out: Path, n_records: str, *words: str) -> None:
+    request = read_request([*words, f"plan.n_records={n_records}"])
+    begin_folder(request.config, request.overrides, out)
+
+
+def _finish(out: Path) -> None:
+    n_failed, problems = run_folder(out, executor=LocalExecutor(n_workers=1), on_shard=lambda _: None)
+    if n_failed or problems:
+        raise SimulationError(f"{n_failed} records failed, problems: {problems}")
+
+
+def alone(what: Callable[..., None], *given: str) -> tuple[float, float]:
+    """CPU seconds and peak bytes that a function of this module prints in a process of its own."""
+    command = [sys.executable, "-c", ALONE.format(what.__name__), *given]
+    told = subprocess.run(command, check=True, capture_output=True, text=True).stdout
+    seconds, peak = json.loads(told.splitlines()[-1])
+    return seconds, peak
 
 
 def side_by_side(*words: str, channels: str = "[pinion_y]") -> list[Run]:
@@ -112,28 +142,26 @@ def straight(unit: str, sizes: Sequence[float], found: Sequence[float], per: int
     }
 
 
-def against_number(runs: int) -> tuple[dict[str, float], dict[str, float]]:
-    """CPU milliseconds a record and peak memory in MB, by the number of records of a data set."""
-    cost, memory, found = {}, {}, []
+def against_number(runs: int) -> dict[str, float]:
+    """CPU milliseconds a record by the number of records of a data set, made by one process from plan to index."""
+    found = []
     for n_records in COUNTS:
-        told = [in_own_process(n_records, *SHORT) for _ in range(runs if n_records < 1000 else 1)]
+        told = [alone(make_set, str(n_records), *QUICKSTART, *SHORT) for _ in range(runs if n_records < 1000 else 1)]
         found.append(min(spent for spent, _ in told))
-        cost[f"{n_records} short records"] = found[-1] / n_records * 1e3
-        memory[f"{n_records} short records"] = max(peak for _, peak in told) / 1e6
-    cost |= straight("record", COUNTS, found)
+    values = {f"{n} short records": spent / n * 1e3 for n, spent in zip(COUNTS, found, strict=True)}
+    return {**values, **straight("record", COUNTS, found)}
+
+
+def memory(_runs: int) -> dict[str, float]:
+    """Peak memory in MB of the process that plans, and of a worker that makes one whole shard, by number of records."""
+    found = {}
     for n_records in LONG_COUNTS:
-        spent, peak = in_own_process(n_records, *LONG)
-        cost[f"{n_records} records of 1 s and four channels"] = spent / n_records * 1e3
-        memory[f"{n_records} records of 1 s and four channels"] = peak / 1e6
-    return cost, memory
-
-
-def in_own_process(n_records: int, *words: str) -> tuple[float, float]:
-    """CPU seconds of one quickstart data set with compiled code loaded, and the process's peak memory in bytes."""
-    given = [sys.executable, "-c", WORKER, str(n_records), "experiment=quickstart", "dataset.records_per_shard=null"]
-    told = subprocess.run([*given, *words], check=True, capture_output=True, text=True).stdout
-    spent, peak = json.loads(told.splitlines()[-1])
-    return spent, peak
+        with tempfile.TemporaryDirectory() as folder:
+            out = str(Path(folder) / "set")
+            planning, working = alone(make_plan, str(n_records), out, *QUICKSTART, *LONG), alone(make_shard, out)
+        name = f"{n_records} records of 1 s and four channels"
+        found |= {f"{name}: planning": planning[1] / 1e6, f"{name}: worker": working[1] / 1e6}
+    return found
 
 
 def against_teeth(runs: int) -> tuple[dict[str, float], dict[str, float]]:
@@ -186,7 +214,8 @@ def main() -> None:
             for name, value in values.items():
                 print(f"  {name:<64}{value:>12.4g}", flush=True)
 
-    show(against_number, "number of records: CPU ms a record", "number of records: peak memory of the process, MB")
+    show(against_number, "number of records: CPU ms a record")
+    show(memory, "peak memory, MB")
     show(against_duration, f"duration of {LANES} records, one channel: CPU s")
     show(against_freedom, "degrees of freedom, 1 s and four channels: CPU ms a record")
     show(against_teeth, "distinct teeth: CPU ms of a table", "distinct teeth: CPU ms a record of 0.2 s, table known")

@@ -6,14 +6,16 @@ import math
 import sys
 from dataclasses import dataclass
 from itertools import pairwise
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 from numpy.typing import NDArray
-from scipy.interpolate import PPoly
 
 from gensig.errors import ConfigError
 from gensig.units import from_si, unit
+
+if TYPE_CHECKING:
+    from scipy.interpolate import PPoly
 
 Array = NDArray[np.float64]
 
@@ -51,6 +53,8 @@ class Profile:
 
     def curve(self) -> PPoly:
         """The factor as a function of time in s; its derivative at a point is that of the piece that begins there."""
+        from scipy.interpolate import PPoly
+
         times = np.array([self.times[0] - 1.0, *self.times, self.times[-1] + 1.0])
         factors = np.array([self.factors[0], *self.factors, self.factors[-1]])
         return PPoly([np.diff(factors) / np.diff(times), factors[:-1]], times)

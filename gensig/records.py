@@ -5,7 +5,7 @@ from __future__ import annotations
 import copy
 import json
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from enum import IntEnum
 from typing import Any
 
@@ -71,7 +71,8 @@ def whole_number(key: str, value: Any, *, at_least: int) -> int:
 
 def record_system(config: Mapping[str, Any], values: Mapping[str, float]) -> SpurPair:
     """The machine of one record: the configuration with the drawn values put in."""
-    own = copy.deepcopy(dict(config))
+    varied = {key.partition(".")[0] for key in values}
+    own = {name: copy.deepcopy(part) if name in varied else part for name, part in config.items()}
     for key, value in values.items():
         replace_key(own, key, value)
     return read_system(own)
@@ -96,40 +97,36 @@ def simulate_records(config: Mapping[str, Any], rows: Sequence[Mapping[str, Any]
     A record's bits do not depend on what it is simulated beside. A motion that does not stay finite becomes a record
     marked as failed.
     """
-    machines = [record_system(config, _row_values(row)) for row in rows]
-    runs = [_row_run(config, system, row) for system, row in zip(machines, rows, strict=True)]
-    wanted: dict[TwinKey, Run] = {}
-    for system, row in zip(machines, rows, strict=True):
-        key = _twin_key(config, row)
-        if system.sensing.snr is not None and system.sensing.snr_reference == "healthy_twin" and key not in _TWINS:
-            wanted.setdefault(key, _twin_run(config, system, row))
-    results = simulate_together([*runs, *wanted.values()])
-    fresh = dict(zip(wanted, results[len(rows) :], strict=True))
-    kept = {key: found for row in rows if (found := _TWINS.get(key := _twin_key(config, row))) is not None}
+    machines = [record_system(config, row_values(row)) for row in rows]
+    runs = [row_run(config, system, row) for system, row in zip(machines, rows, strict=True)]
+    keys = _twin_keys(config, rows)
+    places, further = _missing_twins(config, runs, rows, keys)
+    results = simulate_together([*runs, *further])
+    kept = {key: found for key in keys if (found := _TWINS.get(key)) is not None}
     _TWINS.clear()
     _TWINS.update(kept)
-    _TWINS.update(
-        {key: twin if isinstance(twin, SimulationError) else power(twin.acceleration) for key, twin in fresh.items()}
-    )
+    for key, place in places.items():
+        twin = results[place]
+        _TWINS[key] = twin if isinstance(twin, SimulationError) else power(twin.acceleration)
     return [
-        _finish(config, system, row, result)
-        for system, row, result in zip(machines, rows, results[: len(rows)], strict=True)
+        _finish(config, system, row, key, result)
+        for system, row, key, result in zip(machines, rows, keys, results[: len(rows)], strict=True)
     ]
 
 
 def _finish(
-    config: Mapping[str, Any], system: SpurPair, row: Mapping[str, Any], result: CleanRecord | SimulationError
+    config: Mapping[str, Any],
+    system: SpurPair,
+    row: Mapping[str, Any],
+    twin: TwinKey,
+    result: CleanRecord | SimulationError,
 ) -> Record:
     """Noise, labels and result columns of one simulated row."""
     seed, index = read_seed(config), int(str(row["record_id"]).lstrip("r"))
     n_channels = len(system.sensing.channels)
     noise_power: Array | SimulationError = np.zeros(n_channels)
     if system.sensing.snr is not None and not isinstance(result, SimulationError):
-        reference = (
-            _TWINS[_twin_key(config, row)]
-            if system.sensing.snr_reference == "healthy_twin"
-            else power(result.acceleration)
-        )
+        reference = _TWINS[twin] if system.sensing.snr_reference == "healthy_twin" else power(result.acceleration)
         factor = 10.0 ** (-system.sensing.snr / 10.0)
         noise_power = reference if isinstance(reference, SimulationError) else reference * factor
     problem = next((one for one in (result, noise_power) if isinstance(one, SimulationError)), None)
@@ -173,7 +170,7 @@ def _multihot(config: Mapping[str, Any], row: Mapping[str, Any]) -> NDArray[np.i
     return np.array(present, dtype=np.int8)
 
 
-def _row_values(row: Mapping[str, Any]) -> dict[str, float]:
+def row_values(row: Mapping[str, Any]) -> dict[str, float]:
     """The drawn values of the machine, by configuration key."""
     return {
         key.removeprefix("params/"): float(value)
@@ -187,7 +184,7 @@ def row_faults(row: Mapping[str, Any]) -> list[Fault]:
     return [fault for part in json.loads(str(row["faults_json"])) for fault in read_faults(part, "faults_json")]
 
 
-def _row_run(config: Mapping[str, Any], system: SpurPair, row: Mapping[str, Any]) -> Run:
+def row_run(config: Mapping[str, Any], system: SpurPair, row: Mapping[str, Any]) -> Run:
     specimen, gearbox = _unit(config, system, row)
     start = Start(
         tooth_pinion=int(row["start_tooth_pinion"]),
@@ -207,20 +204,39 @@ def forget_twins() -> None:
     _TWINS.clear()
 
 
-def _twin_key(config: Mapping[str, Any], row: Mapping[str, Any]) -> TwinKey:
-    return identity_hash(dict(config), __version__), str(row["condition_id"])
+def _twin_keys(config: Mapping[str, Any], rows: Sequence[Mapping[str, Any]]) -> list[TwinKey]:
+    identity = identity_hash(dict(config), __version__)
+    return [(identity, str(row["condition_id"])) for row in rows]
 
 
-def _twin_run(config: Mapping[str, Any], system: SpurPair, row: Mapping[str, Any]) -> Run:
-    """The healthy twin of a unit at a condition, from a start of its own."""
+def _missing_twins(
+    config: Mapping[str, Any], runs: Sequence[Run], rows: Sequence[Mapping[str, Any]], keys: Sequence[TwinKey]
+) -> tuple[dict[TwinKey, int], list[Run]]:
+    """The healthy twins that noise needs and nobody has yet: their places among the runs and the further ones given.
+
+    A plan lets the sound record of a group start as the twin does: where that is among the runs, it is the twin.
+    """
+    wanted: dict[TwinKey, Run] = {}
+    among: dict[TwinKey, int] = {}
+    for place, (run, row, key) in enumerate(zip(runs, rows, keys, strict=True)):
+        sensing = run.system.sensing
+        if sensing.snr is not None and sensing.snr_reference == "healthy_twin" and key not in _TWINS:
+            twin = replace(run, faults=(), start=_twin_start(config, run.system, row))
+            wanted.setdefault(key, twin)
+            if not run.faults and run.start == twin.start:
+                among[key] = place
+    further = [key for key in wanted if key not in among]
+    return among | {key: len(runs) + k for k, key in enumerate(further)}, [wanted[key] for key in further]
+
+
+def _twin_start(config: Mapping[str, Any], system: SpurPair, row: Mapping[str, Any]) -> Start:
+    """Where the healthy twin of a unit at a condition starts."""
     rng = stream(read_seed(config), Stream.TWIN, int(str(row["condition_id"]).rpartition("-")[2]))
-    start = Start(
+    return Start(
         tooth_pinion=int(rng.integers(system.pair.pinion.n_teeth)),
         tooth_wheel=int(rng.integers(system.pair.wheel.n_teeth)),
         phase=float(rng.random()),
     )
-    specimen, gearbox = _unit(config, system, row)
-    return Run(system=system, faults=(), start=start, specimen=specimen, gearbox=gearbox)
 
 
 def _unit(config: Mapping[str, Any], system: SpurPair, row: Mapping[str, Any]) -> tuple[Specimen, Gearbox]:

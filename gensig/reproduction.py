@@ -22,8 +22,8 @@ from gensig.errors import ConfigError, DatasetError, SimulationError
 from gensig.records import (
     Record,
     Stream,
-    _row_run,
-    _row_values,
+    row_run,
+    row_values,
     read_seed,
     record_system,
     simulate_record,
@@ -124,7 +124,7 @@ def simulate_twin(config: Mapping[str, Any], row: Mapping[str, Any]) -> Record:
     signals = dict(twin.signals)
     if not np.array_equal(signals["noise_power"], original.signals["noise_power"]):
         # noise follows the record, so that the twin alone would have another
-        (healthy,) = simulate_together([_row_run(sham, record_system(config, _row_values(row)), row)])
+        (healthy,) = simulate_together([row_run(sham, record_system(config, row_values(row)), row)])
         if isinstance(healthy, SimulationError):
             raise healthy
         rng = stream(read_seed(config), Stream.NOISE, int(str(row["record_id"]).lstrip("r")))

@@ -38,6 +38,8 @@ def test_house_rule(command: tuple[str, ...]) -> None:
         ("import gensig.cli", ("numpy", "h5py", "hydra", "numba", "torch", "scipy")),
         ("import gensig.generation", ("torch", "sklearn", "hydra", "matplotlib")),
         ("import gensig.streaming", ("torch", "sklearn", "hydra", "matplotlib")),
+        # half a second each, which the first record of a session would wait for
+        ("import gensig.records", ("scipy.signal", "scipy.optimize", "scipy.stats", "scipy.interpolate")),
         ("import diagnose.data", ("numba", "gensig.systems", "gensig.mesh")),
     ],
 )

@@ -15,11 +15,22 @@ from gensig.dynamics._equations import P_TURN, accelerate, event, motion, recent
 from gensig.dynamics._layout import AHEAD, BASE, NOMINAL, PART, ROLL, at_row
 from gensig.dynamics._mesh_kernels import mesh_law
 from gensig.dynamics._tables import between, cover, gather
-from gensig.dynamics._vector import any_above, compiled, load, n_lanes, spread, store, where_above, width
+from gensig.dynamics._vector import (
+    any_above,
+    compiled,
+    load,
+    n_lanes,
+    plus_product,
+    spread,
+    store,
+    where_above,
+    width,
+)
 from gensig.mesh.pair_table import N_PAIRS
 
 RECENTER = 256  # steps after which the drift of the rotations is taken out of them, so that small numbers stay small
 BLOCK = 64  # output samples between two passes of the low-pass: what it reads is still in the cache
+TOGETHER = 4  # samples of the low-pass that are summed side by side; divides BLOCK
 
 
 @compiled
@@ -207,24 +218,31 @@ def low_pass(means, first, taps, factor, n_channels, n_samples, out, out_row):
     """Every ``factor``-th value of the filtered series of every channel.
 
     ``means`` (step, channel, lane) and, from row ``out_row`` on, ``out`` (sample, channel, lane), flat; ``first`` is
-    the step under the first tap of the first sample. Four partial sums, always in the same order.
+    the step under the first tap of the first sample. ``TOGETHER`` samples at a time share what they read: before and
+    behind ``taps`` stand as many zeros as the first and the last of them lie apart.
     """
-    n, n_taps = width(means), len(taps)
-    row = n_channels * n
-    for s in range(n_samples):
+    n = width(means)
+    row, apart = n_channels * n, (TOGETHER - 1) * factor
+    n_taps = len(taps) - 2 * apart
+    for s in range(0, n_samples, TOGETHER):
+        n_read = n_taps + (min(TOGETHER, n_samples - s) - 1) * factor
         for c in range(n_channels):
             base = (first + s * factor) * row + c * n
             zero = spread(means, 0.0)
             p, q, r, t = zero, zero, zero, zero
-            for k in range(0, n_taps - 3, 4):
-                here = base + k * row
-                p = p + taps[k] * load(means, here)
-                q = q + taps[k + 1] * load(means, here + row)
-                r = r + taps[k + 2] * load(means, here + 2 * row)
-                t = t + taps[k + 3] * load(means, here + 3 * row)
-            for k in range(n_taps - n_taps % 4, n_taps):
-                p = p + taps[k] * load(means, base + k * row)
-            store(out, (out_row + s) * row + c * n, (p + q) + (r + t))
+            for k in range(n_read):
+                value, tap = load(means, base + k * row), apart + k
+                p, q = plus_product(p, taps, tap, value), plus_product(q, taps, tap - factor, value)
+                r = plus_product(r, taps, tap - 2 * factor, value)
+                t = plus_product(t, taps, tap - 3 * factor, value)
+            here = (out_row + s) * row + c * n
+            store(out, here, p)
+            if s + 1 < n_samples:
+                store(out, here + row, q)
+            if s + 2 < n_samples:
+                store(out, here + 2 * row, r)
+            if s + 3 < n_samples:
+                store(out, here + 3 * row, t)
 
 
 @compiled
@@ -236,7 +254,7 @@ def record(
     ``out`` (lane, channel, sample) float64 takes ``n_samples``; the first tap of the first stands on the step after
     ``first_step``. ``means`` is a scratch of ``mean_rows`` rows of channels, of which the last ``BLOCK`` take samples.
     """
-    n, n_channels, n_kept = width(work), len(channels), len(taps) - factor
+    n, n_channels, n_kept = width(work), len(channels), len(taps) - (2 * TOGETHER - 1) * factor
     angle_row, now, done, row = 0, first_step, 0, len(channels) * width(work)
     samples = n_kept + BLOCK * factor
     n_steps, out_row = 1, -1  # then what the first sample needs before its last steps, then block by block
@@ -286,8 +304,8 @@ def law_at(group, motion, work, wide, near, found):
 
 
 def mean_rows(n_taps, factor):
-    """Rows of channels that ``record`` needs for its steps."""
-    return n_taps - factor + BLOCK * factor + BLOCK
+    """Rows of channels that ``record`` needs for its steps, for taps with their zeros."""
+    return n_taps - (2 * TOGETHER - 1) * factor + BLOCK * factor + BLOCK
 
 
 def scratch(n_dof, n_channels, precision="float64"):

@@ -16,6 +16,7 @@ import numpy as np
 from llvmlite import ir
 from numba import njit
 from numba.core import types
+from numba.core.cgutils import get_or_insert_function
 from numba.core.typing.templates import ConcreteTemplate, infer_global, signature
 from numba.extending import intrinsic, lower_builtin, models, register_model
 
@@ -63,8 +64,13 @@ VECTORS = (*GROUPS.values(), *ROWS.values())
 
 def _filled(builder: Any, kind: Vector, number: Any) -> Any:
     """A float64 in every place of a vector."""
-    if kind.element is types.float32:
-        number = builder.fptrunc(number, ir.FloatType())
+    return _repeated(
+        builder, kind, builder.fptrunc(number, ir.FloatType()) if kind.element is types.float32 else number
+    )
+
+
+def _repeated(builder: Any, kind: Vector, number: Any) -> Any:
+    """A number of a vector's kind in every place."""
     nothing = ir.Constant(kind.llvm, ir.Undefined)
     one = builder.insert_element(nothing, number, ir.Constant(_INDEX, 0))
     return builder.shuffle_vector(one, nothing, ir.Constant(ir.VectorType(_INDEX, kind.count), [0] * kind.count))
@@ -104,10 +110,15 @@ for _function, _instruction in (
     _binary(_function, _instruction)
 
 
-def _address(context: Any, builder: Any, kind: Any, array: Any, place: Any, vector: Vector) -> Any:
+_NUMBERS = {types.float64: ir.DoubleType(), types.float32: ir.FloatType()}
+
+
+def _address(context: Any, builder: Any, kind: Any, array: Any, place: Any, read: Any) -> Any:
+    """Where a vector, or a single number, lies."""
     # the plain field: a proxy of the whole array at every access would cost the compiler most of its time
     data = builder.extract_value(array, context.data_model_manager[kind].get_field_position("data"))
-    return builder.bitcast(builder.gep(data, [place]), vector.llvm.as_pointer())
+    llvm = read.llvm if isinstance(read, Vector) else _NUMBERS[read]
+    return builder.bitcast(builder.gep(data, [place]), llvm.as_pointer())
 
 
 def _loaded(vectors: dict[Any, Vector], array: Any) -> Any:
@@ -172,6 +183,20 @@ def where_above(typing_context: Any, a: Any, b: Any, yes: Any, no: Any) -> Any:
         return builder.select(builder.fcmp_ordered(">", args[0], args[1]), args[2], args[3])
 
     return a(a, a, a, a), build
+
+
+@_intrinsic
+def plus_product(typing_context: Any, total: Any, factors: Any, place: Any, value: Any) -> Any:
+    """``total + factors[place] * value``, rounded once; ``factors`` is an array of the vectors' kind."""
+
+    def build(context: Any, builder: Any, sig: Any, args: Any) -> Any:
+        kind = sig.return_type
+        number = builder.load(_address(context, builder, sig.args[1], args[1], args[2], kind.element))
+        name = f"llvm.fma.v{kind.count}f{kind.element.bitwidth}"
+        fma = get_or_insert_function(builder.module, ir.FunctionType(kind.llvm, (kind.llvm,) * 3), name)
+        return builder.call(fma, (_repeated(builder, kind, number), args[3], args[0]))
+
+    return total(total, factors, types.intp, total), build
 
 
 @_intrinsic

@@ -2,20 +2,24 @@
 
 from __future__ import annotations
 
+import json
 import math
 from dataclasses import dataclass
 from functools import lru_cache
+from pathlib import Path
+from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
 
-from gensig.dynamics._kernels import low_pass
+from gensig.dynamics._kernels import TOGETHER, low_pass
 
 Array = NDArray[np.float64]
 
 PASS_SHARE = 0.390625  # 20 kHz of 51.2 kHz
 ATTENUATION_DB = 100.0
 LOWEST_HZ = 20.0
+STORED = Path(__file__).with_name("low_pass.json")  # first halves of symmetric taps, by oversampling
 
 
 def usable_band(sampling_rate: float) -> tuple[float, float]:
@@ -31,6 +35,10 @@ class Decimator:
     oversampling: int
     margin: int
 
+    def padded(self, precision: str) -> NDArray[Any]:
+        """Taps as the compiled low-pass takes them."""
+        return np.pad(self.taps, (TOGETHER - 1) * self.oversampling).astype(precision)
+
     def apply(self, means: Array) -> Array:
         """Mean values over internal steps to samples at the output rate.
 
@@ -45,12 +53,21 @@ class Decimator:
         n_steps, n_channels, n_lanes = means.shape
         n_samples = (n_steps - 1) // self.oversampling - 2 * self.margin
         out = np.empty((n_samples, n_channels, n_lanes), dtype=means.dtype)
-        low_pass(means.ravel(), 1, self.taps, self.oversampling, n_channels, n_samples, out.ravel(), 0)
+        taps = self.padded(means.dtype.name)
+        low_pass(means.ravel(), 1, taps, self.oversampling, n_channels, n_samples, out.ravel(), 0)
         return np.ascontiguousarray(out.transpose(2, 1, 0), dtype=np.float64)
 
 
 @lru_cache(maxsize=16)
 def decimator(oversampling: int) -> Decimator:
+    """The low-pass; see ``design``, whose import takes longer than a first record: that of the default is stored."""
+    stored = json.loads(STORED.read_text("utf-8")).get(str(oversampling))
+    if stored is None:
+        return design(oversampling)
+    return Decimator(np.array([*stored, *reversed(stored)]), oversampling, len(stored) // oversampling)
+
+
+def design(oversampling: int) -> Decimator:
     """Kaiser-window design: pass to 0.39 of the output rate, stop from half of it, so that nothing folds anywhere.
 
     An even number of taps puts samples at the ends of steps, whose means lie half a step earlier; the pass band makes

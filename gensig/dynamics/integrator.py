@@ -16,14 +16,14 @@ from gensig.dynamics._vector import PRECISIONS, n_lanes
 from gensig.dynamics.decimation import Decimator, decimator
 from gensig.dynamics.lanes import at_step, fill_lanes, pack
 from gensig.dynamics.pair import DOFS, PairDynamics
-from gensig.dynamics.system import eigenvalues, slowest_decay
+from gensig.dynamics.system import slowest_decay
 from gensig.errors import ConfigError, SimulationError
 
 Array = NDArray[np.float64]
 
 LONGEST_SETTLING = 0.45  # s
 # the slow transient of the drive takes nearly all of the settling; coarse steps carry it, fine ones end it
-COARSE_OVERSAMPLING = 4
+COARSE_OVERSAMPLING = 3
 FINE_SETTLING = 0.02  # s
 CHECKED = 0.05  # s at the beginning of a record, integrated again at half the step
 FINEST = 64  # steps per sample that are tried where the error is too large
@@ -77,7 +77,7 @@ class Motions:
 
 def settling_time(dynamics: PairDynamics) -> float:
     """Time after which the start's transient has fallen to 1e-4 (longest 0.45 s), s."""
-    rate = slowest_decay(dynamics.system(), dynamics.approach_direction(), dynamics.mean_mesh_stiffness())
+    rate = slowest_decay(dynamics.system(), dynamics.approach_direction(), dynamics.mean_mesh_stiffness)
     return min(LONGEST_SETTLING, math.log(1.0 / SETTLED) / rate)
 
 
@@ -128,11 +128,12 @@ class _Run:
         factor, margin = low_pass.oversampling, low_pass.margin
         out = np.empty((self.n_lanes, len(self.channels), n_samples))
         angle = np.empty((n_samples + 2 * margin, self.n_lanes))
-        n_rows = _kernels.mean_rows(len(low_pass.taps), factor)
+        taps = low_pass.padded(self.precision)
+        n_rows = _kernels.mean_rows(len(taps), factor)
         means = np.empty((n_rows, len(self.channels), self.n_lanes), dtype=self.precision)
         _kernels.record(
             group, self.state.ravel(), self.lost, self.fresh, step, -margin * factor - 1, n_samples, factor,
-            low_pass.taps, self.channels, out.ravel(), angle.ravel(), means.ravel(), self.work, self.wide, self.near,
+            taps, self.channels, out.ravel(), angle.ravel(), means.ravel(), self.work, self.wide, self.near,
         )  # fmt: skip
         return out, np.ascontiguousarray(angle[margin : margin + n_samples + 1].T)
 
@@ -213,13 +214,8 @@ def settling_oversampling(dynamics: PairDynamics, solver: Solver, sampling_rate:
     """
     fine = solver.oversampling
     check_step(dynamics, sampling_rate, fine)
-    stable = float(np.abs(_rates(dynamics)).max()) / (sampling_rate * COARSE_OVERSAMPLING) < 0.5 * STABILITY_LIMIT
+    stable = float(np.abs(dynamics.stiff_rates).max()) / (sampling_rate * COARSE_OVERSAMPLING) < 0.5 * STABILITY_LIMIT
     return COARSE_OVERSAMPLING if stable and fine > COARSE_OVERSAMPLING else fine
-
-
-def _rates(dynamics: PairDynamics) -> NDArray[np.complex128]:
-    """Eigenvalues with the mesh held somewhat above its mean stiffness, 1/s."""
-    return eigenvalues(dynamics.system(), dynamics.approach_direction(), 1.2 * dynamics.mean_mesh_stiffness())
 
 
 def count_samples(duration: float, sampling_rate: float) -> int:
@@ -252,7 +248,7 @@ def check_channels(channels: tuple[str, ...], dofs: tuple[str, ...] = DOFS) -> N
 
 def check_step(dynamics: PairDynamics, sampling_rate: float, oversampling: int) -> None:
     """Raise SimulationError for a step that RK4 cannot take, warn of one that is too long to be accurate."""
-    rates, step = _rates(dynamics), 1.0 / (sampling_rate * oversampling)
+    rates, step = dynamics.stiff_rates, 1.0 / (sampling_rate * oversampling)
     fastest = float(np.abs(rates).max())
     if fastest * step > STABILITY_LIMIT:
         raise SimulationError(

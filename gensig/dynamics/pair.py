@@ -3,17 +3,17 @@
 from __future__ import annotations
 
 import math
-from dataclasses import dataclass
-from functools import cached_property, lru_cache
+from dataclasses import dataclass, replace
+from functools import cached_property
 
 import numpy as np
 from numpy.typing import NDArray
 
 from gensig.dynamics._layout import FAR_NEAR
-from gensig.dynamics.system import LumpedSystem
+from gensig.dynamics.system import LumpedSystem, eigenvalues
 from gensig.errors import ConfigError
 from gensig.mesh.load_distribution import PairStates, pair_states, static_mesh
-from gensig.mesh.pair_table import PairTable
+from gensig.mesh.pair_table import GearTable, PairTable
 from gensig.operating import Nominal, Operating
 from gensig.units import split_unit, unit
 
@@ -23,6 +23,8 @@ PAIR_DOFS = ("pinion_x", "pinion_y", "pinion_rotation", "wheel_x", "wheel_y", "w
 # all that a machine may have; ``PairDynamics.dofs`` says which
 DOFS = (*PAIR_DOFS, "motor_rotation", "load_rotation")
 APPROACH_SIGN = (0.0, -1.0, 1.0, 0.0, 1.0, -1.0)
+# a prime: no tooth is looked at where the last one was, so that few places a tooth show all of its path
+FRICTION_PLACES = 509
 PINION_X, PINION_Y, PINION_ROTATION, WHEEL_X, WHEEL_Y, WHEEL_ROTATION = range(6)  # places in PAIR_DOFS
 
 
@@ -193,14 +195,20 @@ class PairDynamics:
         direction[: len(PAIR_DOFS)] = np.array(APPROACH_SIGN) * radii
         return direction
 
+    @cached_property
     def mean_mesh_stiffness(self) -> float:
         """Mean tangent stiffness of sound teeth over one base pitch under the set torque, N/m."""
         return _mean_mesh_stiffness(self.table, self.mesh_force)
 
+    @cached_property
+    def stiff_rates(self) -> NDArray[np.complex128]:
+        """Eigenvalues with the mesh held somewhat above its mean stiffness, 1/s."""
+        return eigenvalues(self.system(), self.approach_direction(), 1.2 * self.mean_mesh_stiffness)
+
     def numbers(self, step: float, rest: Array) -> tuple[float, ...]:
         """The mesh as numbers, in the order of the rows of ``_layout.Group.numbers``."""
         table, options, pair = self.table, self.table.options, self.table.pair
-        viscous = 2.0 * options.damping_ratio * math.sqrt(self.mean_mesh_stiffness() * self.equivalent_mass)
+        viscous = 2.0 * options.damping_ratio * math.sqrt(self.mean_mesh_stiffness * self.equivalent_mass)
         return (
             pair.pinion.base_radius,
             pair.wheel.base_radius,
@@ -245,9 +253,10 @@ class PairDynamics:
         return float(table.position[first]), float(table.position[last])
 
     def friction_torque(self) -> float:
-        """Mean friction torque reduced to the pinion, from the static loads over one base pitch, N m."""
+        """Mean friction torque reduced to the pinion, from the static loads over one turn of the wheel, N m."""
         pair = self.table.pair
-        states = self._states(pair.base_pitch * (np.arange(64) + 0.5) / 64)
+        places = (np.arange(FRICTION_PLACES) + 0.5) / FRICTION_PLACES
+        states = self._states(pair.base_pitch * pair.wheel.n_teeth * places)
         loads = static_mesh(self.table, states, self.mesh_force).load
         arm = pair.start_curvature_radius + np.clip(states.position, 0.0, pair.path_of_contact)
         loss_arm = np.sign(states.position - pair.pitch_point) * (arm - (pair.tangent_length - arm) / pair.ratio)
@@ -291,7 +300,12 @@ class PairDynamics:
 
     def _states(self, roll: Array) -> PairStates:
         return pair_states(
-            self.table, roll, start_tooth_pinion=self.start_tooth_pinion, start_tooth_wheel=self.start_tooth_wheel
+            self.table,
+            roll,
+            start_tooth_pinion=self.start_tooth_pinion,
+            start_tooth_wheel=self.start_tooth_wheel,
+            pinion_error=self.pinion_error,
+            wheel_error=self.wheel_error,
         )
 
 
@@ -301,9 +315,20 @@ def _couple(matrix: Array, one: int, other: int, value: float) -> None:
     matrix[[one, other], [other, one]] -= value
 
 
-@lru_cache(maxsize=32)
 def _mean_mesh_stiffness(table: PairTable, force: float) -> float:
-    # tooth pairs away from a faulty tooth are the sound ones: average where most pairs are
-    roll = table.pair.base_pitch * (np.arange(table.pair.pinion.n_teeth * 32) + 0.5) / 32
-    stiffness = static_mesh(table, pair_states(table, roll), force).stiffness
+    """Over the teeth that most are, which are the sound ones; where all differ, the median over the teeth."""
+    mesh, n_pitches = table, table.pair.pinion.n_teeth
+    pinion, wheel = _commonest(table.pinion), _commonest(table.wheel)
+    if pinion is not None and wheel is not None:
+        mesh, n_pitches = replace(table, pinion=pinion, wheel=wheel), 1
+    roll = table.pair.base_pitch * (np.arange(n_pitches * 32) + 0.5) / 32
+    stiffness = static_mesh(mesh, pair_states(mesh, roll), force).stiffness
     return float(np.median(stiffness.reshape(-1, 32), axis=0).mean())
+
+
+def _commonest(side: GearTable) -> GearTable | None:
+    """A gear whose teeth are all what most of them are; None where there is no such kind."""
+    counts = np.bincount(side.kind)
+    if counts.max() <= len(side.kind) // 2:
+        return None
+    return replace(side, kind=np.full_like(side.kind, counts.argmax()))

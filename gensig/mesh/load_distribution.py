@@ -40,17 +40,30 @@ class StaticMesh:
 
 
 def pair_states(
-    table: PairTable, roll: Array, *, start_tooth_pinion: int = 0, start_tooth_wheel: int = 0
+    table: PairTable,
+    roll: Array,
+    *,
+    start_tooth_pinion: int = 0,
+    start_tooth_wheel: int = 0,
+    pinion_error: Array | None = None,
+    wheel_error: Array | None = None,
 ) -> PairStates:
-    """Pairs at the pinion's roll, (phase,) m along the line of action; at 0 the start teeth enter at A."""
+    """Pairs at the pinion's roll, (phase,) m along the line of action; at 0 the start teeth enter at A.
+
+    ``pinion_error`` and ``wheel_error`` (tooth,) m open the gaps of their teeth.
+    """
     pitch = table.pair.base_pitch
     newest = np.floor(roll / pitch).astype(np.int64)
     index = newest[:, None] + 1 - np.arange(N_PAIRS)
     position = roll[:, None] - index * pitch
     compliance = np.full(position.shape, -table.shared_compliance)
     gap = np.zeros(position.shape)
-    for side, start in ((table.pinion, start_tooth_pinion), (table.wheel, start_tooth_wheel)):
-        kinds = side.kind[(index + start) % len(side.kind)]
+    sides = ((table.pinion, start_tooth_pinion, pinion_error), (table.wheel, start_tooth_wheel, wheel_error))
+    for side, start, error in sides:
+        teeth = (index + start) % len(side.kind)
+        kinds = side.kind[teeth]
+        if error is not None:
+            gap += error[teeth]
         for kind in np.unique(kinds):
             here = kinds == kind
             compliance[here] += np.interp(position[here], table.position, side.compliance[kind])

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Mapping
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from functools import lru_cache
 from typing import Any
 
@@ -91,10 +91,16 @@ def pair_table(
     position = node_positions(pair, options)
     sound = _sound_structure(pair, material, options)
     sides = {}
-    for name, side in flank_sides(pair, position, material, options, load).items():
+    for name, side in _node_sides(pair, material, options).items():
         mine = {tooth: odd[gear, tooth] for gear, tooth in sorted(odd) if gear == name}
         sides[name] = _gear_table(
-            side, position, mine, sound[name], sound["bending"], material.in_plane(options.elasticity), options
+            side.under(load),
+            position,
+            mine,
+            sound[name],
+            sound["bending"],
+            material.in_plane(options.elasticity),
+            options,
         )
     stiffest = float(sides["pinion"].compliance.min() + sides["wheel"].compliance.min())
     if sound["shared"] >= 0.95 * stiffest:
@@ -110,6 +116,12 @@ def pair_table(
         wheel=sides["wheel"],
         shared_compliance=sound["shared"],
     )
+
+
+@lru_cache(maxsize=16)
+def _node_sides(pair: GearPair, material: Material, options: MeshOptions) -> dict[str, FlankSide]:
+    """The flanks at the nodes, under no load that matters."""
+    return flank_sides(pair, node_positions(pair, options), material, options, 1.0)
 
 
 @lru_cache(maxsize=16)
@@ -203,15 +215,21 @@ def slice_bending(pair: GearPair, position: Array, material: Material, options: 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class FlankSide:
     """One gear's flank at contact positions: ``flank_curvature`` goes on beyond its tip, ``curvature`` is held at A
-    and E. ``base`` is the part of a sound pair's contact compliance that the mate's side carries already."""
+    and E. ``base`` is the ``share`` of a sound pair's contact compliance that the mate's side carries already."""
 
     gear: Gear
     curvature: Array
     flank_curvature: Array
     relative_radius: Array
     law: ContactLaw
+    share: float
     load: Array
     base: Array
+
+    def under(self, load: Array | float) -> FlankSide:
+        """The same under another load of a pair in N, (phase,) or one for all."""
+        loads = np.array(np.broadcast_to(np.asarray(load, dtype=np.float64), self.curvature.shape))
+        return replace(self, load=loads, base=self.share * self.law.compliance(self.gear.face_width, loads))
 
     def contact(self, tooth: Tooth, bending: Array, options: MeshOptions) -> tuple[Array, Array]:
         """Gap and contact compliance of one tooth against a sound mate, (phase,) m and m/N, less ``base``.
@@ -242,8 +260,6 @@ def flank_sides(
     """
     on_path = np.clip(position, 0.0, pair.path_of_contact)
     law = contact_law(pair, on_path, material, options)
-    loads = np.array(np.broadcast_to(np.asarray(load, dtype=np.float64), position.shape))
-    sound = law.compliance(pair.pinion.face_width, loads)
     relative = relative_radius(pair, on_path)
     return {
         gear.name: FlankSide(
@@ -252,9 +268,10 @@ def flank_sides(
             flank_curvature=np.asarray(curvature(beyond_tip)),
             relative_radius=relative,
             law=law,
-            load=loads,
-            base=share * sound,
-        )
+            share=share,
+            load=np.empty(0),
+            base=np.empty(0),
+        ).under(load)
         for gear, curvature, beyond_tip, share in (
             (pair.pinion, pair.pinion_curvature, np.maximum(position, 0.0), 1.0 - pinion_share),
             (pair.wheel, pair.wheel_curvature, np.minimum(position, pair.path_of_contact), pinion_share),

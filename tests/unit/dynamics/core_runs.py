@@ -73,10 +73,11 @@ class CoreRun:
         n, factor = len(self.machines), low_pass.oversampling
         out = np.full((n, len(self.channels), n_samples), np.nan)
         angle = np.full((n_samples + 2 * low_pass.margin, n), np.nan)
-        n_rows = _kernels.mean_rows(len(low_pass.taps), factor)
+        taps = low_pass.padded(self.precision)
+        n_rows = _kernels.mean_rows(len(taps), factor)
         means = np.full((n_rows, len(self.channels), n), np.nan, dtype=self.precision)
         _kernels.record(
             self.group, self.state.ravel(), self.lost, self.fresh, self.step, self.now, n_samples, factor,
-            low_pass.taps, self.channels, out.ravel(), angle.ravel(), means.ravel(), self.work, self.wide, self.near,
+            taps, self.channels, out.ravel(), angle.ravel(), means.ravel(), self.work, self.wide, self.near,
         )  # fmt: skip
         return out, angle

@@ -1,5 +1,6 @@
 """The low-pass before decimation: flat, free of folded content, without delay."""
 
+import json
 from dataclasses import replace
 
 import numpy as np
@@ -7,7 +8,7 @@ import pytest
 from numpy.testing import assert_allclose
 
 from gensig.dynamics._vector import LANES, n_lanes
-from gensig.dynamics.decimation import ATTENUATION_DB, decimator, in_band_error, usable_band
+from gensig.dynamics.decimation import ATTENUATION_DB, STORED, decimator, design, in_band_error, usable_band
 
 RATE = 51200.0
 N_SAMPLES = 2048
@@ -94,6 +95,20 @@ def test_taps_are_symmetric_and_reach_the_margin(oversampling):
     assert len(low_pass.taps) == 2 * low_pass.margin * oversampling
     assert_allclose(low_pass.taps, low_pass.taps[::-1], rtol=0, atol=1e-13)
     assert_allclose(low_pass.taps.sum(), 1.0, rtol=5e-4, atol=0)
+
+
+def test_what_is_stored_is_what_would_be_designed():
+    stored = json.loads(STORED.read_text())
+    assert {"5", "10"} == set(stored)
+    for oversampling in map(int, stored):
+        low_pass, designed = decimator(oversampling), design(oversampling)
+        assert low_pass.margin == designed.margin
+        assert_allclose(low_pass.taps, designed.taps, rtol=0, atol=1e-15)
+
+
+def test_the_default_and_its_check_are_stored(composed_config):
+    default = composed_config["solver"]["oversampling"]
+    assert {str(default), str(2 * default)} <= set(json.loads(STORED.read_text()))
 
 
 def test_in_float32_the_sums_keep_six_digits(oversampling):

@@ -50,8 +50,8 @@ def test_reduced_values(xiamen, dynamics_of):
 
 def test_mean_mesh_stiffness_ignores_the_faulty_tooth(xiamen, dynamics_of):
     sound, faulty = (dynamics_of(xiamen, faults) for faults in ((), (MissingTooth(gear="pinion", tooth=3),)))
-    assert_allclose(faulty.mean_mesh_stiffness(), sound.mean_mesh_stiffness(), rtol=1e-9, atol=0)
-    assert 2e8 < sound.mean_mesh_stiffness() < 3e8
+    assert_allclose(faulty.mean_mesh_stiffness, sound.mean_mesh_stiffness, rtol=1e-9, atol=0)
+    assert 2e8 < sound.mean_mesh_stiffness < 3e8
 
 
 def test_friction_torque_is_a_per_cent_loss(xiamen, dynamics_of, machine):

@@ -310,7 +310,7 @@ class TestConfiguration:
 
 
 class TestMeshNumbers:
-    def test_the_mean_stiffness_of_a_table_is_found_once(self, smooth, dynamics_of, monkeypatch):
+    def test_the_mean_stiffness_is_found_once_a_machine(self, smooth, dynamics_of, monkeypatch):
         calls = []
 
         def counted(*arguments):
@@ -319,14 +319,28 @@ class TestMeshNumbers:
 
         fresh = replace(dynamics_of(smooth), table=replace(smooth.mesh_table()))
         monkeypatch.setattr(pair, "static_mesh", counted)
-        first = fresh.mean_mesh_stiffness()
+        first = fresh.mean_mesh_stiffness
+        assert fresh.mean_mesh_stiffness == first
         assert len(calls) == 1
-        assert replace(fresh, start_phase=0.9, **MACHINES["both"]).mean_mesh_stiffness().hex() == first.hex()
-        assert len(calls) == 1
-        assert pair._mean_mesh_stiffness.__wrapped__(fresh.table, fresh.mesh_force).hex() == first.hex()
+        assert replace(fresh, start_phase=0.9, **MACHINES["both"]).mean_mesh_stiffness.hex() == first.hex()
         lighter = replace(fresh, operating=replace(fresh.operating, torque=2.0))
-        assert lighter.mean_mesh_stiffness() < first
-        assert len(calls) == 3
+        assert lighter.mean_mesh_stiffness < first
+
+    def test_the_mean_stiffness_is_that_of_the_teeth_that_most_are(self, smooth):
+        table, force = smooth.mesh_table(), smooth.mesh_force
+        sound = pair._mean_mesh_stiffness(table, force)
+        soft = np.concatenate([table.pinion.compliance, 2.0 * table.pinion.compliance])
+
+        def softer(n_soft):
+            kind = (np.arange(23) < n_soft).astype(int)
+            rows = {name: np.repeat(getattr(table.pinion, name), 2, axis=0) for name in ("gap", "gap_slope", "present")}
+            rows["compliance_slope"] = np.repeat(table.pinion.compliance_slope, 2, axis=0)
+            return pair._mean_mesh_stiffness(
+                replace(table, pinion=replace(table.pinion, compliance=soft, kind=kind, **rows)), force
+            )
+
+        assert softer(11) == sound
+        assert softer(12) == softer(23) < 0.8 * sound
 
     def test_gears_too_far_apart_for_any_pair_are_followed_everywhere(self, whole):
         far = replace(whole, wheel_error=np.full(84, 2e-4))
