@@ -92,8 +92,8 @@ def _read_all(folder: Path) -> None:
 def _meaning(folder: Path) -> dict[str, Any]:
     """What a manifest says, less what decides nothing."""
     content = json.loads((folder / "manifest.json").read_text(encoding="utf-8"))
-    known = read_manifest(folder).__slots__
-    return {name: value for name, value in content.items() if name in known and name != "environment"}
+    known = set(read_manifest(folder).__slots__) - {"environment", "configuration"}
+    return {name: value for name, value in content.items() if name in known}
 
 
 def _work(template: Path, scratch: Path, seeds: range, pipe: Connection) -> None:

@@ -53,7 +53,7 @@ def mutate(folder: Path, seed: int) -> Mutant:
 
 
 def forge(folder: Path) -> None:
-    """Make sha256 and sizes in the manifest fit the files again."""
+    """Make every sha256 and size fit the files again."""
     path = folder / "manifest.json"
     manifest = json.loads(path.read_text(encoding="utf-8"))
     for entry in manifest["shards"]:
@@ -61,10 +61,21 @@ def forge(folder: Path) -> None:
         entry |= {"sha256": sha256_file(shard), "bytes": shard.stat().st_size}
     manifest["files"] = {name: sha256_file(folder / name) for name in manifest["files"]}
     path.write_text(json.dumps(manifest), encoding="utf-8")
+    forge_checksums(folder)
+
+
+def forge_checksums(folder: Path) -> None:
+    """Make `SHA256SUMS` fit the files again, whatever they are."""
+    path = folder / "SHA256SUMS"
+    names = [line.partition("  ")[2] for line in path.read_text(encoding="utf-8").splitlines()]
+    path.write_text("".join(f"{sha256_file(folder / name)}  {name}\n" for name in names), encoding="utf-8")
 
 
 def _file(folder: Path, rng: np.random.Generator) -> Path:
-    names = ["plan.csv", "index.h5", "config.yaml", *sorted(path.name for path in (folder / "splits").iterdir())]
+    names = [
+        "plan.csv", "index.h5", "config.yaml", "README.md", "croissant.json", "SHA256SUMS",
+        *sorted(path.name for path in (folder / "splits").iterdir()),
+    ]  # fmt: skip
     name = str(rng.choice(names))
     other = folder / "splits" / name if (folder / "splits" / name).exists() else folder / name
     return _shard(folder, rng) if rng.random() < 0.75 else other
@@ -278,6 +289,7 @@ def _manifest(folder: Path, number: int, rng: np.random.Generator) -> Mutant:
         place.pop(key) if name == "gone" else place.update({key: values[int(rng.integers(len(values)))]})
         path.write_text(json.dumps(content), encoding="utf-8")
         name = f"{key} {name}"
+    forge_checksums(folder)
     return Mutant(kind=f"manifest: {name}")
 
 

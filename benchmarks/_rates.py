@@ -19,7 +19,7 @@ from gensig.dynamics.decimation import decimator, in_band_error
 from gensig.dynamics.lanes import pack
 from gensig.dynamics.pair import PairDynamics
 from gensig.planning import make_plan
-from gensig.records import row_run, row_values, record_system
+from gensig.records import record_system, row_run, row_values
 
 Array = NDArray[np.float64]
 Work = tuple[Callable[[], Any], float]  # what to time, and the seconds that it simulates
@@ -70,7 +70,7 @@ def kernel(lanes: list[PairDynamics], oversampling: int, precision: str = "float
         for call in range(n_calls):
             _kernels.integrate(
                 group, state, run.lost, run.fresh, step, n_settling + call * PER_CALL, PER_CALL, CHANNELS, means, 0,
-                nothing, -1, 1, run.work, run.wide, run.near,
+                nothing, -1, 1, nothing, run.work, run.wide, run.near,
             )  # fmt: skip
             run.fresh[:] = 0.0
 
@@ -111,8 +111,8 @@ def difference(all_of: list[PairDynamics], oversampling: int) -> float:
         run.begin(group, lane, dynamics.static_start(0.0))
     ours = np.empty((n_steps, len(CHANNELS), LANES))
     _kernels.integrate(
-        group, run.state.ravel(), run.lost, run.fresh, step, 0, n_steps, CHANNELS, ours.ravel(), 0, np.empty(0), -1, 1,
-        run.work, run.wide, run.near,
+        group, run.state.ravel(), run.lost, run.fresh, step, 0, n_steps, CHANNELS, ours.ravel(), 0,
+        np.empty(0), -1, 1, np.empty(0), run.work, run.wide, run.near,
     )  # fmt: skip
     theirs = np.stack([scalar_run(one, oversampling, n_steps * step)[1] for one in all_of], axis=-1)
     return float(in_band_error(low_pass.apply(theirs), low_pass.apply(ours), SAMPLING_RATE).max())

@@ -22,6 +22,7 @@ PLAN, TABLES, EQUATIONS = "machine and plan row", "mesh tables", "equations and 
 SETTLING, RECORDING, CHECKING = "integration: settling", "integration: recording", "integration: error check"
 LOW_PASS, NOISE, WRITING, OTHER = "low-pass", "noise and labels", "HDF5 writing", "other"
 INTEGRATION = (SETTLING, RECORDING, CHECKING)
+CLOSING = "closing the folder"  # index, card and pictures: once a data set, whatever its size
 STAGES = (PLAN, TABLES, EQUATIONS, *INTEGRATION, LOW_PASS, NOISE, WRITING, OTHER)
 CLOCKED: tuple[tuple[Any, str, str], ...] = (
     (generation, "read_plan", PLAN),
@@ -42,6 +43,7 @@ CLOCKED: tuple[tuple[Any, str, str], ...] = (
     (ShardWriter, "__enter__", WRITING),
     (ShardWriter, "write", WRITING),
     (ShardWriter, "__exit__", WRITING),
+    (generation, "finalize", CLOSING),
 )
 
 
@@ -52,7 +54,7 @@ class Stages:
     """
 
     def __init__(self) -> None:
-        self.seconds = dict.fromkeys(STAGES, 0.0)
+        self.seconds = dict.fromkeys((*STAGES, CLOSING), 0.0)
         self.n_samples: dict[tuple[int, str], int] = {}
         self.n_runs = self.n_repeated = 0
         self._open: list[str] = []
@@ -126,7 +128,9 @@ class Stages:
             self.seconds[LOW_PASS] += spent
 
 
-def _low_pass_of(_run: Any, _group: Any, _step: float, low_pass: Decimator, n_samples: int) -> tuple[Decimator, int]:
+def _low_pass_of(
+    _run: Any, _group: Any, _step: float, low_pass: Decimator, n_samples: int, **_: Any
+) -> tuple[Decimator, int]:
     return low_pass, n_samples
 
 
@@ -134,12 +138,13 @@ def low_pass_seconds(oversampling: int, precision: str, n_channels: int, runs: i
     """CPU seconds of the low-pass for one output sample of a whole group, block by block as in the product."""
     low_pass, block = decimator(oversampling), _kernels.BLOCK
     width = n_channels * _kernels.n_lanes(precision)
-    means = np.zeros(_kernels.mean_rows(len(low_pass.taps), oversampling) * width, dtype=precision)
+    taps = low_pass.padded(precision)
+    means = np.zeros(_kernels.mean_rows(len(taps), oversampling) * width, dtype=precision)
     out, again = np.empty(block * width, dtype=precision), 50
 
     def work() -> None:
         for _ in range(again):
-            _kernels.low_pass(means, 0, low_pass.taps, oversampling, n_channels, block, out, 0)
+            _kernels.low_pass(means, 0, taps, oversampling, n_channels, block, out, 0)
 
     work()
     return least(work, runs) / (again * block)

@@ -1,14 +1,19 @@
 """Kill a run at random moments, resume it, compare: ``python -m benchmarks.kill_campaign [--kills 200]``.
 
-Each data set is begun with ``gensig generate`` and killed (SIGKILL, the parent or one of its workers, in turn drawn at
-random) until the asked number of kills is spent; then it is resumed, verified, and every file that counts as the data
-set is compared with an uninterrupted run byte by byte. After each kill the folder must not look whole unless it is.
-Needs Linux (/proc). The exit status is 1 for any difference.
+Each data set is begun with ``gensig generate`` and killed (SIGKILL) up to five times; then it is resumed, verified, and
+every file that counts as the data set is compared with an uninterrupted run byte by byte. After each kill the folder
+must not look whole unless it is; one that was killed before it had a manifest is begun again by the same command.
+
+Most runs are forked from this process, which has imported and compiled everything, so that kills fall into planning,
+writing and closing; one in ``COMMAND_EVERY`` is the command itself with two workers, imports included, of which the
+parent or a worker is killed. Needs Linux (/proc). The exit status is 1 for any difference, and where too few kills fell
+before the end of a run.
 """
 
 from __future__ import annotations
 
 import argparse
+import multiprocessing
 import os
 import random
 import signal
@@ -16,10 +21,12 @@ import subprocess
 import sys
 import tempfile
 import time
+from abc import ABC, abstractmethod
 from collections import Counter
 from contextlib import suppress
 from pathlib import Path
 
+from gensig.cli import main as gensig
 from gensig.dataset.manifest import read_manifest
 from gensig.dataset.verify import verify
 
@@ -29,57 +36,125 @@ SET = (
     "dataset.records_per_shard=1",
     "operating.duration_s=0.02",
     "sensing.channels=[pinion_y]",
-    "executor.n_workers=2",
 )
-COMPARED = ("plan.csv", "index.h5", "shards/*", "splits/*")
+COMPARED = ("plan.csv", "index.h5", "shards/*", "splits/*", "figures/*")
 KILLS_PER_SET = 5
+COMMAND_EVERY = 5
+LONGEST = 300.0  # s for any run; one that takes longer hangs
+KILLED = ("parent", "worker", "forked run")
 
 
-def gensig(*words: str) -> list[str]:
-    return [sys.executable, "-m", "gensig.cli", *words]
+class Run(ABC):
+    """A run of gensig in another process."""
+
+    @property
+    @abstractmethod
+    def pid(self) -> int:
+        """Number of the process."""
+
+    @abstractmethod
+    def wait(self, seconds: float) -> int | None:
+        """Exit status, negative for a signal; None where it still runs after that time."""
+
+    def kill(self) -> None:
+        with suppress(ProcessLookupError):
+            os.kill(self.pid, signal.SIGKILL)
+        self.wait(LONGEST)
+
+
+class Command(Run):
+    """The command as a user gives it."""
+
+    def __init__(self, *words: str) -> None:
+        self._process = subprocess.Popen(
+            [sys.executable, "-m", "gensig.cli", *words], stdout=subprocess.DEVNULL, stderr=subprocess.DEVNULL
+        )
+
+    @property
+    def pid(self) -> int:
+        return self._process.pid
+
+    def wait(self, seconds: float) -> int | None:
+        try:
+            return self._process.wait(seconds)
+        except subprocess.TimeoutExpired:
+            return None
+
+
+class Fork(Run):
+    """The same in a copy of this process, which has imported everything."""
+
+    def __init__(self, *words: str) -> None:
+        self._process = multiprocessing.get_context("fork").Process(target=_quiet, args=(words,))
+        self._process.start()
+
+    @property
+    def pid(self) -> int:
+        assert self._process.pid is not None
+        return self._process.pid
+
+    def wait(self, seconds: float) -> int | None:
+        self._process.join(seconds)
+        return self._process.exitcode
+
+
+def _quiet(words: tuple[str, ...]) -> None:
+    nowhere = os.open(os.devnull, os.O_WRONLY)
+    os.dup2(nowhere, 1)
+    os.dup2(nowhere, 2)
+    sys.exit(gensig(words))
+
+
+def start(out: Path, *, command: bool) -> Run:
+    """Begin the folder, or go on with it where it has begun."""
+    workers = 2 if command else 1
+    begun = (out / "manifest.json").is_file()
+    words = (
+        ("resume", str(out), "--workers", str(workers))
+        if begun
+        else ("generate", *SET, f"executor.n_workers={workers}", f"out={out}")
+    )
+    return Command(*words) if command else Fork(*words)
 
 
 def contents(folder: Path) -> dict[str, bytes]:
-    """Every file that must be byte-equal, hidden ones among the shards included."""
+    """Every file that must be byte-equal, hidden ones included."""
     paths = [path for pattern in COMPARED for path in sorted(folder.glob(pattern))]
     return {str(path.relative_to(folder)): path.read_bytes() for path in paths}
 
 
-def workers_of(process: subprocess.Popen[bytes]) -> list[int]:
+def workers_of(run: Run) -> list[int]:
     """Worker processes of a running command; not the helper that cleans up after them."""
     with suppress(OSError):
-        children = Path(f"/proc/{process.pid}/task/{process.pid}/children").read_text().split()
+        children = Path(f"/proc/{run.pid}/task/{run.pid}/children").read_text().split()
         return [pid for pid in map(int, children) if b"spawn_main" in Path(f"/proc/{pid}/cmdline").read_bytes()]
     return []
 
 
-def kill_once(command: list[str], out: Path, seconds: float, rng: random.Random) -> str:
-    """Start the command, wait until the folder is there and some more, kill; says who was killed, or 'ended first'."""
-    process = subprocess.Popen(command, stdout=subprocess.DEVNULL, stderr=subprocess.DEVNULL)
-    before = signature(out)
+def kill_once(run: Run, out: Path, seconds: float, rng: random.Random) -> str:
+    """Kill a run at a random moment; says who was killed, or 'ended first'."""
+    before, limit = signature(out), time.monotonic() + LONGEST
     # Half the kills come after the next shard, in the thick of writing; the others at any moment, imports included.
     if rng.random() < 0.5:
-        while signature(out) == before and process.poll() is None:
-            time.sleep(0.005)
-        wait = rng.uniform(0.0, 0.1 * seconds)
+        while signature(out) == before and run.wait(0.002) is None and time.monotonic() < limit:
+            pass
+        wait = rng.uniform(0.0, 0.2 * seconds)
     else:
         wait = rng.uniform(0.0, seconds)
-    with suppress(subprocess.TimeoutExpired):
-        process.wait(wait)
-    victim, pid = "parent", process.pid
-    workers = workers_of(process)
-    if workers and rng.random() < 0.5:
-        victim, pid = "worker", rng.choice(workers)
-    if process.poll() is not None:
+    if run.wait(wait) is not None:
         return "ended first"
+    if isinstance(run, Fork):
+        run.kill()
+        return "forked run"
+    workers = workers_of(run)
+    if not workers or rng.random() < 0.5:
+        run.kill()
+        return "parent"
     with suppress(ProcessLookupError):
-        os.kill(pid, signal.SIGKILL)
-    if victim == "worker" and rng.random() < 0.5:
-        process.wait()  # the run goes on with another worker
-    elif victim == "worker":
-        process.kill()
-    process.wait()
-    return victim
+        os.kill(rng.choice(workers), signal.SIGKILL)
+    if rng.random() < 0.5 or run.wait(LONGEST) is None:  # else the run goes on with another worker
+        run.kill()
+    return "worker"
 
 
 def signature(out: Path) -> list[str]:
@@ -93,44 +168,58 @@ def is_whole(out: Path) -> bool:
     return (out / "manifest.json").is_file() and read_manifest(out).is_complete
 
 
+def durations(folder: Path) -> dict[bool, float]:
+    """Time of an undisturbed run: of the command (True) and of a fork (False), everything being compiled."""
+    (folder / "reference").parent.mkdir(exist_ok=True)
+    if gensig(["generate", "--quiet", *SET, "executor.n_workers=1", f"out={folder / 'reference'}"]):
+        raise SystemExit("an undisturbed run failed")
+    found = {}
+    for command in (True, False):
+        begin = time.monotonic()
+        if start(folder / f"undisturbed-{command}", command=command).wait(LONGEST) != 0:
+            raise SystemExit("an undisturbed run failed")
+        found[command] = time.monotonic() - begin
+    return found
+
+
+def n_kills_of(outcome: Counter[str]) -> int:
+    return sum(outcome[name] for name in KILLED)
+
+
 def campaign(n_kills: int, seed: int, folder: Path) -> tuple[Counter[str], list[str]]:
     """Spend the kills on one data set after the other; what was killed, and every way in which one was not equal."""
     rng = random.Random(seed)
-    begin = time.monotonic()
-    subprocess.run(gensig("generate", "--quiet", *SET, f"out={folder / 'reference'}"), check=True)
-    seconds = time.monotonic() - begin
+    seconds = durations(folder)
     wanted = contents(folder / "reference")
     outcome: Counter[str] = Counter()
     problems: list[str] = []
     for number in range(10 * n_kills):
-        if outcome["parent"] + outcome["worker"] >= n_kills:
+        if n_kills_of(outcome) >= n_kills:
             break
         out = folder / f"set-{number}"
         for _ in range(KILLS_PER_SET):
-            if is_whole(out) or outcome["parent"] + outcome["worker"] >= n_kills:
+            if is_whole(out) or n_kills_of(outcome) >= n_kills:
                 break
-            begun = (out / "manifest.json").is_file()
-            if out.exists() and not begun:
-                outcome["folder half made: refused or removed"] += 1
-                break
-            command = gensig("resume", str(out), "--workers", "2") if begun else gensig("generate", *SET, f"out={out}")
-            outcome[kill_once(command, out, seconds, rng)] += 1
+            command = (n_kills_of(outcome) + outcome["ended first"]) % COMMAND_EVERY == 0
+            outcome[kill_once(start(out, command=command), out, seconds[command], rng)] += 1
             if (out / "manifest.json").is_file():
                 found = verify(out)
                 if found.complete != is_whole(out):
                     problems.append(f"set {number}: looks whole and is not: {found.problems[0]}")
-        if not (out / "manifest.json").is_file():
-            continue
-        done = subprocess.run(gensig("resume", "--quiet", str(out)), capture_output=True, text=True, check=False)
+            elif out.exists():
+                outcome["of these before the manifest"] += 1
+        for attempt in ("first", "second"):  # a folder without a manifest is begun first
+            if not is_whole(out) and (status := start(out, command=False).wait(LONGEST)):
+                problems.append(f"set {number}: the {attempt} run after the kills ended with {status}")
         outcome["sets"] += 1
-        if done.returncode:
-            problems.append(f"set {number}: resume ended with {done.returncode}: {done.stderr[-300:]}")
-        elif not verify(out).complete:
-            problems.append(f"set {number}: {verify(out).problems[0]}")
-        else:
-            made = contents(out)
-            different = sorted(name for name in {*wanted, *made} if wanted.get(name) != made.get(name))
-            problems += [f"set {number}: {name} differs" for name in different]
+        if outcome["sets"] % 10 == 0:
+            print(f"{n_kills_of(outcome)} of {n_kills} kills, {len(problems)} problem(s)", file=sys.stderr, flush=True)
+        if not is_whole(out) or verify(out).problems:
+            problems += [f"set {number}: {line}" for line in verify(out).problems[:3]]
+            continue
+        made = contents(out)
+        different = sorted(name for name in {*wanted, *made} if wanted.get(name) != made.get(name))
+        problems += [f"set {number}: {name} differs" for name in different]
     return outcome, problems
 
 
@@ -146,7 +235,7 @@ def main() -> int:
     print(f"{facts}; {len(problems)} problem(s), {time.monotonic() - begin:.0f} s")
     for problem in problems:
         print(problem)
-    return 1 if problems or outcome["parent"] + outcome["worker"] < arguments.kills else 0
+    return 1 if problems or n_kills_of(outcome) < arguments.kills else 0
 
 
 if __name__ == "__main__":

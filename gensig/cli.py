@@ -125,7 +125,7 @@ VERBS: dict[str, Verb] = {
         _resume,
     ),
     "finalize": Verb(
-        "close a data set made by array jobs",
+        "close a data set made by array jobs, or accept an edited card",
         "gensig finalize runs/large",
         "gensig.commands.datasets:finalize",
         _folder,

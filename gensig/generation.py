@@ -10,11 +10,11 @@ from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
 
+from gensig.dataset.beginning import create_folder
 from gensig.dataset.compression import COMPRESSIONS, creation_options
 from gensig.dataset.joining import joined_folder
 from gensig.dataset.layout import PLAN, ShardEntry, read_manifest, shard_path
 from gensig.dataset.manifest import (
-    create_folder,
     finalize,
     identity_hash,
     record_failed_shard,
@@ -22,6 +22,7 @@ from gensig.dataset.manifest import (
 )
 from gensig.dataset.plan import Plan, read_plan
 from gensig.dataset.receipts import collect_receipts, read_receipt, receipt_path, write_receipt
+from gensig.dataset.run_log import log
 from gensig.dataset.schema import SAMPLE_TYPES
 from gensig.dataset.shard import ShardWriter
 from gensig.dynamics._vector import n_lanes
@@ -29,7 +30,7 @@ from gensig.dynamics.decimation import usable_band
 from gensig.errors import ConfigError
 from gensig.execution.base import Executor, ShardFailure
 from gensig.planning import check_switches, make_plan
-from gensig.records import read_seed, simulate_records
+from gensig.records import read_seed, signal_shapes, simulate_records
 from gensig.systems.registry import read_system
 from gensig.systems.spur_pair import SpurPair
 from gensig.units import from_si
@@ -38,11 +39,21 @@ from gensig.version import __version__
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Progress:
-    """One finished shard: how many of how many records are done, and how many of them failed."""
+    """How far a run is when a shard is finished or given up.
+
+    Parameters
+    ----------
+    n_done, n_records : int    records that are there, of all that shall be
+    n_failed : int             records among `n_done` whose simulation failed
+    n_made, n_bytes : int      records and bytes that this run has made
+    reason : str               why this shard could not be made; empty when it was
+    """
 
     n_done: int
     n_records: int
     n_failed: int
+    n_made: int
+    n_bytes: int
     reason: str
 
 
@@ -69,6 +80,7 @@ def begin_folder(config: dict[str, Any], overrides: Sequence[str], out: Path) ->
         seed=read_seed(config),
         generator_version=__version__,
     )
+    log(out, f"gensig {__version__}: {plan.n_records} records in {plan.n_shards} shards are planned")
     return plan.n_shards
 
 
@@ -103,21 +115,49 @@ def run_folder(
     n_done = n_records - sum(rows[index] for index in missing)
     n_failed = sum(entries[index].n_failed for index in mine if index not in missing)
     problems: list[str] = []
-    for index, result in executor.run(functools.partial(write_shard, out), missing):
-        if isinstance(result, ShardFailure):
-            problems.append(f"shard {index}: {result.reason}")
-            if executor.closes:
-                record_failed_shard(out, index)
-        else:
-            n_done, n_failed = n_done + rows[index], n_failed + result.n_failed
-            if executor.closes:
-                record_shard(out, index, result.sha256, result.n_bytes, result.n_failed)
-                receipt_path(out, index).unlink(missing_ok=True)
-        reason = problems[-1] if isinstance(result, ShardFailure) else ""
-        on_shard(Progress(n_done=n_done, n_records=n_records, n_failed=n_failed, reason=reason))
-    if executor.closes and not problems:
-        finalize(out)
+    n_made, n_bytes = 0, 0
+    logged = executor.closes and not manifest.is_complete  # the log of a closed folder is closed too
+    if logged:
+        log(out, f"gensig {__version__}, {executor}: {len(missing)} of {len(mine)} shards to make")
+    try:
+        for index, result in executor.run(functools.partial(write_shard, out), missing):
+            if isinstance(result, ShardFailure):
+                reason = f"shard {index}: {result.reason}"
+                problems.append(reason)
+                if executor.closes:
+                    record_failed_shard(out, index)
+                    log(out, f"{reason}; not made")
+            else:
+                reason = ""
+                n_done, n_failed = n_done + rows[index], n_failed + result.n_failed
+                n_made, n_bytes = n_made + rows[index], n_bytes + result.n_bytes
+                if executor.closes:
+                    record_shard(out, index, result.sha256, result.n_bytes, result.n_failed)
+                    receipt_path(out, index).unlink(missing_ok=True)
+                    log(out, f"shard {index}: {rows[index]} records, {result.n_failed} failed, {result.n_bytes} bytes")
+            on_shard(
+                Progress(
+                    n_done=n_done,
+                    n_records=n_records,
+                    n_failed=n_failed,
+                    n_made=n_made,
+                    n_bytes=n_bytes,
+                    reason=reason,
+                )
+            )
+    except BaseException as error:
+        if logged:
+            log(out, f"ended by {type(error).__name__}: {error}")
+        raise
+    if logged and not problems:
+        _close(out)
     return n_failed, problems
+
+
+def _close(out: Path) -> None:
+    """Close the folder; the log is closed with it, and takes no line afterwards."""
+    log(out, "every shard is done; closing")
+    finalize(out)
 
 
 def _is_there(out: Path, index: int, entry: ShardEntry) -> bool:
@@ -135,7 +175,8 @@ def close_folder(out: Path) -> int:
     """
     joined_folder(out)
     collect_receipts(out)
-    finalize(out)
+    if not read_manifest(out).is_complete:
+        _close(out)
     return read_manifest(out).n_failed
 
 
@@ -190,22 +231,10 @@ def block_length(config: Mapping[str, Any]) -> int:
 def open_shard(path: Path, config: Mapping[str, Any], n_records: int, params: Sequence[str]) -> ShardWriter:
     """Writer for records of one configuration."""
     system = read_system(config)
-    n_channels = len(system.sensing.channels)
-    n_samples = round(system.operating.duration * system.sensing.sampling_rate)
-    shapes: dict[str, tuple[int, ...]] = {
-        "acceleration": (n_channels, n_samples),
-        "fault_multihot": (len(config["plan"]["classes"]),),
-        "signal_power": (n_channels,),
-        "noise_power": (n_channels,),
-    }
-    if config["dataset"]["store_clean"]:
-        shapes["acceleration_clean"] = (n_channels, n_samples)
-    if config["dataset"]["store_shaft_angle"]:
-        shapes["shaft_angle"] = (n_samples,)
     return ShardWriter(
         path,
         n_records=n_records,
-        signals=shapes,
+        signals=signal_shapes(config, system),
         params=params,
         attributes=root_attributes(config, system),
         compression=config["dataset"]["compression"],

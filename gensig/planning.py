@@ -3,95 +3,226 @@
 from __future__ import annotations
 
 import copy
+import itertools
 import json
 import math
 from collections.abc import Mapping
+from dataclasses import dataclass
 from typing import Any
 
 import numpy as np
+from numpy.typing import NDArray
 
-from gensig.dataset.distributions import design_points, values_at
+from gensig.dataset.distributions import GRID, LEVELS, design_points, level_values, n_levels, values_at
 from gensig.dataset.plan import Plan, record_ids, shard_places
+from gensig.dataset.schema import SCALES, SIGNALS
 from gensig.errors import ConfigError
 from gensig.faults.base import faulty_teeth
 from gensig.faults.registry import COMPOUND, fault_parts, read_faults
 from gensig.mesh.pair_table import check_teeth
-from gensig.records import MISSING, Stream, read_seed, record_system, replace_key, stream, whole_number
+from gensig.records import (
+    MISSING,
+    Stream,
+    read_seed,
+    record_system,
+    replace_key,
+    signal_shapes,
+    stream,
+    whole_number,
+)
 from gensig.systems.registry import read_system
 from gensig.systems.spur_pair import severity
 from gensig.units import from_si
 
 SHARD_BYTES = 65_536_000  # 80 records of 4 x 51,200 float32 samples
+MOST_IN_GRID = 1_000_000  # records; a product of levels is soon larger than meant
+KEYS = (
+    "n_records", "n_units", "n_gearboxes", "conditions_per_unit", "n_repeats", "classes", "design", "vary", "sham",
+)  # fmt: skip
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class Counts:
+    """How many of everything a plan has.
+
+    Attributes
+    ----------
+    n_conditions : over all units; unit ``condition % n_units`` runs a condition
+    condition_points : (condition,) int    point of the grid over ``plan.vary``
+    fault_points : (condition,) int        point of the grid over a fault's ``vary``, modulo the size that one has
+
+    Only a grid reads the points: there every unit runs every set-point with every fault.
+    """
+
+    n_records: int
+    n_units: int
+    n_gearboxes: int
+    n_repeats: int
+    n_conditions: int
+    condition_points: NDArray[np.int64]
+    fault_points: NDArray[np.int64]
 
 
 def make_plan(config: Mapping[str, Any]) -> Plan:
     """Draw every input of every record.
 
-    Records come in groups of one a class that share unit and condition, in random order within the group, so that
-    neither position nor any drawn value tells the class.
+    Nested by unit, condition, fault and repeat. What shares a ``condition_id`` is one unit at one set-point: one record
+    a class and repeat, in random order within each repeat, so that neither position nor any drawn value tells the
+    class. Repeats share the fault too; each has a start and noise of its own.
 
     Raises
     ------
     ConfigError    for counts, keys or distributions that cannot be used
     """
-    plan, seed = config["plan"], read_seed(config)
-    names = list(plan["classes"])
-    n_records = whole_number("plan.n_records", plan["n_records"], at_least=len(names))
-    n_units = whole_number("plan.n_units", plan["n_units"], at_least=1)
-    asked = round(math.sqrt(n_units)) if plan["n_gearboxes"] is None else plan["n_gearboxes"]
-    n_gearboxes = min(n_units, whole_number("plan.n_gearboxes", asked, at_least=1))
-    if not isinstance(plan["sham"], bool):
-        raise ConfigError(f"plan.sham = {plan['sham']!r} must be true or false")
+    seed, names = read_seed(config), list(config["plan"]["classes"])
+    counts = read_counts(config)
     read_system(config).check()
-    n_groups = math.ceil(n_records / len(names))
-    for key in plan["vary"]:
-        replace_key(copy.deepcopy(dict(config)), key, 0.0)
-    conditions = _draw(config, plan["vary"], n_groups, stream(seed, Stream.CONDITION), "plan")
+    conditions = _draw(config, config["plan"]["vary"], counts.condition_points, stream(seed, Stream.CONDITION), "plan")
     faults = {
-        name: _draw_faults(config, fault, n_groups, stream(seed, Stream.FAULT, index))
+        name: _draw_faults(config, fault, counts.fault_points, stream(seed, Stream.FAULT, index))
         for index, (name, fault) in enumerate(config["classes"].items())
     }
+    sound = next((name for name in names if not fault_parts(config["classes"][name])), None)
     rows: list[dict[str, Any]] = []
-    for group in range(n_groups):
-        unit = group % n_units
-        gearbox, specimen = unit % n_gearboxes, unit // n_gearboxes
-        for place in stream(seed, Stream.ORDER, group).permutation(len(names)):
-            if len(rows) == n_records:
+    for condition, repeat in itertools.product(range(counts.n_conditions), range(counts.n_repeats)):
+        unit = condition % counts.n_units
+        values = {key: drawn[condition] for key, drawn in conditions.items()}
+        for place in stream(seed, Stream.ORDER, condition * counts.n_repeats + repeat).permutation(len(names)):
+            if len(rows) == counts.n_records:
                 break
             name = names[place]
-            values = {key: drawn[group] for key, drawn in conditions.items()}
+            fault = faults[name][condition]
+            # The first sound record of a condition starts as the twin that sets the noise does: it is that twin.
+            is_twin = name == sound and repeat == 0
+            start = stream(seed, Stream.TWIN, condition) if is_twin else stream(seed, Stream.START, len(rows))
             rows.append(
                 {
                     "label": int(place),
                     "label_name": name,
                     "unit_id": f"unit-{unit:04d}",
-                    "gearbox_id": f"gearbox-{gearbox:04d}",
-                    "specimen_id": f"specimen-{specimen:04d}",
-                    "condition_id": f"condition-{group:06d}",
-                    **_row(config, seed, len(rows), faults[name][group], values),
+                    "gearbox_id": f"gearbox-{unit % counts.n_gearboxes:04d}",
+                    "specimen_id": f"specimen-{unit // counts.n_gearboxes:04d}",
+                    "condition_id": f"condition-{condition:06d}",
+                    "repeat": repeat,
+                    **_row(config, fault, values, start),
                 }
             )
     return _as_plan(config, rows)
 
 
+def read_counts(config: Mapping[str, Any]) -> Counts:
+    """Check and work out every count of the plan; a grid's from its levels.
+
+    Raises
+    ------
+    ConfigError    for counts that cannot be used or do not agree
+    """
+    plan = config["plan"]
+    if odd := sorted(set(plan).symmetric_difference(KEYS)):
+        raise ConfigError(
+            f"plan: {'unknown' if odd[0] in plan else 'missing'} key '{odd[0]}'; it has {', '.join(KEYS)}"
+        )
+    n_classes = len(plan["classes"])
+    n_units = whole_number("plan.n_units", plan["n_units"], at_least=1)
+    asked = round(math.sqrt(n_units)) if plan["n_gearboxes"] is None else plan["n_gearboxes"]
+    n_gearboxes = min(n_units, whole_number("plan.n_gearboxes", asked, at_least=1))
+    n_repeats = whole_number("plan.n_repeats", plan["n_repeats"], at_least=1)
+    if not isinstance(plan["sham"], bool):
+        raise ConfigError(f"plan.sham = {plan['sham']!r} must be true or false")
+    for key in plan["vary"]:
+        replace_key(copy.deepcopy(dict(config)), key, 0.0)
+    per_unit, n_faults = plan["conditions_per_unit"], 1
+    if plan["design"] == GRID:
+        if per_unit is not None:
+            raise ConfigError(f"plan.conditions_per_unit = {per_unit!r}: a grid's levels say how many; leave it null")
+        per_unit, n_faults = _grid_size(config)
+    n_records = plan["n_records"]
+    if n_records is not None:
+        whole_number("plan.n_records", n_records, at_least=n_classes)
+    if per_unit is None:
+        if n_records is None:
+            raise ConfigError("plan.n_records = null: give a number, plan.conditions_per_unit, or plan.design=grid")
+        n_conditions = math.ceil(n_records / (n_classes * n_repeats))
+    else:
+        n_conditions = n_units * whole_number("plan.conditions_per_unit", per_unit, at_least=1) * n_faults
+        n_records = _fitting(plan, n_conditions * n_classes * n_repeats, (n_units, per_unit, n_faults, n_classes))
+    points = np.arange(n_conditions) // n_units
+    return Counts(
+        n_records=n_records,
+        n_units=n_units,
+        n_gearboxes=n_gearboxes,
+        n_repeats=n_repeats,
+        n_conditions=n_conditions,
+        condition_points=points // n_faults,
+        fault_points=points % n_faults,
+    )
+
+
+def _grid_size(config: Mapping[str, Any]) -> tuple[int, int]:
+    """Points of the grid over the conditions, and the least number that the grids of all faults divide."""
+    vary = config["plan"]["vary"]
+    for key, spec in vary.items():
+        if n_levels(f"plan.vary.{key}", spec) is None and LEVELS not in spec:
+            raise ConfigError(
+                f"plan.vary.{key}: a grid needs its levels: give levels: 4 or so, distribution: choice, or "
+                "levels: null to draw it all the same"
+            )
+    n_faults = [_n_points("fault", specs) for specs in _fault_varies(config).values()]
+    return _n_points("plan", vary), math.lcm(*n_faults)
+
+
+def _n_points(where: str, vary: Mapping[str, Any]) -> int:
+    return math.prod(n_levels(f"{where}.vary.{key}", spec) or 1 for key, spec in vary.items())
+
+
+def _fault_varies(config: Mapping[str, Any]) -> dict[str, dict[str, Any]]:
+    """Distributions of the keys of each class."""
+    return {name: _fault_specs(config, fault)[0] for name, fault in config["classes"].items()}
+
+
+def describe_design(config: Mapping[str, Any]) -> str:
+    """The design in words: of a grid the number of levels of each key, and the keys that are drawn all the same."""
+    plan = config["plan"]
+    if plan["design"] != GRID:
+        return str(plan["design"])
+    of_faults = {f"{name}.{key}": spec for name, vary in _fault_varies(config).items() for key, spec in vary.items()}
+    keys = {key: n_levels(key, spec) for key, spec in {**plan["vary"], **of_faults}.items()}
+    crossed = " x ".join(f"{key} {n}" for key, n in keys.items() if n is not None)
+    drawn = ", ".join(key for key, n in keys.items() if n is None)
+    return f"grid of {crossed or 'no key'}" + (f"; drawn: {drawn}" if drawn else "")
+
+
+def _fitting(plan: Mapping[str, Any], n_records: int, counts: tuple[int, ...]) -> int:
+    """The number of records that follows from the others, if ``plan.n_records`` has nothing against it."""
+    names = ("units", "conditions", "faults", "classes", "repeats")
+    product = " x ".join(f"{n:,} {name}" for n, name in zip((*counts, plan["n_repeats"]), names, strict=True) if n > 1)
+    told = f"{n_records:,} records ({product})" if product else "1 record"
+    if plan["design"] == GRID and n_records > MOST_IN_GRID:
+        raise ConfigError(f"the grid has {told}, more than {MOST_IN_GRID:,}; take fewer levels, units or repeats")
+    if plan["n_records"] not in (None, n_records):
+        raise ConfigError(
+            f"plan.n_records = {plan['n_records']}, but the plan has {told}; plan.n_records=null takes them"
+        )
+    return n_records
+
+
 def _row(
-    config: Mapping[str, Any], seed: int, index: int, fault: dict[str, Any], values: dict[str, float]
+    config: Mapping[str, Any], fault: dict[str, Any], values: dict[str, float], start: np.random.Generator
 ) -> dict[str, Any]:
     """Columns of one record that follow from its drawn values; building its machine checks them all."""
     system = record_system(config, values)
     system.pair.require_continuous_drive()
     applied = read_faults(fault)
     check_teeth(system.pair, system.material, system.mesh, faulty_teeth(system.pair, applied))
-    rng = stream(seed, Stream.START, index)
     parts = fault_parts(fault)
     return {
         "faults_json": json.dumps(parts, separators=(",", ":")),
         "severity": 0.0 if config["plan"]["sham"] else severity(applied, system.pair),
         "fault_gear": applied[0].gear if applied else "",
         "fault_tooth": applied[0].first_tooth if applied else -1,
-        "start_tooth_pinion": int(rng.integers(system.pair.pinion.n_teeth)),
-        "start_tooth_wheel": int(rng.integers(system.pair.wheel.n_teeth)),
-        "start_phase": float(rng.random()),
+        "start_tooth_pinion": int(start.integers(system.pair.pinion.n_teeth)),
+        "start_tooth_wheel": int(start.integers(system.pair.wheel.n_teeth)),
+        "start_phase": float(start.random()),
         "speed_set_rpm": from_si("speed_rpm", system.operating.speed),
         "torque_nm": system.operating.torque,
         "snr_db": MISSING if system.sensing.snr is None else system.sensing.snr,
@@ -125,27 +256,40 @@ def record_bytes(config: Mapping[str, Any], *, as_stored: bool = False) -> int:
 
     Shards are cut by the latter, so that how samples are stored does not change a plan.
     """
-    system, dataset = read_system(config), config["dataset"]
-    n_samples = round(system.operating.duration * system.sensing.sampling_rate)
-    n_copies = 2 if dataset["store_clean"] else 1
-    size = 2 if as_stored and dataset["sample_type"] == "int16" else 4
-    angle = 8 * n_samples if dataset["store_shaft_angle"] else 0
-    return max(1, size * n_copies * len(system.sensing.channels) * n_samples + angle)
+    bulk = {name: shape for name, shape in signal_shapes(config, read_system(config)).items() if SIGNALS[name].is_bulk}
+    counts = as_stored and config["dataset"]["sample_type"] == "int16"
+    return sum(
+        math.prod(shape) * (2 if counts and name in SCALES else SIGNALS[name].n_bytes) for name, shape in bulk.items()
+    )
 
 
 def check_switches(config: Mapping[str, Any]) -> None:
     """Raise ConfigError for a switch of ``dataset`` that is neither true nor false."""
-    for key in ("store_clean", "store_shaft_angle"):
+    for key in ("store_clean", "store_shaft_angle", "store_mesh_state", "store_detectability"):
         if not isinstance(config["dataset"][key], bool):
             raise ConfigError(f"dataset.{key} = {config['dataset'][key]!r} must be true or false")
 
 
 def _draw(
-    config: Mapping[str, Any], vary: Mapping[str, Any], n: int, rng: np.random.Generator, where: str
+    config: Mapping[str, Any], vary: Mapping[str, Any], points: NDArray[np.int64], rng: np.random.Generator, where: str
 ) -> dict[str, list[Any]]:
-    """Values of every varied key, (n,) each, from one space-filling design."""
-    points = design_points(config["plan"]["design"], n, len(vary), rng)
-    return {key: values_at(f"{where}.vary.{key}", spec, points[:, k]) for k, (key, spec) in enumerate(vary.items())}
+    """Values of every varied key, (condition,) each.
+
+    In a grid a key with levels has that of the condition's point, the first key slowest. All others are drawn together
+    from one space-filling design.
+    """
+    design = config["plan"]["design"]
+    names = {key: f"{where}.vary.{key}" for key in vary}
+    crossed = [key for key in vary if design == GRID and n_levels(names[key], vary[key]) is not None]
+    drawn = [key for key in vary if key not in crossed]
+    unit = design_points(design, len(points), len(drawn), rng)
+    values = {key: values_at(names[key], vary[key], unit[:, k]) for k, key in enumerate(drawn)}
+    step = 1
+    for key in reversed(crossed):
+        levels = level_values(names[key], vary[key])
+        values[key] = [levels[point // step % len(levels)] for point in points.tolist()]
+        step *= len(levels)
+    return {key: values[key] for key in vary}
 
 
 def _sizes(fault: Mapping[str, Any]) -> dict[str, float]:
@@ -157,27 +301,35 @@ def _sizes(fault: Mapping[str, Any]) -> dict[str, float]:
     return {key: float(value) for key, value in numbers.items()}
 
 
-def _draw_faults(
-    config: Mapping[str, Any], fault: Mapping[str, Any], n: int, rng: np.random.Generator
-) -> list[dict[str, Any]]:
-    """One complete fault a group, its severity distribution drawn; one design for all parts of a compound fault."""
+def _fault_specs(
+    config: Mapping[str, Any], fault: Mapping[str, Any]
+) -> tuple[dict[str, Any], dict[str, tuple[int, str]]]:
+    """Distributions of a fault by name, and the part and key that each is of."""
     read_faults(fault)
-    parts = [{key: value for key, value in part.items() if key != "vary"} for part in fault_parts(fault)]
     specs: dict[str, Any] = {}
     places: dict[str, tuple[int, str]] = {}
-    for place, (plain, part) in enumerate(zip(parts, fault_parts(fault), strict=True)):
+    for place, part in enumerate(fault_parts(fault)):
         for key, spec in (part.get("vary") or {}).items():
-            if key not in plain:
-                raise ConfigError(f"fault.vary: '{key}' is no key of fault={plain['kind']}")
+            if key not in part or key == "vary":
+                raise ConfigError(f"fault.vary: '{key}' is no key of fault={part['kind']}")
             name = f"parts.{place}.{key}" if fault["kind"] == COMPOUND else key
-            specs[name], places[name] = _tooth_range(config, plain["gear"], spec), (place, key)
-    drawn = _draw(config, specs, n, rng, "fault")
+            specs[name], places[name] = _tooth_range(config, part["gear"], spec), (place, key)
+    return specs, places
+
+
+def _draw_faults(
+    config: Mapping[str, Any], fault: Mapping[str, Any], points: NDArray[np.int64], rng: np.random.Generator
+) -> list[dict[str, Any]]:
+    """One complete fault a condition, its severity distribution drawn; one design for all parts of a compound fault."""
+    specs, places = _fault_specs(config, fault)
+    parts = [{key: value for key, value in part.items() if key != "vary"} for part in fault_parts(fault)]
+    drawn = _draw(config, specs, points, rng, "fault")
     faults: list[dict[str, Any]] = []
-    for group in range(n):
+    for condition in range(len(points)):
         own = [dict(plain) for plain in parts]
         for name, values in drawn.items():
             place, key = places[name]
-            own[place][key] = values[group]
+            own[place][key] = values[condition]
         faults.append({"kind": fault["kind"], "parts": own} if fault["kind"] == COMPOUND else (own or [dict(fault)])[0])
     return faults
 
@@ -186,4 +338,4 @@ def _tooth_range(config: Mapping[str, Any], gear: str, spec: Any) -> Any:
     """``distribution: tooth`` as whole numbers over the gear's teeth, anything else as it is."""
     if not (isinstance(spec, Mapping) and spec.get("distribution") == "tooth"):
         return spec
-    return {"distribution": "integers", "low": 0, "high": config["gear"][gear]["n_teeth"] - 1}
+    return {**spec, "distribution": "integers", "low": 0, "high": config["gear"][gear]["n_teeth"] - 1}

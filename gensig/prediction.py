@@ -13,10 +13,13 @@ from typing import Any
 from gensig.dataset.plan import Plan, plan_text
 from gensig.execution.base import read_n_workers
 from gensig.generation import block_length, open_shard
-from gensig.planning import make_plan
+from gensig.planning import describe_design, make_plan
 from gensig.records import Record, forget_twins, simulate_records
 
-N_INDEXED = 2600  # bytes of index.h5 for each shard, of all its columns
+# Bytes beside shards and plan: index, cards and configuration; more for each shard, record (splits) and class (figure).
+BESIDE, BESIDE_A_SHARD, BESIDE_A_RECORD, BESIDE_A_CLASS = 42_000, 3_000, 250, 40_000
+
+CLOSING = 2.0  # s for index, cards and figures, most of it the import of matplotlib
 
 
 def predict(config: Mapping[str, Any]) -> dict[str, str]:
@@ -26,14 +29,16 @@ def predict(config: Mapping[str, Any]) -> dict[str, str]:
     with as many workers; start-up is counted for the workers of this machine.
     """
     started = time.process_time()  # what a process spends before its first record
+    begin = time.monotonic()
     table = make_plan(config)
+    planning = time.monotonic() - begin
     first = table.rows(0)[: block_length(config)]
     probe = [table.record(int(index)) for index in first]
     begin = time.monotonic()
     simulate_records(config, probe[:1])  # compiles, or loads what was compiled
     workers = min(_n_processes(config), table.n_shards)
     # Workers import once more what this process has imported, and load what was compiled.
-    start_up = started * (1 if workers == 1 else 2) + time.monotonic() - begin
+    start_up = planning + started * (1 if workers == 1 else 2) + time.monotonic() - begin
     forget_twins()
     begin = time.monotonic()
     records = simulate_records(config, probe)
@@ -42,13 +47,15 @@ def predict(config: Mapping[str, Any]) -> dict[str, str]:
     rounds = math.ceil(table.n_shards / workers)
     whole = seconds * max(table.shard_sizes()) / len(probe)
     spread = table.n_records / max(table.shard_sizes()) / workers
-    total = start_up + whole * (rounds if rounds < 2 * spread else spread)
+    total = start_up + CLOSING + whole * (rounds if rounds < 2 * spread else spread)
     classes = Counter(str(name) for name in table.columns["label_name"])
     return {
         "records": f"{table.n_records}",
         "classes": ", ".join(f"{name} {count}" for name, count in classes.items()),
         "units": f"{len(set(table.columns['unit_id']))}",
         "conditions": f"{len(set(table.columns['condition_id']))}",
+        "design": describe_design(config),
+        "repeats": f"{config['plan']['n_repeats']}",
         "shards": f"{table.n_shards} of at most {max(table.shard_sizes())} records",
         "bytes": f"{n_bytes:,} ({n_bytes / 1e6:.3g} MB)",
         "time": f"about {max(1, round(total))} s on {workers} worker(s), from {seconds / len(probe):.3g} s a record "
@@ -62,7 +69,7 @@ def _n_processes(config: Mapping[str, Any]) -> int:
 
 
 def _stored_bytes(config: Mapping[str, Any], table: Plan, records: list[Record]) -> int:
-    """Bytes of all shards, of plan and index, from two shards of different length."""
+    """Bytes of all files, from two shards of different length and what is usual beside them."""
     params = [name.removeprefix("params/") for name in table.columns if name.startswith("params/")]
     sizes = []
     with tempfile.TemporaryDirectory() as folder:
@@ -74,4 +81,6 @@ def _stored_bytes(config: Mapping[str, Any], table: Plan, records: list[Record])
     one, many = sizes
     per_record = (many - one) / (len(records) - 1) if len(records) > 1 else one
     shards = table.n_shards * (one - per_record) + table.n_records * per_record
-    return round(shards + len(plan_text(table)) + N_INDEXED * table.n_shards)
+    n_classes = len(config["plan"]["classes"])
+    beside = BESIDE + BESIDE_A_SHARD * table.n_shards + BESIDE_A_RECORD * table.n_records + BESIDE_A_CLASS * n_classes
+    return round(shards + len(plan_text(table)) + beside)

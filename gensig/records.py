@@ -13,10 +13,12 @@ import numpy as np
 from numpy.typing import NDArray
 
 from gensig.dataset.manifest import identity_hash
+from gensig.dynamics.mesh_state import NO_TOOTH, MeshState
 from gensig.errors import ConfigError, SimulationError
 from gensig.faults.base import Fault
 from gensig.faults.registry import read_faults
-from gensig.sensing.chain import add_noise, power
+from gensig.mesh.pair_table import N_PAIRS
+from gensig.sensing.chain import add_noise, detectability, power
 from gensig.sensing.manufacturing import Gearbox, Specimen, draw_gearbox, draw_specimen
 from gensig.systems.registry import read_system
 from gensig.systems.spur_pair import CleanRecord, Run, SpurPair, Start, simulate_together
@@ -101,7 +103,11 @@ def simulate_records(config: Mapping[str, Any], rows: Sequence[Mapping[str, Any]
     runs = [row_run(config, system, row) for system, row in zip(machines, rows, strict=True)]
     keys = _twin_keys(config, rows)
     places, further = _missing_twins(config, runs, rows, keys)
-    results = simulate_together([*runs, *further])
+    # the same machines without their faults, to see what the faults change
+    asked = config["dataset"]["store_detectability"]
+    sound = {place: replace(run, faults=(), tell_mesh=False) for place, run in enumerate(runs) if asked and run.faults}
+    results = simulate_together([*runs, *further, *sound.values()])
+    without = dict(zip(sound, results[len(runs) + len(further) :], strict=True))
     kept = {key: found for key in keys if (found := _TWINS.get(key)) is not None}
     _TWINS.clear()
     _TWINS.update(kept)
@@ -109,8 +115,8 @@ def simulate_records(config: Mapping[str, Any], rows: Sequence[Mapping[str, Any]
         twin = results[place]
         _TWINS[key] = twin if isinstance(twin, SimulationError) else power(twin.acceleration)
     return [
-        _finish(config, system, row, key, result)
-        for system, row, key, result in zip(machines, rows, keys, results[: len(rows)], strict=True)
+        _finish(config, system, row, key, result, without.get(place, result) if asked else None)
+        for place, (system, row, key, result) in enumerate(zip(machines, rows, keys, results[: len(rows)], strict=True))
     ]
 
 
@@ -120,8 +126,9 @@ def _finish(
     row: Mapping[str, Any],
     twin: TwinKey,
     result: CleanRecord | SimulationError,
+    sound: CleanRecord | SimulationError | None,
 ) -> Record:
-    """Noise, labels and result columns of one simulated row."""
+    """Noise, labels and result columns of one simulated row; ``sound`` is the same record without its faults."""
     seed, index = read_seed(config), int(str(row["record_id"]).lstrip("r"))
     n_channels = len(system.sensing.channels)
     noise_power: Array | SimulationError = np.zeros(n_channels)
@@ -143,6 +150,8 @@ def _finish(
             "integration_error": result.integration_error,
             "integration_check": result.integration_check,
         }
+        if isinstance(sound, CleanRecord):
+            told["detectability"] = detectability(clean - sound.acceleration, noise_power)
     noisy = add_noise(clean, noise_power, stream(seed, Stream.NOISE, index))
     signals: dict[str, NDArray[Any]] = {
         "acceleration": noisy.astype(np.float32),
@@ -155,8 +164,51 @@ def _finish(
     if config["dataset"]["store_shaft_angle"]:
         failed = np.full(clean.shape[1], MISSING)
         signals["shaft_angle"] = failed if isinstance(result, SimulationError) else result.shaft_angle
+    if config["dataset"]["store_mesh_state"]:
+        signals |= _mesh_signals(result.mesh if isinstance(result, CleanRecord) else None, clean.shape[1])
     columns = {key: value for key, value in row.items() if key not in ("shard", "row")}
     return Record(signals=signals, values={**columns, **told})
+
+
+def _mesh_signals(mesh: MeshState | None, n_samples: int) -> dict[str, NDArray[Any]]:
+    """The mesh state as a shard takes it; of a failed record nothing is known."""
+    if mesh is None:
+        nobody = np.full((N_PAIRS, n_samples), NO_TOOTH, dtype=np.int16)
+        return {
+            "mesh_pinion_tooth": nobody,
+            "mesh_wheel_tooth": nobody,
+            "mesh_load_share": np.full((N_PAIRS, n_samples), MISSING, dtype=np.float32),
+            "mesh_force": np.full(n_samples, MISSING, dtype=np.float32),
+            "contact_lost": np.zeros(n_samples, dtype=np.int8),
+            "fault_engaged": np.zeros(n_samples, dtype=np.int8),
+        }
+    return {
+        "mesh_pinion_tooth": mesh.pinion_tooth,
+        "mesh_wheel_tooth": mesh.wheel_tooth,
+        "mesh_load_share": mesh.load_share.astype(np.float32),
+        "mesh_force": mesh.force.astype(np.float32),
+        "contact_lost": mesh.contact_lost.astype(np.int8),
+        "fault_engaged": mesh.fault_engaged.astype(np.int8),
+    }
+
+
+def signal_shapes(config: Mapping[str, Any], system: SpurPair) -> dict[str, tuple[int, ...]]:
+    """Shape of every array of one record, by signal name."""
+    dataset, n_channels = config["dataset"], len(system.sensing.channels)
+    n_samples = round(system.operating.duration * system.sensing.sampling_rate)
+    shapes: dict[str, tuple[int, ...]] = {
+        "acceleration": (n_channels, n_samples),
+        "fault_multihot": (len(config["plan"]["classes"]),),
+        "signal_power": (n_channels,),
+        "noise_power": (n_channels,),
+    }
+    if dataset["store_clean"]:
+        shapes["acceleration_clean"] = (n_channels, n_samples)
+    if dataset["store_shaft_angle"]:
+        shapes["shaft_angle"] = (n_samples,)
+    if dataset["store_mesh_state"]:
+        shapes |= {name: values.shape for name, values in _mesh_signals(None, n_samples).items()}
+    return shapes
 
 
 def _multihot(config: Mapping[str, Any], row: Mapping[str, Any]) -> NDArray[np.int8]:
@@ -185,6 +237,7 @@ def row_faults(row: Mapping[str, Any]) -> list[Fault]:
 
 
 def row_run(config: Mapping[str, Any], system: SpurPair, row: Mapping[str, Any]) -> Run:
+    """What one row of a plan asks to simulate."""
     specimen, gearbox = _unit(config, system, row)
     start = Start(
         tooth_pinion=int(row["start_tooth_pinion"]),
@@ -192,7 +245,14 @@ def row_run(config: Mapping[str, Any], system: SpurPair, row: Mapping[str, Any])
         phase=float(row["start_phase"]),
     )
     faults = () if config["plan"]["sham"] else tuple(row_faults(row))
-    return Run(system=system, faults=faults, start=start, specimen=specimen, gearbox=gearbox)
+    return Run(
+        system=system,
+        faults=faults,
+        start=start,
+        specimen=specimen,
+        gearbox=gearbox,
+        tell_mesh=config["dataset"]["store_mesh_state"],
+    )
 
 
 TwinKey = tuple[str, str]
@@ -221,7 +281,7 @@ def _missing_twins(
     for place, (run, row, key) in enumerate(zip(runs, rows, keys, strict=True)):
         sensing = run.system.sensing
         if sensing.snr is not None and sensing.snr_reference == "healthy_twin" and key not in _TWINS:
-            twin = replace(run, faults=(), start=_twin_start(config, run.system, row))
+            twin = replace(run, faults=(), tell_mesh=False, start=_twin_start(config, run.system, row))
             wanted.setdefault(key, twin)
             if not run.faults and run.start == twin.start:
                 among[key] = place

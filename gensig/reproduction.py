@@ -22,10 +22,10 @@ from gensig.errors import ConfigError, DatasetError, SimulationError
 from gensig.records import (
     Record,
     Stream,
-    row_run,
-    row_values,
     read_seed,
     record_system,
+    row_run,
+    row_values,
     simulate_record,
     simulate_records,
     stream,

@@ -193,5 +193,5 @@ def _as_stored(record: Record) -> Record:
     """The record with the values that a shard fills in, and its reason as long as a shard holds it."""
     values = {**DEFAULTS, **record.values}
     n_bytes = COLUMNS["status_reason"].n_bytes
-    values["status_reason"] = str(values["status_reason"]).encode()[:n_bytes].decode(errors="ignore")
+    values["status_reason"] = str(values["status_reason"]).encode("ascii", "backslashreplace")[:n_bytes].decode()
     return replace(record, values=values)

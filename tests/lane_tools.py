@@ -70,7 +70,7 @@ def _advance(group, q, v, step, first_step, n_steps, channels=()):
     work, wide, near = _kernels.scratch(len(q), len(index))
     _kernels.integrate(
         group, state.ravel(), np.zeros(LANES), np.ones(LANES), step, first_step, n_steps, index, means.ravel(), 0,
-        np.empty(0), -1, 1, work, wide, near,
+        np.empty(0), -1, 1, np.empty(0), work, wide, near,
     )  # fmt: skip
     center = wide.reshape(-1, LANES)[CENTER, 0] * group.rotation.reshape(-1, LANES)[:, 0]
     return state[0, :, 0] + group.rest[:, 0] + center, state[1, :, 0].copy(), means[:, :, 0].T.copy()

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import os
 import sys
+import threading
 import time
 import warnings
 from collections.abc import Iterator
@@ -15,6 +16,8 @@ from gensig.errors import ConfigError
 
 if TYPE_CHECKING:
     from gensig.generation import Progress
+
+LINE_SECONDS = 5.0
 
 
 @contextmanager
@@ -35,51 +38,87 @@ def one_line_warnings(program: str) -> Iterator[None]:
 
 
 class ShardProgress:
-    """Progress over records: rich bar on a terminal, a line every few seconds otherwise, nothing when quiet."""
+    """Progress over records: a bar on a terminal, a line every few seconds elsewhere, nothing when quiet."""
 
     def __init__(self, *, quiet: bool, n_records: int) -> None:
         self.quiet = quiet
         self.n_records = n_records
-        self._begin = time.monotonic()
-        self._last_line = self._begin
+        self._last: Progress | None = None
+        self._begin = self._last_time = time.monotonic()
         self._bar: Any = None
+        self._ended = threading.Event()
+        self._ticker = threading.Thread(target=self._tick, daemon=True)
 
     def __enter__(self) -> ShardProgress:
-        if not self.quiet and sys.stderr.isatty():
+        if self.quiet:
+            return self
+        if sys.stderr.isatty():
             from rich.console import Console
-            from rich.progress import BarColumn, MofNCompleteColumn, Progress, TextColumn, TimeRemainingColumn
+            from rich.progress import BarColumn, MofNCompleteColumn, Progress, TextColumn
 
             self._bar = Progress(
                 TextColumn("records"),
                 BarColumn(),
                 MofNCompleteColumn(),
-                TextColumn("{task.fields[rate]}"),
-                TimeRemainingColumn(),
+                TextColumn("{task.fields[facts]}"),
                 console=Console(stderr=True),
             )
             self._bar.start()
-            self._task = self._bar.add_task("records", total=self.n_records, rate="")
+            self._task = self._bar.add_task("records", total=self.n_records, facts=self.facts())
+        self._ticker.start()
         return self
 
     def __exit__(self, *_details: object) -> None:
+        self._ended.set()
+        if self._ticker.is_alive():
+            self._ticker.join()
         if self._bar is not None:
             self._bar.stop()
 
     def __call__(self, progress: Progress) -> None:
-        """Take one finished shard."""
-        now = time.monotonic()
-        rate = progress.n_done / max(now - self._begin, 1e-9)
-        failed = f", {progress.n_failed} failed" if progress.n_failed else ""
+        """Take one shard that is finished or given up."""
+        self._last, self._last_time = progress, time.monotonic()
         if self._bar is not None:
-            self._bar.update(self._task, completed=progress.n_done, rate=f"{rate:.1f} records/s{failed}")
-        elif not self.quiet and (now - self._last_line > 5.0 or progress.n_done == progress.n_records):
-            self._last_line = now
-            left = (progress.n_records - progress.n_done) / max(rate, 1e-9)
-            print(
-                f"{progress.n_done} of {progress.n_records} records, {rate:.1f} records/s, {left:.0f} s left{failed}",
-                file=sys.stderr,
-                flush=True,
-            )
+            self._show_bar()
+        elif not self.quiet and progress.n_done == progress.n_records:
+            self._print_line()
+
+    def _tick(self) -> None:
+        """Show the time pass, also where no shard is finished yet; lines come less often in a long run."""
+        while not self._ended.wait(1.0 if self._bar is not None else self._pause()):
+            self._show_bar() if self._bar is not None else self._print_line()
+
+    def _pause(self) -> float:
+        return max(LINE_SECONDS, 0.01 * (time.monotonic() - self._begin))
+
+    def _show_bar(self) -> None:
+        n_done = self._last.n_done if self._last is not None else 0
+        self._bar.update(self._task, completed=n_done, facts=self.facts())
+
+    def facts(self) -> str:
+        """Rate, bytes and time left, as far as they are known."""
+        last = self._last
+        seconds = self._last_time - self._begin
+        if last is None or not last.n_made or seconds <= 0.0:
+            return f"{time.monotonic() - self._begin:.0f} s"
+        rate = last.n_made / seconds
+        left = max(0.0, (last.n_records - last.n_done) / rate - (time.monotonic() - self._last_time))
+        failed = f", {last.n_failed} failed" if last.n_failed else ""
+        return f"{rate:.1f} records/s, {last.n_bytes / 1e6:.1f} MB, {_duration(left)} left{failed}"
+
+    def _print_line(self) -> None:
+        n_done = self._last.n_done if self._last is not None else 0
+        print(f"{n_done} of {self.n_records} records, {self.facts()}", file=sys.stderr, flush=True)
+
+
+def _duration(seconds: float) -> str:
+    """'42 s', '3 min 10 s', '2 h 5 min'."""
+    whole = round(seconds)
+    if whole < 60:
+        return f"{whole} s"
+    if whole < 3600:
+        return f"{whole // 60} min {whole % 60} s"
+    return f"{whole // 3600} h {whole % 3600 // 60} min"
 
 
 @contextmanager

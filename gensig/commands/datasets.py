@@ -15,9 +15,10 @@ from gensig.commands.console import ShardProgress
 from gensig.compose import job_folders, override_keys, sweep
 from gensig.config import Request, read_request
 from gensig.dataset.atomic import read_text
+from gensig.dataset.beginning import refuse_used
 from gensig.dataset.inspection import inspect as inspect_path
 from gensig.dataset.layout import CONFIG_BYTES_LIMIT, MANIFEST, OVERRIDES
-from gensig.dataset.manifest import read_manifest, refuse_used
+from gensig.dataset.manifest import read_manifest
 from gensig.dataset.verify import verify as verify_folder
 from gensig.errors import ConfigError
 
@@ -54,8 +55,8 @@ def _generate_one(request: Request, out: Path, executor: Executor, arguments: Na
     from gensig.generation import begin_folder, run_folder
 
     begin = time.monotonic()
-    n_records = request.config["plan"]["n_records"]
     n_shards = begin_folder(request.config, request.overrides, out)
+    n_records = read_manifest(out).n_records
     if not arguments.quiet:
         print(f"{out}: making {n_records} records in {n_shards} shard(s)", file=sys.stderr, flush=True)
     with ShardProgress(quiet=arguments.quiet, n_records=n_records) as progress:
@@ -140,11 +141,21 @@ def resume(arguments: Namespace) -> int:
 
 
 def finalize(arguments: Namespace) -> int:
-    """Close a data set whose shards were made by tasks of an array job."""
-    from gensig.generation import close_folder
+    """Close a data set whose shards were made by tasks of an array job; accept an edited card of a closed one."""
+    from gensig.dataset.checksums import accept_edits
 
     out = Path(arguments.folder)
-    n_failed, n_records = close_folder(out), read_manifest(out).n_records
+    manifest = read_manifest(out)
+    if manifest.is_complete:
+        accepted = accept_edits(out)
+        if accepted:
+            print(f"{out}: accepted as it is now: {', '.join(accepted)}")
+        n_failed = manifest.n_failed
+    else:
+        from gensig.generation import close_folder
+
+        n_failed = close_folder(out)
+    n_records = manifest.n_records
     if n_failed:
         print(f"gensig: {n_failed} of {n_records} records failed and are marked so in {out}", file=sys.stderr)
     print(f"{out} is complete: {n_records} records")

@@ -117,7 +117,8 @@ def simulate(arguments: Namespace) -> int:
     request = read_request(arguments.overrides, config_dir=arguments.config_dir)
     config = request.config
     name = config["fault"]["kind"]
-    config["plan"] = {**config["plan"], "classes": [name], "n_records": 1, "n_units": 1, "n_gearboxes": 1, "vary": {}}
+    one: dict[str, Any] = {"n_records": 1, "n_units": 1, "n_gearboxes": 1, "conditions_per_unit": None, "n_repeats": 1}
+    config["plan"] = {**config["plan"], **one, "classes": [name], "design": "latin_hypercube", "vary": {}}
     config["classes"] = {name: without_vary(config["fault"])}
     row = make_plan(config).record(0)
     return _show(config, simulate_record(config, row), arguments)

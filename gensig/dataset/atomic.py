@@ -1,8 +1,11 @@
 """Files that appear whole or not at all, and files of strangers read with a limit."""
 
+import fcntl
 import hashlib
 import os
 import secrets
+from collections.abc import Iterator
+from contextlib import contextmanager, suppress
 from pathlib import Path
 
 from gensig.errors import DatasetError
@@ -13,6 +16,21 @@ TEMPORARY_SUFFIX = ".tmp"
 def temporary_name(path: Path) -> Path:
     """A name in the same folder that no other process uses: hidden, ending in `TEMPORARY_SUFFIX`."""
     return path.with_name(f".{path.name}.{os.getpid()}-{secrets.token_hex(4)}{TEMPORARY_SUFFIX}")
+
+
+@contextmanager
+def locked(folder: Path) -> Iterator[None]:
+    """Keep other local processes from changing the same data set; a lock ends with its process and leaves no file."""
+    try:
+        descriptor = os.open(folder, os.O_RDONLY)
+    except OSError as error:
+        raise DatasetError(f"{folder} cannot be opened: {error.strerror}; give the folder of a data set") from error
+    try:
+        with suppress(OSError):  # a file system without locks: one writer at a time is then the caller's duty
+            fcntl.flock(descriptor, fcntl.LOCK_EX)
+        yield
+    finally:
+        os.close(descriptor)
 
 
 def sync_folder(folder: Path) -> None:

@@ -2,14 +2,16 @@
 
 import html
 import re
+from collections.abc import Mapping
 from pathlib import Path
 
 import numpy as np
 import yaml
 
 from gensig.dataset.atomic import write_text
-from gensig.dataset.croissant import CROISSANT, croissant_text
-from gensig.dataset.layout import CARD, SHARDS
+from gensig.dataset.class_figures import write_class_figures
+from gensig.dataset.croissant import croissant_text
+from gensig.dataset.layout import CARD, CROISSANT, SHARDS
 from gensig.dataset.reader import Dataset, open_dataset
 
 GEOMETRY = (
@@ -48,15 +50,21 @@ CAVEATS = """- The records are simulated. A model trained on them alone has prov
 """
 
 
-def write_card(out: Path) -> None:
-    """Write `README.md` and `croissant.json` of a data-set folder whose shards are all done."""
+def write_card(out: Path, *, figures: bool = True) -> None:
+    """Write `README.md`, its figures and `croissant.json` of a data-set folder whose shards are all done."""
     with open_dataset(out, allow_incomplete=True) as data:
+        pictures = write_class_figures(data) if figures else {}
         write_text(out / CROISSANT, croissant_text(data, CAVEATS))
-        write_text(out / CARD, card_text(data))
+        write_text(out / CARD, card_text(data, pictures))
 
 
-def card_text(data: Dataset) -> str:
-    """The card as Markdown after Hugging Face front matter; every text that comes from a file is escaped."""
+def card_text(data: Dataset, pictures: Mapping[str, str] | None = None) -> str:
+    """The card as Markdown after Hugging Face front matter; every text that comes from a file is escaped.
+
+    Parameters
+    ----------
+    pictures : path in the folder by class name
+    """
     sections = [
         front_matter(data),
         f"# {escape(data.folder.resolve().name)}",
@@ -64,6 +72,7 @@ def card_text(data: Dataset) -> str:
         _table(("fact", "value"), _facts(data)),
         "## Classes",
         _table(("class", "records", "severity"), _classes(data)),
+        _gallery(pictures or {}),
         "## Splits",
         _table(("protocol", *("train", "validation", "test")), _splits(data)),
         "## Load it",
@@ -73,7 +82,15 @@ def card_text(data: Dataset) -> str:
         "## Licence",
         LICENCE,
     ]
-    return "\n\n".join(section.strip() for section in sections) + "\n"
+    return "\n\n".join(section.strip() for section in sections if section) + "\n"
+
+
+def _gallery(pictures: Mapping[str, str]) -> str:
+    """A picture a class, with what all of them show."""
+    if not pictures:
+        return ""
+    shown = [f"![{escape(name)}]({path})" for name, path in pictures.items()]
+    return "\n\n".join(["The record of median severity of each class, noise included, on the same axes:", *shown])
 
 
 def front_matter(data: Dataset) -> str:

@@ -10,8 +10,6 @@ from gensig.dataset.plan import Plan
 from gensig.dataset.reader import Dataset
 from gensig.dataset.schema import COLUMNS, PARAMS
 
-CROISSANT = "croissant.json"
-
 _CONTEXT: dict[str, Any] = {
     "@language": "en",
     "@vocab": "https://schema.org/",

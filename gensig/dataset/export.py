@@ -136,7 +136,8 @@ def _write_hdf5(data: Dataset, path: Path) -> None:
             sample = data.shard_column(0, name)
             dtype = sample.dtype
             if dtype.kind == "U":
-                dtype = h5py.string_dtype("utf-8", column.n_bytes if column else TEXT_BYTES)
+                plain = all(text.isascii() for text in np.unique(data.column(name)).tolist())
+                dtype = h5py.string_dtype("ascii" if plain else "utf-8", column.n_bytes if column else TEXT_BYTES)
             item = file.create_dataset(name, (data.n_records, *sample.shape[1:]), dtype)
             set_attribute(item, "unit", unit_of(name))
             for shard, entry in enumerate(data.manifest.shards):

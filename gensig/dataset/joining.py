@@ -2,16 +2,13 @@
 
 from __future__ import annotations
 
-import json
 from collections.abc import Mapping
 from pathlib import Path
 from typing import Any
 
 from gensig.dataset.atomic import sha256_file
-from gensig.dataset.attributes import read_attributes
 from gensig.dataset.compression import creation_options
-from gensig.dataset.guard import open_shard
-from gensig.dataset.layout import CONFIG, PLAN, Manifest, read_config, read_manifest, shard_path
+from gensig.dataset.layout import CONFIG, PLAN, Manifest, read_config, read_manifest
 from gensig.dataset.manifest import differing_keys, identity_hash
 from gensig.errors import DatasetError
 from gensig.version import __version__
@@ -37,8 +34,9 @@ def joined_folder(out: Path, *, asked: Mapping[str, Any] | None = None) -> tuple
             "differ: go on with that version, or start a new folder"
         )
     if identity_hash(config, __version__) != manifest.identity:
-        begun = _begun_with(out, manifest)
-        where = f" in {_listed(differing_keys(begun, config))}" if begun is not None else ""
+        begun = manifest.configuration
+        told = begun and identity_hash(begun, manifest.generator_version) == manifest.identity
+        where = f" in {_listed(differing_keys(begun, config))}" if told else ""
         raise DatasetError(
             f"{out / CONFIG} was changed{where} since the folder was begun; undo that, or start a new folder"
         )
@@ -51,16 +49,6 @@ def joined_folder(out: Path, *, asked: Mapping[str, Any] | None = None) -> tuple
         raise DatasetError(f"{out / PLAN} was changed since the folder was begun; restore it, or start a new folder")
     creation_options(config["dataset"]["compression"])  # refuses one whose package is missing
     return manifest, config
-
-
-def _begun_with(out: Path, manifest: Manifest) -> dict[str, Any] | None:
-    """The configuration that a finished shard carries, where there is one."""
-    index = next((place for place, entry in enumerate(manifest.shards) if entry.state == "done"), None)
-    if index is None:
-        return None
-    with open_shard(shard_path(out, index), folder=out) as file:
-        config = json.loads(str(read_attributes(file)["config_json"]))
-    return config if identity_hash(config, manifest.generator_version) == manifest.identity else None
 
 
 def _listed(keys: list[str]) -> str:

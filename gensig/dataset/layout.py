@@ -18,8 +18,13 @@ OVERRIDES = "overrides.yaml"
 PLAN = "plan.csv"
 INDEX = "index.h5"
 CARD = "README.md"
+CROISSANT = "croissant.json"
+CHECKSUMS = "SHA256SUMS"
+LOG = "run.log"
 SHARDS = "shards"
 SPLITS = "splits"
+FIGURES = "figures"
+BEGINNING = ".beginning"  # in a folder that has no manifest yet
 
 TEXT_BYTES_LIMIT = 256 * 1024**2
 CONFIG_BYTES_LIMIT = 1024**2
@@ -61,6 +66,7 @@ class Manifest:
     state : str            'incomplete', or 'complete' once everything else is on disk
     shards : tuple         one entry a shard, in order
     files : dict           sha256 of the other files that decide or list the records
+    configuration : dict   what `identity` was made of, so that keys changed since can be named; {} in older folders
     environment : dict     versions, machine and times; decides nothing
     """
 
@@ -72,6 +78,7 @@ class Manifest:
     state: str = "incomplete"
     shards: tuple[ShardEntry, ...]
     files: dict[str, str]
+    configuration: dict[str, Any] = field(default_factory=dict)
     environment: dict[str, Any] = field(default_factory=dict)
 
     @property
@@ -90,10 +97,14 @@ class Manifest:
         return sum(entry.n_failed for entry in self.shards)
 
 
+def manifest_text(manifest: Manifest) -> str:
+    """What `manifest.json` holds."""
+    return json.dumps(asdict(manifest), indent=1, ensure_ascii=False, allow_nan=False) + "\n"
+
+
 def write_manifest(folder: Path, manifest: Manifest) -> None:
     """Replace `manifest.json` atomically."""
-    text = json.dumps(asdict(manifest), indent=1, ensure_ascii=False, allow_nan=False)
-    write_text(folder / MANIFEST, text + "\n")
+    write_text(folder / MANIFEST, manifest_text(manifest))
 
 
 def read_manifest(folder: Path) -> Manifest:
@@ -107,6 +118,11 @@ def read_manifest(folder: Path) -> Manifest:
     folder = Path(folder)
     path = folder / MANIFEST
     if not path.is_file():
+        if (folder / BEGINNING).is_file():
+            raise DatasetError(
+                f"{folder} holds no record: its run was killed before the plan was on disk; give the same "
+                f"`gensig generate` or `gensig plan --freeze` with out={folder} again"
+            )
         raise DatasetError(
             f"{folder} is no gensig data set: it has no {MANIFEST}; give the folder that `gensig generate` made"
         )
@@ -125,6 +141,7 @@ def read_manifest(folder: Path) -> Manifest:
             state=_one_of(_get(content, "state", str), ("incomplete", "complete"), "state"),
             shards=shards,
             files={name: _hash(value, name) for name, value in _get(content, "files", dict).items()},
+            configuration=_get(content, "configuration", dict) if "configuration" in content else {},
             environment=_get(content, "environment", dict),
         )
         _check_manifest(manifest)

@@ -190,17 +190,21 @@ class Dataset:
         return block if channels is None else block[[self._channel(channel) for channel in channels]]
 
     def trace(self, record_index: int, name: str, start: int = 0, stop: int | None = None) -> np.ndarray:
-        """'tacho' or 'shaft_angle' of one record, (sample,), where the data set holds it."""
+        """Another signal of one record, where the data set holds it: 'shaft_angle' (sample,), and the mesh state.
+
+        Of that 'mesh_force', 'contact_lost' and 'fault_engaged' are (sample,); 'mesh_pinion_tooth', 'mesh_wheel_tooth'
+        and 'mesh_load_share' (pair, sample).
+        """
         stop = self.n_samples if stop is None else stop
         traces = [known for known in self.signal_names if known not in SCALES]
         if name not in traces:
             raise unknown_name("trace", name, traces or ["none"], self.folder)
         shard, row = self._place(record_index, start, stop)
         try:
-            values = self._file(shard)[name][row, start:stop]
+            values = self._file(shard)[name][row, ..., start:stop]
         except HDF5_ERRORS as error:
             raise self._unreadable(shard, error) from error
-        if values.shape != (stop - start,):
+        if values.shape[-1:] != (stop - start,) or values.ndim != len(SIGNALS[name].axes):
             raise self._unreadable(shard, ValueError(f"{name} has another shape than in the other shards"))
         return values
 

@@ -2,7 +2,6 @@
 
 from dataclasses import dataclass
 
-import h5py
 import numpy as np
 
 from gensig.errors import DatasetError
@@ -19,7 +18,7 @@ class Column:
     Parameters
     ----------
     name : str           name of the HDF5 data set
-    dtype : str          numpy type, or 'str<n>' for UTF-8 text of at most n bytes
+    dtype : str          numpy type, or 'str<n>' for ASCII text of at most n bytes
     unit : str           unit of the values; '' for text, '1' for pure numbers
     role : str           one of `ROLES`: what a learner may do with it
     description : str    the meaning, one sentence
@@ -39,7 +38,7 @@ class Column:
 
     @property
     def is_text(self) -> bool:
-        """True for UTF-8 text."""
+        """True for text."""
         return self.dtype.startswith("str")
 
     @property
@@ -49,8 +48,8 @@ class Column:
 
     @property
     def storage_dtype(self) -> np.dtype:
-        """Type of the HDF5 data set."""
-        return h5py.string_dtype("utf-8", self.n_bytes) if self.is_text else np.dtype(self.dtype).newbyteorder("<")
+        """Type of the HDF5 data set; text is marked as ASCII, because Octave reads none that is marked as UTF-8."""
+        return np.dtype(f"S{self.n_bytes}") if self.is_text else np.dtype(self.dtype).newbyteorder("<")
 
     @property
     def is_bulk(self) -> bool:
@@ -87,7 +86,8 @@ COLUMNS: dict[str, Column] = _table(
     ("gearbox_id", "str64", "", "unit", "housing, transfer path and bearings"),
     ("specimen_id", "str64", "", "unit", "set of gears with its manufacturing errors"),
     ("unit_id", "str64", "", "unit", "one specimen in one gearbox"),
-    ("condition_id", "str64", "", "condition", "speed and torque set-point"),
+    ("condition_id", "str64", "", "condition", "one unit at one set-point; its records share one noise level"),
+    ("repeat", "int32", "1", "condition", "number among the records of the same condition_id and class, from 0"),
     ("status", "str16", "", "result", "'ok' or 'failed'; a failed record keeps its parameters, its signals may be NaN"),
     ("status_reason", "str256", "", "result", "why the record failed, cut to 256 bytes; empty when ok"),
     ("integration_error", "float64", "1", "result", "relative error of the time integration; NaN where not measured"),
@@ -106,6 +106,13 @@ COLUMNS: dict[str, Column] = _table(
         "result",
         "share of the time without tooth contact; NaN where not measured",
     ),
+    (
+        "detectability",
+        "float64",
+        "1",
+        "fault",
+        "d' of the best detector, which knows what the fault adds, in the record's noise; NaN where not asked for",
+    ),
 )
 
 SIGNALS: dict[str, Column] = {
@@ -123,6 +130,18 @@ SIGNALS: dict[str, Column] = {
                description="once-per-revolution pulse of the driving shaft (optional)"),
         Column(name="shaft_angle", dtype="float64", unit="rad", role="result", axes=("sample",),
                description="angle of the driving shaft (optional)"),
+        Column(name="mesh_pinion_tooth", dtype="int16", unit="1", role="fault", axes=("pair", "sample"),
+               description="pinion tooth of each pair that carries load, from 0; -1 where it does not (optional)"),
+        Column(name="mesh_wheel_tooth", dtype="int16", unit="1", role="fault", axes=("pair", "sample"),
+               description="the same of the wheel (optional)"),
+        Column(name="mesh_load_share", dtype="float32", unit="1", role="fault", axes=("pair", "sample"),
+               description="normal force of each pair over that of all (optional)"),
+        Column(name="mesh_force", dtype="float32", unit="N", role="fault", axes=("sample",),
+               description="normal force of all pairs, negative on the back flanks (optional)"),
+        Column(name="contact_lost", dtype="int8", unit="1", role="fault", axes=("sample",),
+               description="1 where no tooth touches another (optional)"),
+        Column(name="fault_engaged", dtype="int8", unit="1", role="fault", axes=("sample",),
+               description="1 where a faulty tooth carries load or stands on the path of contact (optional)"),
         Column(name="fault_multihot", dtype="int8", unit="1", role="label", axes=("class",),
                description="1 for the record's class and those of a compound fault's parts, by class_names (optional)"),
         Column(name="signal_power", dtype="float64", unit="(m/s^2)^2", role="result", axes=("channel",),
@@ -145,11 +164,13 @@ REQUIRED_ATTRIBUTES = ("schema_version", "sampling_rate_hz", "channel_names", "c
 
 # A column left out of `ShardWriter.write` gets its value here; any other must be given.
 DEFAULTS: dict[str, str | float] = {
+    "repeat": 0,
     "status": "ok",
     "status_reason": "",
     "integration_error": float("nan"),
     "integration_check": "none",
     "contact_loss_fraction": float("nan"),
+    "detectability": float("nan"),
 }
 
 PARAMS = "params"
@@ -172,7 +193,7 @@ def column_table() -> str:
     lines = ["| name | shape | type | unit | role | meaning |", "|---|---|---|---|---|---|"]
     for column in (*SIGNALS.values(), *COLUMNS.values()):
         shape = ", ".join(("record", *column.axes))
-        kind = f"UTF-8, {column.n_bytes} bytes" if column.is_text else column.dtype
+        kind = f"ASCII, {column.n_bytes} bytes" if column.is_text else column.dtype
         if column.name in SCALES:
             kind = " or ".join(SAMPLE_TYPES)
         name = f"`{column.name}`" + (" *" if column.name in REQUIRED else "")

@@ -282,9 +282,9 @@ def _encoded(column: Column, value: str | int | float) -> bytes | int | float:
         if column.is_text:
             if not isinstance(value, str) or "\0" in value:
                 raise TypeError
-            encoded = value.encode("utf-8")
             if column.name == "status_reason":
-                return encoded[: column.n_bytes].decode("utf-8", "ignore").encode("utf-8")
+                return value.encode("ascii", "backslashreplace")[: column.n_bytes]
+            encoded = value.encode("ascii")
             if len(encoded) > column.n_bytes:
                 raise OverflowError
             return encoded
@@ -297,9 +297,8 @@ def _encoded(column: Column, value: str | int | float) -> bytes | int | float:
             raise OverflowError
         return integer
     except (TypeError, ValueError, OverflowError) as error:
-        raise DatasetError(
-            f"column {column.name}: {value!r} is not a {column.dtype}; give {column.description}"
-        ) from error
+        kind = f"ASCII text of at most {column.n_bytes} bytes" if column.is_text else f"value of type {column.dtype}"
+        raise DatasetError(f"column {column.name}: {value!a} is no {kind}; give {column.description}") from error
 
 
 def _check_row(values: Mapping[str, str | int | float]) -> None:

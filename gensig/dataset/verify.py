@@ -8,11 +8,13 @@ import numpy as np
 
 from gensig.dataset.atomic import sha256_file
 from gensig.dataset.attributes import HDF5_ERRORS, read_attributes
+from gensig.dataset.checksums import differences
 from gensig.dataset.guard import datasets, first_line, open_shard, read_rows
 from gensig.dataset.inspection import inspect
 from gensig.dataset.layout import (
     CONFIG,
     INDEX,
+    MANIFEST,
     OVERRIDES,
     PLAN,
     SHARDS,
@@ -59,11 +61,18 @@ def verify(folder: Path, *, quick: bool = False) -> VerifyResult:
 
     Raises
     ------
-    DatasetError    when the folder is no data set or its manifest cannot be read
+    DatasetError    when the folder is no data set
     """
     folder = Path(folder)
-    manifest = read_manifest(folder)
+    try:
+        manifest = read_manifest(folder)
+    except DatasetError as error:
+        if not (folder / MANIFEST).is_file():
+            raise
+        return VerifyResult(complete=False, problems=[str(error)], n_records=0, n_failed=0)
     problems = _state(folder, manifest) + _extra_files(folder, manifest)
+    if manifest.is_complete:
+        problems += [one.line for one in differences(folder, manifest, quick=quick)]
     plan = None
     if not quick:
         found, plan = _beside_shards(folder, manifest)
@@ -139,6 +148,9 @@ def _beside_shards(folder: Path, manifest: Manifest) -> tuple[list[str], Plan | 
         config = read_config(folder)
         if identity_hash(config, manifest.generator_version) != manifest.identity:
             problems.append(f"{CONFIG} and the identity in the manifest do not belong together; one was altered")
+        begun = manifest.configuration
+        if begun and identity_hash(begun, manifest.generator_version) != manifest.identity:
+            problems.append(f"{MANIFEST} has a configuration and an identity that do not belong together")
         if "seed" in config and config["seed"] != manifest.seed:
             problems.append(f"{CONFIG} has seed {config['seed']!r} and the manifest {manifest.seed}; one was altered")
     except DatasetError as error:

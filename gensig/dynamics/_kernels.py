@@ -18,6 +18,7 @@ from gensig.dynamics._tables import between, cover, gather
 from gensig.dynamics._vector import (
     any_above,
     compiled,
+    inlined,
     load,
     n_lanes,
     plus_product,
@@ -35,8 +36,8 @@ TOGETHER = 4  # samples of the low-pass that are summed side by side; divides BL
 
 @compiled
 def integrate(
-    group, state, lost, fresh, step, first_step, n_steps, channels, out, out_row, angle, angle_row, per_angle, work,
-    wide, near,
+    group, state, lost, fresh, step, first_step, n_steps, channels, out, out_row, angle, angle_row, per_angle, seen,
+    work, wide, near,
 ):  # fmt: skip
     """Advance every lane by ``n_steps`` of classical RK4.
 
@@ -56,6 +57,7 @@ def integrate(
         row stores nothing
     angle : (sample, lane)    takes, from row ``angle_row`` on, the pinion's angle in rad since time 0 at the begin of
         every step whose number ``per_angle`` divides; a negative row stores nothing
+    seen : (sample, N_SEEN, lane)    takes at the same places what the pairs do; may be empty
     work, wide, near : ``scratch`` of the group
 
     Returns
@@ -88,9 +90,14 @@ def integrate(
         if place % RECENTER == 0:
             recenter(group, now, n_dof, work, wide)
         set_out(group, place * step, now, drive, work, wide)
+        seen_row = -1
         if angle_row >= 0 and place % per_angle == 0:
             for lane in range(n):
                 angle[angle_row * n + lane] = wide[NOMINAL * n + lane] + work[now + P_TURN * n + lane]
+            if len(seen) > 0:
+                seen_row = angle_row
+                for k in range(N_PAIRS):
+                    store(work, (layout.PAIR_FORCE + k) * n, zero)
             angle_row += 1
         speed, gain = load(work, drive), load(work, drive + n)
         approach, rate = motion(numbers, now, now + size, work)
@@ -140,6 +147,8 @@ def integrate(
                 if part == 0:
                     if stage == 0:
                         loaded = law[7]
+                        if seen_row >= 0:
+                            tell(seen, seen_row, law[0], work, near)
                         store(lost, 0, load(lost, 0) + where_above(law[0] * law[0], zero, zero, one))
                     else:
                         differs = law[7] - loaded
@@ -213,6 +222,19 @@ def integrate(
     return angle_row
 
 
+@inlined
+def tell(seen, row, normal, work, near):
+    """Write what the pairs do at an instant."""
+    n = width(work)
+    store(work, layout.LAW * n, normal)
+    for lane in range(n):
+        at = row * layout.N_SEEN * n + lane
+        seen[at + layout.SEEN_NEWEST * n] = near[layout.NEWEST * n + lane]
+        seen[at + layout.SEEN_FORCE * n] = work[layout.LAW * n + lane]
+        for k in range(N_PAIRS):
+            seen[at + (layout.SEEN_PAIRS + k) * n] = work[(layout.PAIR_FORCE + k) * n + lane]
+
+
 @compiled
 def low_pass(means, first, taps, factor, n_channels, n_samples, out, out_row):
     """Every ``factor``-th value of the filtered series of every channel.
@@ -247,8 +269,9 @@ def low_pass(means, first, taps, factor, n_channels, n_samples, out, out_row):
 
 @compiled
 def record(
-    group, state, lost, fresh, step, first_step, n_samples, factor, taps, channels, out, angle, means, work, wide, near
-):
+    group, state, lost, fresh, step, first_step, n_samples, factor, taps, channels, out, angle, seen, means, work, wide,
+    near,
+):  # fmt: skip
     """Integrate and decimate block by block, so that nothing at the internal rate leaves the cache.
 
     ``out`` (lane, channel, sample) float64 takes ``n_samples``; the first tap of the first stands on the step after
@@ -260,8 +283,8 @@ def record(
     n_steps, out_row = 1, -1  # then what the first sample needs before its last steps, then block by block
     while True:
         angle_row = integrate(
-            group, state, lost, fresh, step, now, n_steps, channels, means, out_row, angle, angle_row, factor, work,
-            wide, near,
+            group, state, lost, fresh, step, now, n_steps, channels, means, out_row, angle, angle_row, factor, seen,
+            work, wide, near,
         )  # fmt: skip
         now += n_steps
         for lane in range(n):

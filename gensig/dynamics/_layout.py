@@ -50,7 +50,10 @@ MOTION = FLAGS + 1  # roll less that at the begin of the step, approach, its rat
 N_LAW = 8
 LAW = MOTION + 4
 RAW = LAW + N_LAW  # table rows as they are read, lane by lane
-N_MESH = RAW + N_PAIRS * COLUMNS
+PAIR_FORCE = RAW + N_PAIRS * COLUMNS
+N_MESH = PAIR_FORCE + N_PAIRS
+# what is told of the mesh at an output sample: the newest pair, the normal force, and that of every pair
+SEEN_NEWEST, SEEN_FORCE, SEEN_PAIRS, N_SEEN = 0, 1, 2, 2 + N_PAIRS
 # rows of the float64 scratch
 BASE, CENTER, NOMINAL, ROLL, N_WIDE = 0, 1, 2, 3, 3 + N_SLOTS
 # rows of the whole numbers of the scratch

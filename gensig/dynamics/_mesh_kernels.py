@@ -25,6 +25,7 @@ from gensig.dynamics._layout import (
     NODES_PER_METER,
     OWN,
     OWN_SLOPE,
+    PAIR_FORCE,
     PATH,
     PER_FRICTION_WIDTH,
     PER_SWITCH_WIDTH,
@@ -107,7 +108,8 @@ def one_sided_law(numbers, consistent, first, last, slot, margin, ahead, approac
 
     Normal force, friction force, friction moments about pinion and wheel, force on the roll coordinate (energy
     balance), stored energy, power lost in mesh damping, number of loaded pairs; a vector each. Rows ``margin`` take
-    how deep every pair bites into the body that the others deflect, negative where it does not; none if negative.
+    how deep every pair bites into the body that the others deflect, negative where it does not, and ``PAIR_FORCE`` its
+    normal force; none if negative.
     """
     n = width(work)
     zero, one = spread(work, 0.0), spread(work, 1.0)
@@ -138,6 +140,8 @@ def one_sided_law(numbers, consistent, first, last, slot, margin, ahead, approac
         rate = approach_rate - slope * roll_rate
         force = elastic * (1.0 + damping * rate)
         force = where_above(force, zero, force, zero)
+        if margin >= 0:
+            store(work, (PAIR_FORCE + k) * n, force)
         normal = normal + force
         loaded = loaded + where_above(force, zero, one, zero)
         stored = stored + elastic * (bite - 0.5 * load(work, (pair + OWN) * n) * elastic)
@@ -155,7 +159,7 @@ def one_sided_law(numbers, consistent, first, last, slot, margin, ahead, approac
 def papers_law(numbers, first, last, slot, margin, ahead, approach, approach_rate, work):
     """F = k(t) delta + c_m delta': two-sided, no gap, pairs in and out over one integration step.
 
-    Rows ``margin`` take how far every pair is in, from 0 to 1 and beyond; none if negative.
+    Rows ``margin`` take how far every pair is in, from 0 to 1 and beyond, ``PAIR_FORCE`` its force; none if negative.
     """
     n = width(work)
     zero, one = spread(work, 0.0), spread(work, 1.0)
@@ -182,6 +186,8 @@ def papers_law(numbers, first, last, slot, margin, ahead, approach, approach_rat
     for k in range(first, last):
         position = load(work, (slot * SLOT_ROWS + k * N_KEPT + POSITION) * n) + ahead
         part = normal * load(work, (BITE + k) * n) * per_stiffness
+        if margin >= 0:
+            store(work, (PAIR_FORCE + k) * n, part)
         sliding, moment, reaction = _rubbed(numbers, position, part)
         friction, moment_p, moment_w = friction + sliding, moment_p + moment, moment_w + reaction
     stored, lost = 0.5 * together * approach * approach, damping * approach_rate * approach_rate

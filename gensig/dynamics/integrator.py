@@ -11,7 +11,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from gensig.dynamics import _kernels
-from gensig.dynamics._layout import CENTER, Group
+from gensig.dynamics._layout import CENTER, N_SEEN, Group
 from gensig.dynamics._vector import PRECISIONS, n_lanes
 from gensig.dynamics.decimation import Decimator, decimator
 from gensig.dynamics.lanes import at_step, fill_lanes, pack
@@ -64,12 +64,14 @@ class Motions:
 
     ``acceleration`` (lane, channel, sample) m/s2 or rad/s2; ``check`` is the same at half the step, of the beginning
     only; empty where the error is not asked for. ``shaft_angle`` (lane, sample) rad of the pinion since time 0,
-    ``mean_speed`` (lane,) rad/s, ``contact_loss_fraction`` (lane,), ``finite`` (lane,) whether all stayed so.
+    ``seen`` (lane, row, sample) what the core tells of the mesh, empty unless asked for, ``mean_speed`` (lane,) rad/s,
+    ``contact_loss_fraction`` (lane,), ``finite`` (lane,) whether all stayed so.
     """
 
     acceleration: Array
     check: Array
     shaft_angle: Array
+    seen: Array
     mean_speed: Array
     contact_loss_fraction: Array
     finite: NDArray[np.bool_]
@@ -114,28 +116,34 @@ class _Run:
         nothing = np.empty(0, dtype=self.precision)
         _kernels.integrate(
             group, self.state.ravel(), self.lost, self.fresh, step, first_step, n_steps, self.channels, nothing, -1,
-            np.empty(0), -1, 1, self.work, self.wide, self.near,
+            np.empty(0), -1, 1, np.empty(0), self.work, self.wide, self.near,
         )  # fmt: skip
         self.fresh[:] = 0.0
 
-    def record(self, group: Group, step: float, low_pass: Decimator, n_samples: int) -> tuple[Array, Array]:
+    def record(
+        self, group: Group, step: float, low_pass: Decimator, n_samples: int, *, tell_mesh: bool = False
+    ) -> tuple[Array, Array, Array]:
         """Integrate on, from ``low_pass.margin`` samples and a step before time 0, and decimate.
 
         Returns
         -------
-        accelerations (lane, channel, sample), and angles of the pinions (lane, sample + 1)
+        accelerations (lane, channel, sample), angles of the pinions (lane, sample + 1), and if the mesh shall be told
+        of, ``N_SEEN`` rows of it (lane, row, sample), else (lane, 0, sample)
         """
         factor, margin = low_pass.oversampling, low_pass.margin
         out = np.empty((self.n_lanes, len(self.channels), n_samples))
         angle = np.empty((n_samples + 2 * margin, self.n_lanes))
+        seen = np.empty((len(angle), N_SEEN if tell_mesh else 0, self.n_lanes))
         taps = low_pass.padded(self.precision)
         n_rows = _kernels.mean_rows(len(taps), factor)
         means = np.empty((n_rows, len(self.channels), self.n_lanes), dtype=self.precision)
         _kernels.record(
             group, self.state.ravel(), self.lost, self.fresh, step, -margin * factor - 1, n_samples, factor,
-            taps, self.channels, out.ravel(), angle.ravel(), means.ravel(), self.work, self.wide, self.near,
+            taps, self.channels, out.ravel(), angle.ravel(), seen.ravel(), means.ravel(), self.work, self.wide,
+            self.near,
         )  # fmt: skip
-        return out, np.ascontiguousarray(angle[margin : margin + n_samples + 1].T)
+        told = np.ascontiguousarray(seen[margin : margin + n_samples].transpose(2, 1, 0))
+        return out, np.ascontiguousarray(angle[margin : margin + n_samples + 1].T), told
 
 
 def integrate(
@@ -145,6 +153,7 @@ def integrate(
     sampling_rate: float,
     duration: float,
     channels: tuple[str, ...],
+    tell_mesh: bool = False,
 ) -> Motions:
     """Settle every machine by itself, then record ``duration`` from time 0 on.
 
@@ -185,7 +194,7 @@ def integrate(
     run.advance(*recording, end * fine, n_fine * fine - 1)
     checking = run.again()
     run.lost[:] = 0.0
-    acceleration, angle = run.record(*recording, low_pass, n_samples)
+    acceleration, angle, seen = run.record(*recording, low_pass, n_samples, tell_mesh=tell_mesh)
     check = np.empty((len(lanes), len(channels), 0))
     if solver.max_error is not None:
         finer, finer_low_pass = at(2 * fine), decimator(2 * fine)
@@ -194,11 +203,12 @@ def integrate(
         wait = -2 * finer_low_pass.margin * fine - 1 - first
         checking.advance(*finer, first, wait)
         n_check = min(n_samples, math.ceil(CHECKED * sampling_rate))
-        check, _ = checking.record(*finer, finer_low_pass, n_check)
+        check, _, _ = checking.record(*finer, finer_low_pass, n_check)
     return Motions(
         acceleration=acceleration,
         check=check,
         shaft_angle=angle[:, :-1],
+        seen=seen,
         mean_speed=(angle[:, -1] - angle[:, 0]) * sampling_rate / n_samples,
         contact_loss_fraction=run.lost / ((n_samples + 2 * low_pass.margin - 1) * fine + 1),
         finite=np.asarray((np.abs(run.state) < OUT_OF_BOUNDS).all(axis=(0, 1))),

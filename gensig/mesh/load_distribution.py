@@ -120,10 +120,21 @@ def loaded_pair_table(
     """
     load: Array | float = force
     if options.contact != "linear":
-        roll = pair.base_pitch * np.arange(options.points_per_pitch) / options.points_per_pitch
         for _ in range(LOAD_ROUNDS):
             sound = pair_table(pair, material, options, load=load)
-            shares = static_mesh(sound, pair_states(sound, roll), force).load
-            # pairs stand in order of entry, each one pitch after the one before it: nodes -1..0, 0..1, 1..2, 2..3
+            shares = static_mesh(sound, _sound_states(sound), force).load
             load = np.maximum(np.append(shares.T.ravel(), 0.0), LEAST_LOAD_SHARE * force)
     return pair_table(pair, material, options, teeth, load=load)
+
+
+def _sound_states(table: PairTable) -> PairStates:
+    """Sound pairs at every node of one pitch; in order of entry, each one pitch after the one before it."""
+
+    def of_pairs(nodes: Array) -> Array:
+        return nodes[:-1].reshape(N_PAIRS, table.options.points_per_pitch).T
+
+    return PairStates(
+        compliance=of_pairs(table.pinion.compliance[0] + table.wheel.compliance[0] - table.shared_compliance),
+        gap=of_pairs(table.pinion.gap[0] + table.wheel.gap[0]),
+        position=of_pairs(table.position),
+    )

@@ -23,6 +23,8 @@ def smooth(values: Array, distance: float, limit: float) -> tuple[Array, Array]:
     """
     bend = np.zeros(values.shape[1])
     bend[1:-1] = np.clip(np.diff(values[0], n=2), -limit, limit)
-    control = np.pad(values - 0.25 * bend, ((0, 0), (1, 1)), mode="reflect", reflect_type="odd")
-    before, here, after = control[:, :-2], control[:, 1:-1], control[:, 2:]
+    here = values - 0.25 * bend
+    # straight on beyond the ends; np.pad takes longer than all the rest
+    before = np.concatenate([2.0 * here[:, :1] - here[:, 1:2], here[:, :-1]], axis=1)
+    after = np.concatenate([here[:, 1:], 2.0 * here[:, -1:] - here[:, -2:-1]], axis=1)
     return 0.25 * (before + 2.0 * here + after), (after - before) / (2.0 * distance)

@@ -21,6 +21,7 @@ from gensig.dynamics.integrator import (
     integrate,
     settling_oversampling,
 )
+from gensig.dynamics.mesh_state import MeshState, mesh_state
 from gensig.dynamics.pair import Body, PairDynamics, Rotor, Support
 from gensig.errors import FaultError, SimulationError
 from gensig.faults.base import Fault, faulty_teeth
@@ -60,7 +61,7 @@ class CleanRecord:
     """Accelerations before noise, (channel, sample) m/s2 (rad/s2 for rotations), and what the run tells of itself.
 
     ``shaft_angle`` (sample,) rad of the pinion, from its nominal place at the first sample on, ``mean_speed`` rad/s,
-    ``integration_check`` one of ``CHECKS``.
+    ``integration_check`` one of ``CHECKS``, ``mesh`` the loads of the teeth where they were asked for.
     """
 
     acceleration: Array
@@ -69,6 +70,7 @@ class CleanRecord:
     contact_loss_fraction: float
     integration_error: float
     integration_check: str
+    mesh: MeshState | None = None
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -226,13 +228,17 @@ def severity(faults: Sequence[Fault], pair: GearPair) -> float:
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Run:
-    """One record to be simulated; what is None is perfect, nominal, and starts with teeth 0 at A."""
+    """One record to be simulated; what is None is perfect, nominal, and starts with teeth 0 at A.
+
+    ``tell_mesh`` asks for the loads of the teeth at every sample.
+    """
 
     system: SpurPair
     faults: tuple[Fault, ...]
     start: Start | None = None
     specimen: Specimen | None = None
     gearbox: Gearbox | None = None
+    tell_mesh: bool = False
 
     @property
     def kind(self) -> tuple[object, ...]:
@@ -241,7 +247,7 @@ class Run:
         operating = system.operating
         steady = operating.speed_profile is None and operating.torque_profile is None
         sensing = (system.sensing.sampling_rate, system.sensing.channels, operating.duration)
-        machine = (system.motor is None, system.load is None, steady)
+        machine = (system.motor is None, system.load is None, steady, self.tell_mesh)
         return (*sensing, *machine, system.solver, system.mesh.law, system.mesh.roll_torque)
 
     def finer(self) -> Run:
@@ -323,6 +329,7 @@ def _side_by_side(runs: Sequence[Run], machines: Sequence[PairDynamics]) -> list
         sampling_rate=system.sensing.sampling_rate,
         duration=system.operating.duration,
         channels=system.sensing.channels,
+        tell_mesh=runs[0].tell_mesh,
     )
     errors, checks = _checks(motions, system.solver, system.sensing.sampling_rate)
     records: list[CleanRecord | SimulationError] = []
@@ -338,6 +345,7 @@ def _side_by_side(runs: Sequence[Run], machines: Sequence[PairDynamics]) -> list
                     contact_loss_fraction=float(motions.contact_loss_fraction[lane]),
                     integration_error=float(errors[lane]),
                     integration_check=checks[lane],
+                    mesh=_mesh_state(run, machines[lane], motions, lane) if run.tell_mesh else None,
                 )
             )
         else:
@@ -348,6 +356,11 @@ def _side_by_side(runs: Sequence[Run], machines: Sequence[PairDynamics]) -> list
                 )
             )
     return records
+
+
+def _mesh_state(run: Run, dynamics: PairDynamics, motions: Motions, lane: int) -> MeshState:
+    faulty = faulty_teeth(run.system.pair, run.faults)
+    return mesh_state(dynamics, motions.seen[lane], motions.shaft_angle[lane], faulty)
 
 
 @lru_cache(maxsize=32)

@@ -212,6 +212,42 @@ def test_resume_with_another_identity_is_refused(
     assert {path: path.read_bytes() for path in begun.rglob("*") if path.is_file()} == before
 
 
+def test_a_change_is_named_before_any_shard_is_done(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
+    out = tmp_path / "data"
+    assert main(["plan", "--freeze", *TINY, f"out={out}"]) == 0
+    change_config(out)
+    capsys.readouterr()
+    assert resume(out) == 2
+    (line,) = capsys.readouterr().err.splitlines()
+    assert "changed in operating.torque_nm since" in line
+    assert not any((out / "shards").iterdir())
+
+
+def test_a_killed_beginning_says_what_to_do_and_is_begun_anew(
+    reference: Path, tmp_path: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    """SIGKILL of the command itself as soon as it has begun its folder, before the manifest is there."""
+    out = tmp_path / "data"
+    code = (
+        "import os, signal, sys\n"
+        "from gensig.dataset import beginning\n"
+        "beginning.write_manifest = lambda *_: os.kill(os.getpid(), signal.SIGKILL)\n"
+        "from gensig.cli import main\n"
+        "main(sys.argv[1:])"
+    )
+    words = ["generate", "--quiet", *TINY, "executor.n_workers=1", f"out={out}"]
+    assert subprocess.run([sys.executable, "-c", code, *words], check=False).returncode == -signal.SIGKILL
+    assert (out / "plan.csv").is_file()
+    assert not (out / "manifest.json").exists()
+    for verb in ("resume", "verify", "finalize", "inspect"):
+        assert main([verb, str(out)]) == 2
+        (line,) = capsys.readouterr().err.splitlines()
+        assert "gensig generate" in line
+        assert "again" in line
+    assert main(words) == 0
+    assert contents(out) == contents(reference)
+
+
 def test_resume_without_the_compression_is_refused_before_anything_runs(
     tmp_path: Path, monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
 ) -> None:

@@ -1,14 +1,18 @@
 """Distributions and designs that plans draw from."""
 
+import math
 import re
+import subprocess
+import sys
 
 import numpy as np
 import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 from numpy.testing import assert_allclose
+from scipy.stats import qmc
 
-from gensig.dataset.distributions import check_distribution, design_points, values_at
+from gensig.dataset.distributions import check_distribution, design_points, level_values, n_levels, values_at
 from gensig.errors import ConfigError
 
 SPECS = {
@@ -51,6 +55,72 @@ def test_shapes():
     assert_allclose([np.mean(choice == value) for value in SPECS["choice"]["values"]], 1 / 3, rtol=0, atol=1e-3)
 
 
+NORMALS = (
+    {"mean": 1.0, "std": 2.0, "low": -2.0, "high": 5.0},  # both sides cut
+    {"mean": 0.0, "std": 1.0, "low": -9.0, "high": 0.5},  # one side
+    {"mean": 0.0, "std": 1.0, "low": 30.0, "high": 40.0},  # far out in the tail
+    {"mean": 20.0, "std": 1e6, "low": 10.0, "high": 30.0},  # as good as uniform
+)
+
+
+def cut_normal_share(value, *, mean, std, low, high):
+    """Probability below a value; from the side on which it can be told from rounding."""
+    side = 1.0 if low < mean else -1.0
+
+    def tail(x):
+        return 0.5 * math.erfc(-side * (x - mean) / std / math.sqrt(2.0))
+
+    return (tail(value) - tail(low)) / (tail(high) - tail(low))
+
+
+@pytest.mark.parametrize("numbers", NORMALS)
+def test_a_cut_normal_has_the_normal_density_between_its_ends(numbers):
+    values = values_at("key", {"distribution": "normal", **numbers}, POINTS)
+    assert_allclose([cut_normal_share(value, **numbers) for value in values], POINTS, rtol=0, atol=1e-8)
+
+
+@pytest.mark.parametrize("design", ["latin_hypercube", "sobol"])
+def test_a_cut_normal_stays_space_filling(design):
+    """One value in each of 64 parts of equal probability: nothing is drawn and thrown away."""
+    for numbers in NORMALS[:2]:
+        points = design_points(design, 64, 1, np.random.default_rng(3))
+        values = values_at("key", {"distribution": "normal", **numbers}, points[:, 0])
+        parts = [int(64 * cut_normal_share(value, **numbers)) for value in values]
+        assert sorted(parts) == list(range(64))
+
+
+def test_scipy_is_imported_only_when_it_draws():
+    code = "import sys, gensig.dataset.distributions; sys.exit('scipy' in sys.modules)"
+    assert subprocess.run([sys.executable, "-c", code], check=False).returncode == 0
+
+
+class TestLevels:
+    @pytest.mark.parametrize(
+        ("spec", "levels"),
+        [
+            ({**SPECS["uniform"], "levels": 5}, [-1.0, 0.0, 1.0, 2.0, 3.0]),
+            ({**SPECS["log_uniform"], "levels": 3}, [0.1, 1.0, 10.0]),
+            ({**SPECS["integers"], "levels": 4}, [2, 3, 4, 5]),
+            ({"distribution": "integers", "low": 0, "high": 22, "levels": 3}, [0, 11, 22]),
+            (SPECS["choice"], [1.0, 2.5, 7]),
+            ({"distribution": "normal", "mean": 2.0, "std": 1.0, "low": -7.0, "high": 11.0, "levels": 3},
+             [2.0 - 0.96742157, 2.0, 2.0 + 0.96742157]),
+        ],
+    )  # fmt: skip
+    def test_values(self, spec, levels):
+        assert n_levels("key", spec) == len(levels)
+        assert_allclose(level_values("key", spec), levels, rtol=1e-7, atol=1e-12)
+
+    @pytest.mark.parametrize("kind", sorted(SPECS))
+    def test_null_has_none(self, kind):
+        assert n_levels("key", {**SPECS[kind], "levels": None}) is None
+
+    @pytest.mark.parametrize("kind", sorted(SPECS))
+    def test_designs_that_draw_pass_over_them(self, kind):
+        levels = None if kind == "choice" else 3
+        assert values_at("key", {**SPECS[kind], "levels": levels}, POINTS) == values_at("key", SPECS[kind], POINTS)
+
+
 @pytest.mark.parametrize(
     ("spec", "text"),
     [
@@ -60,13 +130,26 @@ def test_shapes():
         ({"distribution": "uniform", "low": 1}, "uniform needs exactly low, high"),
         ({"distribution": "uniform", "low": 1, "high": 2, "mean": 3}, "uniform needs exactly low, high"),
         ({"distribution": "uniform", "low": 2, "high": 1}, "low = 2 and high = 1 are no range for uniform"),
-        ({"distribution": "log_uniform", "low": 0, "high": 1}, "are no range for log_uniform"),
+        ({"distribution": "uniform", "low": 2, "high": 2}, "low = 2 and high = 2 are no range for uniform"),
+        ({"distribution": "integers", "low": 3, "high": 3}, "are no range for integers; low must be below"),
+        ({**SPECS["normal"], "low": 5.0}, "low = 5 and high = 5 are no range for normal; low must be below"),
+        (
+            {"distribution": "log_uniform", "low": 0, "high": 1},
+            "no range for log_uniform; low must be below and above 0",
+        ),
         ({"distribution": "uniform", "low": "a", "high": 1}, "low = 'a' is not a finite number"),
         ({"distribution": "uniform", "low": 0, "high": float("inf")}, "high = inf is not a finite number"),
         ({"distribution": "uniform", "low": True, "high": 2}, "low = True is not a finite number"),
         ({**SPECS["normal"], "std": 0}, "std = 0 must be positive"),
+        ({**SPECS["normal"], "std": -1.5}, "std = -1.5 must be positive"),
+        ({**SPECS["normal"], "mean": float("nan")}, "mean = nan is not a finite number"),
+        ({"distribution": "normal", "mean": 1, "std": 2}, "normal needs exactly mean, std, low, high"),
+        ({**SPECS["uniform"], "levels": 1}, "levels = 1 must be a whole number of at least 2"),
+        ({**SPECS["uniform"], "levels": 2.5}, "levels = 2.5 must be a whole number of at least 2"),
+        ({**SPECS["integers"], "levels": 5}, "levels = 5, but there are 4 whole numbers"),
+        ({**SPECS["choice"], "levels": 3}, "the levels of a choice are its values"),
         ({"distribution": "choice", "values": []}, "values must be a list with at least one entry"),
-        ({"distribution": "choice", "values": ["a"]}, "values must be numbers"),
+        ({"distribution": "choice", "values": ["a"]}, "values must be finite numbers"),
     ],
 )
 def test_mistakes_are_answered(spec, text):
@@ -97,11 +180,24 @@ class TestDesigns:
         assert counts.max() <= (1 if design == "latin_hypercube" else 2)
 
 
+def test_two_designs_of_one_size_have_nothing_in_common():
+    """Of 16 x 16 cells about 163 are hit by chance; Sobol points in the order of the sequence hit 16."""
+
+    def n_cells(one, other):
+        return len(set(zip((16 * one).astype(int), (16 * other).astype(int), strict=True)))
+
+    for design in ("latin_hypercube", "sobol"):
+        one, other = (design_points(design, 256, 2, np.random.default_rng(seed)) for seed in (1, 2))
+        assert min(n_cells(one[:, k], other[:, k]) for k in range(2)) > 130
+    raw = [qmc.Sobol(2, rng=np.random.default_rng(seed)).random_base2(8) for seed in (1, 2)]
+    assert n_cells(raw[0][:, 0], raw[1][:, 0]) == 16
+
+
 def test_no_dimension_draws_nothing():
     assert design_points("latin_hypercube", 5, 0, np.random.default_rng(0)).shape == (5, 0)
 
 
 @pytest.mark.parametrize("n_dimensions", [0, 2])
 def test_unknown_designs_list_the_known(n_dimensions):
-    with pytest.raises(ConfigError, match=r"plan.design = 'grid'; allowed: latin_hypercube, sobol"):
-        design_points("grid", 4, n_dimensions, np.random.default_rng(0))
+    with pytest.raises(ConfigError, match=r"plan.design = 'factorial'; allowed: latin_hypercube, sobol, grid"):
+        design_points("factorial", 4, n_dimensions, np.random.default_rng(0))

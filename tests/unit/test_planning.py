@@ -333,13 +333,31 @@ class TestRefusals:
             ({"n_units": 0}, "plan.n_units = 0"),
             ({"n_gearboxes": -1}, "plan.n_gearboxes = -1"),
             ({"n_gearboxes": 0}, "plan.n_gearboxes = 0"),
-            ({"design": "grid"}, "plan.design = 'grid'"),
+            ({"design": "factorial"}, "plan.design = 'factorial'; allowed: latin_hypercube, sobol, grid"),
+            ({"n_repeats": 0}, "plan.n_repeats = 0 must be a whole number of at least 1"),
+            ({"n_repeats": 1.5}, "plan.n_repeats = 1.5"),
+            (
+                {"n_records": None},
+                "plan.n_records = null: give a number, plan.conditions_per_unit, or plan.design=grid",
+            ),
+            ({"conditions_per_unit": 0}, "plan.conditions_per_unit = 0"),
+            (
+                {"conditions_per_unit": 3, "n_repeats": 2},
+                "plan.n_records = 8, but the plan has 960 records (40 units x 3 conditions x 4 classes x 2 repeats); "
+                "plan.n_records=null takes them",
+            ),
+            ({"n_reports": 3}, "plan: unknown key 'n_reports'; it has n_records, n_units"),
             ({"sham": 3}, "plan.sham = 3"),
         ],
     )
     def test_counts_and_choices(self, planned, changes, text):
         with pytest.raises(ConfigError, match=re.escape(text)):
             planned(plan={"n_records": 8, **changes})
+
+    def test_an_option_of_ones_own_that_lacks_a_key(self, quickstart):
+        plan = {key: value for key, value in quickstart["plan"].items() if key != "n_repeats"}
+        with pytest.raises(ConfigError, match="plan: missing key 'n_repeats'; it has n_records, n_units"):
+            make_plan({**quickstart, "plan": plan})
 
     def test_values_are_checked_before_anything_runs(self, planned):
         vary = {"operating.torque_nm": {"distribution": "uniform", "low": -20, "high": -10}}

@@ -4,8 +4,9 @@ from pathlib import Path
 
 import numpy as np
 
+from gensig.dataset.beginning import create_folder
 from gensig.dataset.layout import shard_path
-from gensig.dataset.manifest import create_folder, finalize, identity_hash, record_shard
+from gensig.dataset.manifest import finalize, identity_hash, record_shard
 from gensig.dataset.plan import Plan, record_ids, shard_places
 from gensig.dataset.shard import ShardWriter
 
@@ -107,6 +108,7 @@ def build(
     close: bool = True,
     failed: int | None = None,
     clean: bool = False,
+    figures: bool = False,
     **storage: str,
 ) -> Path:
     """A data-set folder; fewer shards or close=False make an interrupted one."""
@@ -118,5 +120,5 @@ def build(
         writer = write_shard(shard_path(out, shard), plan, shard, failed=failed, clean=clean, **storage)
         record_shard(out, shard, writer.sha256, writer.n_bytes, writer.n_failed)
     if close:
-        finalize(out)
+        finalize(out, figures=figures)
     return out

@@ -45,7 +45,7 @@ def test_shards_are_as_described(folder: Path) -> None:
             assert file[name].dtype == column.storage_dtype
         for name in REQUIRED:
             assert file[name].shape[0] == 10
-        assert h5py.check_string_dtype(file["record_id"].dtype).encoding == "utf-8"
+        assert h5py.check_string_dtype(file["record_id"].dtype).encoding == "ascii"
 
 
 @pytest.mark.parametrize("sample_type", SAMPLE_TYPES)

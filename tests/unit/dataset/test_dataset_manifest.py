@@ -12,8 +12,9 @@ import pytest
 import yaml
 from dataset_samples import CONFIG, build, make_plan, write_shard
 
+from gensig.dataset.beginning import create_folder
 from gensig.dataset.layout import read_config, shard_path
-from gensig.dataset.manifest import create_folder, finalize, identity_hash, read_manifest, record_shard
+from gensig.dataset.manifest import finalize, identity_hash, read_manifest, record_shard
 from gensig.dataset.plan import Plan, read_plan
 from gensig.errors import DatasetError
 
@@ -42,6 +43,7 @@ def test_identity_covers_what_decides_the_bits() -> None:
 def test_folder_holds_what_is_needed(folder: Path, plan: Plan) -> None:
     assert set(_tree(folder)) == {
         "config.yaml", "overrides.yaml", "plan.csv", "manifest.json", "index.h5", "README.md", "croissant.json",
+        "SHA256SUMS",
         "splits/by_unit.csv", "splits/cross_specimen.csv", "splits/random_window_leaky.csv",
         *(f"shards/shard-0000{i}.h5" for i in range(4)),
     }  # fmt: skip
@@ -57,7 +59,7 @@ def test_folder_holds_what_is_needed(folder: Path, plan: Plan) -> None:
 def test_two_runs_are_byte_equal(tmp_path: Path, plan: Plan) -> None:
     first, second = (_tree(build(tmp_path / name, plan)) for name in ("a", "b"))
     different = {name for name in first if first[name] != second[name]}
-    assert different <= {"manifest.json", "README.md", "croissant.json"}  # times and the folder's name
+    assert different <= {"manifest.json", "README.md", "croissant.json", "SHA256SUMS"}  # times and the folder's name
 
 
 def test_existing_folder_is_not_touched(tmp_path: Path, plan: Plan) -> None:

@@ -94,7 +94,8 @@ def test_failed_record_keeps_its_parameters(tmp_path: Path) -> None:
 @pytest.mark.parametrize(
     ("change", "message"),
     [
-        ({"label": 1.5}, "label: 1.5 is not a int16"),
+        ({"label": 1.5}, "label: 1.5 is no value of type int16"),
+        ({"label_name": "Riß"}, "ASCII text of at most 64 bytes"),
         ({"label": 2**15}, "label"),
         ({"severity": 1.2}, "outside 0"),
         ({"severity": float("nan")}, "outside 0"),
@@ -295,3 +296,15 @@ def test_exception_while_renaming_leaves_nothing(tmp_path: Path, monkeypatch: py
     with pytest.raises(KeyboardInterrupt):
         write_shard(tmp_path / "a.h5", make_plan())
     assert list(tmp_path.iterdir()) == []
+
+
+def test_a_reason_becomes_ascii_and_is_cut(tmp_path: Path) -> None:
+    signals, values = row_of(make_plan(), 0, status="failed")
+    with ShardWriter(
+        tmp_path / "a.h5", n_records=1, signals=SIGNALS, params=["crack_depth_mm"], attributes=ATTRIBUTES
+    ) as writer:
+        writer.write(0, signals, values | {"status_reason": "gap of 3 µm " + "x" * 300})
+    with h5py.File(tmp_path / "a.h5") as file:
+        reason = file["status_reason"][0]
+    assert reason.startswith(b"gap of 3 \\xb5m xxx")
+    assert len(reason) == 256

@@ -12,6 +12,7 @@ import pytest
 from dataset_samples import ATTRIBUTES, CLASSES, build, make_plan, write_shard
 
 from gensig.dataset.atomic import sha256_file
+from gensig.dataset.checksums import accept_edits
 from gensig.dataset.layout import shard_path
 from gensig.dataset.plan import Plan, read_plan, write_plan
 from gensig.dataset.verify import inspect, verify
@@ -25,13 +26,15 @@ def _flip(path: Path, offset: int) -> None:
 
 
 def _forge(folder: Path, shard: int, change: Callable[[h5py.File], None]) -> None:
-    """Change a shard and make sha256 and size in the manifest fit again: only the content can give it away."""
+    """Change a shard and make every sha256 and size fit again: only the content can give it away."""
     path = shard_path(folder, shard)
     with h5py.File(path, "r+") as file:
         change(file)
     manifest = json.loads((folder / "manifest.json").read_text())
     manifest["shards"][shard] |= {"sha256": sha256_file(path), "bytes": path.stat().st_size}
     (folder / "manifest.json").write_text(json.dumps(manifest))
+    (folder / "SHA256SUMS").unlink()
+    accept_edits(folder)
 
 
 def test_whole_set_passes(folder: Path) -> None:
@@ -82,6 +85,22 @@ def test_truncated_swapped_extra_and_foreign_shards_are_named(folder: Path, tmp_
     assert ".shard-00001.h5.1-a.tmp' is extra" in text
     assert "shard-00002.h5" not in text
     assert any("truncated" in problem for problem in verify(folder, quick=True).problems)
+
+
+def test_quick_reads_no_record(folder: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    def refuse(path: Path, **_: object) -> str:
+        raise AssertionError(f"{path} was read")
+
+    monkeypatch.setattr("gensig.dataset.verify.open_shard", refuse)
+    monkeypatch.setattr("gensig.dataset.verify.sha256_file", refuse)
+    monkeypatch.setattr("gensig.dataset.verify.read_plan", refuse)
+    assert verify(folder, quick=True).problems == []
+    path = shard_path(folder, 1)
+    _flip(path, path.stat().st_size // 2)
+    assert verify(folder, quick=True).complete  # what it does not look at
+    path.write_bytes(path.read_bytes() + b"x")
+    (problem,) = verify(folder, quick=True).problems
+    assert "shard-00001.h5 is not the recorded file" in problem
 
 
 def _swap(a: Path, b: Path) -> None:

@@ -19,6 +19,7 @@ import gensig.dataset.shard as shard_module
 from diagnose.windows import load_windows, subset_segments, task_of
 from gensig.cli import main
 from gensig.dataset.atomic import sha256_file
+from gensig.dataset.checksums import accept_edits
 from gensig.dataset.compression import COMPRESSIONS, compression_of
 from gensig.dataset.guard import open_shard
 from gensig.dataset.layout import shard_path
@@ -224,13 +225,15 @@ def test_other_processes_read_blosc2(whole: Path, method: str) -> None:
 
 
 def _forge(folder: Path, change: Callable[[h5py.File], None]) -> str:
-    """Problems of shard 1 when its content is changed and the manifest made to agree."""
+    """Problems of shard 1 when its content is changed and every sha256 made to agree."""
     path = shard_path(folder, 1)
     with h5py.File(path, "r+") as file:
         change(file)
     manifest = json.loads((folder / "manifest.json").read_text())
     manifest["shards"][1] |= {"sha256": sha256_file(path), "bytes": path.stat().st_size}
     (folder / "manifest.json").write_text(json.dumps(manifest))
+    (folder / "SHA256SUMS").unlink()
+    accept_edits(folder)
     return "\n".join(verify(folder).problems)
 
 

@@ -63,7 +63,7 @@ class CoreRun:
         means = np.empty((n_steps, len(self.channels), len(self.machines)), dtype=self.precision)
         _kernels.integrate(
             self.group, self.state.ravel(), self.lost, self.fresh, self.step, self.now, n_steps, self.channels,
-            means.ravel(), 0, np.empty(0), -1, 1, self.work, self.wide, self.near,
+            means.ravel(), 0, np.empty(0), -1, 1, np.empty(0), self.work, self.wide, self.near,
         )  # fmt: skip
         self.now, self.fresh[:] = self.now + n_steps, 0.0
         return means
@@ -78,6 +78,7 @@ class CoreRun:
         means = np.full((n_rows, len(self.channels), n), np.nan, dtype=self.precision)
         _kernels.record(
             self.group, self.state.ravel(), self.lost, self.fresh, self.step, self.now, n_samples, factor,
-            taps, self.channels, out.ravel(), angle.ravel(), means.ravel(), self.work, self.wide, self.near,
+            taps, self.channels, out.ravel(), angle.ravel(), np.empty(0), means.ravel(), self.work, self.wide,
+            self.near,
         )  # fmt: skip
         return out, angle
