@@ -7,7 +7,9 @@ from importlib import metadata
 from pathlib import Path
 from typing import Any
 
-PACKAGES = ("numpy", "scipy", "numba", "h5py", "hdf5plugin", "gensig")
+from gensig.version import __version__
+
+PACKAGES = ("numpy", "scipy", "numba", "h5py", "hdf5plugin")
 
 
 def environment() -> dict[str, Any]:
@@ -15,6 +17,7 @@ def environment() -> dict[str, Any]:
     return {
         "python": platform.python_version(),
         **{name: _version(name) for name in PACKAGES},
+        "gensig": __version__,  # a checkout that is used as it is has outgrown what was installed
         "cpu_model": _cpu_model(),
         "platform": platform.platform(),
         "git_commit": _git_commit(),
