@@ -25,7 +25,7 @@ INTEGRATION = (SETTLING, RECORDING, CHECKING)
 CLOSING = "closing the folder"  # index, card and pictures: once a data set, whatever its size
 STAGES = (PLAN, TABLES, EQUATIONS, *INTEGRATION, LOW_PASS, NOISE, WRITING, OTHER)
 CLOCKED: tuple[tuple[Any, str, str], ...] = (
-    (generation, "read_plan", PLAN),
+    (generation, "_folder_inputs", PLAN),
     (records, "record_system", PLAN),
     (records, "row_run", PLAN),
     (records, "_twin_start", PLAN),

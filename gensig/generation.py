@@ -20,14 +20,14 @@ from gensig.dataset.manifest import (
     record_failed_shard,
     record_shard,
 )
-from gensig.dataset.plan import Plan, read_plan
+from gensig.dataset.plan import PlanRows
 from gensig.dataset.receipts import collect_receipts, read_receipt, receipt_path, write_receipt
 from gensig.dataset.run_log import log
 from gensig.dataset.schema import SAMPLE_TYPES
 from gensig.dataset.shard import ShardWriter
 from gensig.dynamics._vector import n_lanes
 from gensig.dynamics.decimation import usable_band
-from gensig.errors import ConfigError
+from gensig.errors import ConfigError, DatasetError
 from gensig.execution.base import Executor, ShardFailure
 from gensig.planning import check_switches, make_plan
 from gensig.records import read_seed, signal_shapes, simulate_records
@@ -199,26 +199,32 @@ def write_shard(out: Path, shard_index: int) -> WrittenShard:
     ------
     DatasetError    where the folder was begun by another version than that of this process
     """
-    config, plan = _folder_inputs(out, (out / PLAN).stat().st_mtime_ns)
-    indices = plan.rows(shard_index)
-    params = [name.removeprefix("params/") for name in plan.columns if name.startswith("params/")]
-    writer = open_shard(shard_path(out, shard_index), config, len(indices), params)
+    config, plan, sizes = _folder_inputs(out, (out / PLAN).stat().st_mtime_ns)
+    n_records, begin = sizes[shard_index], sum(sizes[:shard_index])
+    params = [name.removeprefix("params/") for name in plan.names if name.startswith("params/")]
+    writer = open_shard(shard_path(out, shard_index), config, n_records, params)
     together = block_length(config)
     with writer:
-        for first in range(0, len(indices), together):
-            rows = [plan.record(int(index)) for index in indices[first : first + together]]
+        for first in range(0, n_records, together):
+            rows = plan.records(begin + first, min(together, n_records - first))
+            _check_places(out, rows, shard_index, first)
             for row, record in enumerate(simulate_records(config, rows), start=first):
                 writer.write(row, record.signals, record.values)
     written = WrittenShard(sha256=writer.sha256, n_bytes=writer.n_bytes, n_failed=writer.n_failed)
-    write_receipt(out, shard_index, rows=len(indices), **dataclasses.asdict(written))
+    write_receipt(out, shard_index, rows=n_records, **dataclasses.asdict(written))
     return written
 
 
 @functools.lru_cache(maxsize=1)
-def _folder_inputs(out: Path, _changed: int) -> tuple[dict[str, Any], Plan]:
-    """Configuration and plan, read once by a process that makes many shards of one folder."""
-    _, config = joined_folder(out)
-    return config, read_plan(out / PLAN)
+def _folder_inputs(out: Path, _changed: int) -> tuple[dict[str, Any], PlanRows, list[int]]:
+    """Configuration, plan and records of each shard, read once by a process that makes many shards of one folder."""
+    manifest, config = joined_folder(out)
+    return config, PlanRows(out / PLAN), [entry.rows for entry in manifest.shards]
+
+
+def _check_places(out: Path, rows: Sequence[Mapping[str, Any]], shard_index: int, first: int) -> None:
+    if any((row["shard"], row["row"]) != (shard_index, first + k) for k, row in enumerate(rows)):
+        raise DatasetError(f"{out / PLAN} and the manifest disagree on shard {shard_index}; restore both from a copy")
 
 
 def block_length(config: Mapping[str, Any]) -> int:
@@ -245,12 +251,13 @@ def open_shard(path: Path, config: Mapping[str, Any], n_records: int, params: Se
 def root_attributes(config: Mapping[str, Any], system: SpurPair) -> dict[str, Any]:
     """What is the same for every record of a data set."""
     pair = system.pair
-    rotation = [name.endswith("rotation") for name in system.sensing.channels]
+    rotation = [name.endswith("rotation") for name in system.sensing.channel_names]
     return {
         "generator_version": __version__,
         "sampling_rate_hz": system.sensing.sampling_rate,
         "usable_band_hz": list(usable_band(system.sensing.sampling_rate)),
-        "channel_names": list(system.sensing.channels),
+        "channel_names": list(system.sensing.channel_names),
+        "source_names": list(system.sensing.channels),
         "channel_units": ["rad/s^2" if turns else "m/s^2" for turns in rotation],
         "class_names": list(config["plan"]["classes"]),
         "n_teeth_pinion": pair.pinion.n_teeth,

@@ -31,7 +31,7 @@ from gensig.records import (
     whole_number,
 )
 from gensig.systems.registry import read_system
-from gensig.systems.spur_pair import severity
+from gensig.systems.spur_pair import SpurPair, severity
 from gensig.units import from_si
 
 SHARD_BYTES = 65_536_000  # 80 records of 4 x 51,200 float32 samples
@@ -87,6 +87,9 @@ def make_plan(config: Mapping[str, Any]) -> Plan:
     for condition, repeat in itertools.product(range(counts.n_conditions), range(counts.n_repeats)):
         unit = condition % counts.n_units
         values = {key: drawn[condition] for key, drawn in conditions.items()}
+        if repeat == 0:
+            system = record_system(config, values)
+            system.pair.require_continuous_drive()
         for place in stream(seed, Stream.ORDER, condition * counts.n_repeats + repeat).permutation(len(names)):
             if len(rows) == counts.n_records:
                 break
@@ -104,7 +107,7 @@ def make_plan(config: Mapping[str, Any]) -> Plan:
                     "specimen_id": f"specimen-{unit // counts.n_gearboxes:04d}",
                     "condition_id": f"condition-{condition:06d}",
                     "repeat": repeat,
-                    **_row(config, fault, values, start),
+                    **_row(config, system, fault, values, start),
                 }
             )
     return _as_plan(config, rows)
@@ -207,11 +210,13 @@ def _fitting(plan: Mapping[str, Any], n_records: int, counts: tuple[int, ...]) -
 
 
 def _row(
-    config: Mapping[str, Any], fault: dict[str, Any], values: dict[str, float], start: np.random.Generator
+    config: Mapping[str, Any],
+    system: SpurPair,
+    fault: dict[str, Any],
+    values: dict[str, float],
+    start: np.random.Generator,
 ) -> dict[str, Any]:
-    """Columns of one record that follow from its drawn values; building its machine checks them all."""
-    system = record_system(config, values)
-    system.pair.require_continuous_drive()
+    """Columns of one record that follow from its drawn values."""
     applied = read_faults(fault)
     check_teeth(system.pair, system.material, system.mesh, faulty_teeth(system.pair, applied))
     parts = fault_parts(fault)
@@ -265,7 +270,7 @@ def record_bytes(config: Mapping[str, Any], *, as_stored: bool = False) -> int:
 
 def check_switches(config: Mapping[str, Any]) -> None:
     """Raise ConfigError for a switch of ``dataset`` that is neither true nor false."""
-    for key in ("store_clean", "store_shaft_angle", "store_mesh_state", "store_detectability"):
+    for key in ("store_clean", "store_source", "store_shaft_angle", "store_mesh_state", "store_detectability"):
         if not isinstance(config["dataset"][key], bool):
             raise ConfigError(f"dataset.{key} = {config['dataset'][key]!r} must be true or false")
 

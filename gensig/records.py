@@ -18,10 +18,12 @@ from gensig.errors import ConfigError, SimulationError
 from gensig.faults.base import Fault
 from gensig.faults.registry import read_faults
 from gensig.mesh.pair_table import N_PAIRS
-from gensig.sensing.chain import add_noise, detectability, power
+from gensig.sensing.chain import detectability
+from gensig.sensing.instrument import Instrument, draw_instrument
 from gensig.sensing.manufacturing import Gearbox, Specimen, draw_gearbox, draw_specimen
+from gensig.systems.lead_in import simulate_with_lead_in
 from gensig.systems.registry import read_system
-from gensig.systems.spur_pair import CleanRecord, Run, SpurPair, Start, simulate_together
+from gensig.systems.spur_pair import CleanRecord, Run, SpurPair, Start
 from gensig.units import from_si
 from gensig.version import __version__
 
@@ -33,6 +35,7 @@ FIXED_KEYS = (
     "gear.",
     "system.",
     "sensing.sampling_rate_hz",
+    "sensing.path.",
     "operating.duration_s",
     "plan.",
     "dataset.",
@@ -52,6 +55,8 @@ class Stream(IntEnum):
     START = 5
     TWIN = 6
     NOISE = 7
+    PATH = 8
+    SENSOR = 9
 
 
 def stream(seed: int, cause: Stream, index: int = 0) -> np.random.Generator:
@@ -99,21 +104,30 @@ def simulate_records(config: Mapping[str, Any], rows: Sequence[Mapping[str, Any]
     A record's bits do not depend on what it is simulated beside. A motion that does not stay finite becomes a record
     marked as failed.
     """
-    machines = [record_system(config, row_values(row)) for row in rows]
+    made: dict[tuple[tuple[str, float], ...], SpurPair] = {}
+    machines = []
+    for row in rows:  # the records of a condition share their machine
+        drawn = tuple(row_values(row).items())
+        if drawn not in made:
+            made[drawn] = record_system(config, dict(drawn))
+        machines.append(made[drawn])
     runs = [row_run(config, system, row) for system, row in zip(machines, rows, strict=True)]
     keys = _twin_keys(config, rows)
     places, further = _missing_twins(config, runs, rows, keys)
     # the same machines without their faults, to see what the faults change
     asked = config["dataset"]["store_detectability"]
     sound = {place: replace(run, faults=(), tell_mesh=False) for place, run in enumerate(runs) if asked and run.faults}
-    results = simulate_together([*runs, *further, *sound.values()])
+    results = simulate_with_lead_in([*runs, *further, *sound.values()])
     without = dict(zip(sound, results[len(runs) + len(further) :], strict=True))
     kept = {key: found for key in keys if (found := _TWINS.get(key)) is not None}
     _TWINS.clear()
     _TWINS.update(kept)
     for key, place in places.items():
-        twin = results[place]
-        _TWINS[key] = twin if isinstance(twin, SimulationError) else power(twin.acceleration)
+        twin, sharing = results[place], keys.index(key)
+        instrument = row_instrument(config, machines[sharing], rows[sharing])
+        _TWINS[key] = (
+            twin if isinstance(twin, SimulationError) else instrument.power(instrument.measure(twin.acceleration))
+        )
     return [
         _finish(config, system, row, key, result, without.get(place, result) if asked else None)
         for place, (system, row, key, result) in enumerate(zip(machines, rows, keys, results[: len(rows)], strict=True))
@@ -128,46 +142,62 @@ def _finish(
     result: CleanRecord | SimulationError,
     sound: CleanRecord | SimulationError | None,
 ) -> Record:
-    """Noise, labels and result columns of one simulated row; ``sound`` is the same record without its faults."""
+    """Path, sensor, noise, labels and result columns of one row; ``sound`` is the same record without its faults."""
     seed, index = read_seed(config), int(str(row["record_id"]).lstrip("r"))
-    n_channels = len(system.sensing.channels)
-    noise_power: Array | SimulationError = np.zeros(n_channels)
-    if system.sensing.snr is not None and not isinstance(result, SimulationError):
-        reference = _TWINS[twin] if system.sensing.snr_reference == "healthy_twin" else power(result.acceleration)
-        factor = 10.0 ** (-system.sensing.snr / 10.0)
+    sensing, instrument = system.sensing, row_instrument(config, system, row)
+    n_sensors, n_samples = len(sensing.channel_names), round(system.operating.duration * sensing.sampling_rate)
+    measured = None if isinstance(result, SimulationError) else instrument.measure(result.acceleration)
+    noise_power: Array | SimulationError = np.zeros(n_sensors)
+    if sensing.snr is not None and measured is not None:
+        reference = _TWINS[twin] if sensing.snr_reference == "healthy_twin" else instrument.power(measured)
+        factor = 10.0 ** (-sensing.snr / 10.0)
         noise_power = reference if isinstance(reference, SimulationError) else reference * factor
     problem = next((one for one in (result, noise_power) if isinstance(one, SimulationError)), None)
-    if isinstance(result, SimulationError) or isinstance(noise_power, SimulationError):
-        n_samples = round(system.operating.duration * system.sensing.sampling_rate)
-        clean, noise_power = np.full((n_channels, n_samples), MISSING), np.full(n_channels, MISSING)
+    if isinstance(result, SimulationError) or isinstance(noise_power, SimulationError) or measured is None:
+        source = np.full((len(sensing.channels), n_samples), MISSING)
+        noisy = clean = np.full((n_sensors, n_samples), MISSING)
+        noise_power = np.full(n_sensors, MISSING)
         told = {"status": "failed", "status_reason": str(problem), "speed_rpm": MISSING, "mesh_frequency_hz": MISSING}
     else:
-        clean, speed_rpm = result.acceleration, from_si("speed_rpm", result.mean_speed)
+        source, clean, speed_rpm = (
+            result.acceleration[:, sensing.n_lead :],
+            measured,
+            from_si("speed_rpm", result.mean_speed),
+        )
+        noisy, clipped = instrument.record(clean, noise_power, stream(seed, Stream.NOISE, index))
         told = {
             "speed_rpm": speed_rpm,
             "mesh_frequency_hz": speed_rpm / 60.0 * system.pair.pinion.n_teeth,
             "contact_loss_fraction": result.contact_loss_fraction,
             "integration_error": result.integration_error,
             "integration_check": result.integration_check,
+            **clipping(system, clipped),
         }
-        if isinstance(sound, CleanRecord):
-            told["detectability"] = detectability(clean - sound.acceleration, noise_power)
-    noisy = add_noise(clean, noise_power, stream(seed, Stream.NOISE, index))
+        if isinstance(sound, CleanRecord) and sensing.has_white_noise:
+            told["detectability"] = detectability(clean - instrument.measure(sound.acceleration), noise_power)
     signals: dict[str, NDArray[Any]] = {
         "acceleration": noisy.astype(np.float32),
         "fault_multihot": _multihot(config, row),
-        "signal_power": power(clean),
+        "signal_power": instrument.power(clean),
         "noise_power": noise_power,
     }
     if config["dataset"]["store_clean"]:
         signals["acceleration_clean"] = clean.astype(np.float32)
+    if config["dataset"]["store_source"]:
+        signals["acceleration_source"] = source.astype(np.float32)
     if config["dataset"]["store_shaft_angle"]:
-        failed = np.full(clean.shape[1], MISSING)
+        failed = np.full(n_samples, MISSING)
         signals["shaft_angle"] = failed if isinstance(result, SimulationError) else result.shaft_angle
     if config["dataset"]["store_mesh_state"]:
-        signals |= _mesh_signals(result.mesh if isinstance(result, CleanRecord) else None, clean.shape[1])
+        signals |= _mesh_signals(result.mesh if isinstance(result, CleanRecord) else None, n_samples)
     columns = {key: value for key, value in row.items() if key not in ("shard", "row")}
     return Record(signals=signals, values={**columns, **told})
+
+
+def clipping(system: SpurPair, clipped: float) -> dict[str, Any]:
+    """Columns on a record of which a share lies outside the converter's range."""
+    sensor = system.sensing.sensor
+    return {"clipped_fraction": clipped, "clipped": int(sensor is not None and clipped > sensor.max_clipped_fraction)}
 
 
 def _mesh_signals(mesh: MeshState | None, n_samples: int) -> dict[str, NDArray[Any]]:
@@ -194,7 +224,7 @@ def _mesh_signals(mesh: MeshState | None, n_samples: int) -> dict[str, NDArray[A
 
 def signal_shapes(config: Mapping[str, Any], system: SpurPair) -> dict[str, tuple[int, ...]]:
     """Shape of every array of one record, by signal name."""
-    dataset, n_channels = config["dataset"], len(system.sensing.channels)
+    dataset, n_channels = config["dataset"], len(system.sensing.channel_names)
     n_samples = round(system.operating.duration * system.sensing.sampling_rate)
     shapes: dict[str, tuple[int, ...]] = {
         "acceleration": (n_channels, n_samples),
@@ -204,6 +234,8 @@ def signal_shapes(config: Mapping[str, Any], system: SpurPair) -> dict[str, tupl
     }
     if dataset["store_clean"]:
         shapes["acceleration_clean"] = (n_channels, n_samples)
+    if dataset["store_source"]:
+        shapes["acceleration_source"] = (len(system.sensing.channels), n_samples)
     if dataset["store_shaft_angle"]:
         shapes["shaft_angle"] = (n_samples,)
     if dataset["store_mesh_state"]:
@@ -253,6 +285,13 @@ def row_run(config: Mapping[str, Any], system: SpurPair, row: Mapping[str, Any])
         gearbox=gearbox,
         tell_mesh=config["dataset"]["store_mesh_state"],
     )
+
+
+def row_instrument(config: Mapping[str, Any], system: SpurPair, row: Mapping[str, Any]) -> Instrument:
+    """Transfer path and sensors of a row's gearbox, drawn from their own streams."""
+    seed, gearbox = read_seed(config), int(str(row["gearbox_id"]).rpartition("-")[2])
+    causes = (stream(seed, cause, gearbox) for cause in (Stream.PATH, Stream.SENSOR))
+    return draw_instrument(system.sensing, *causes)
 
 
 TwinKey = tuple[str, str]

@@ -22,16 +22,17 @@ from gensig.errors import ConfigError, DatasetError, SimulationError
 from gensig.records import (
     Record,
     Stream,
+    clipping,
     read_seed,
     record_system,
+    row_instrument,
     row_run,
     row_values,
     simulate_record,
     simulate_records,
     stream,
 )
-from gensig.sensing.chain import add_noise
-from gensig.systems.spur_pair import simulate_together
+from gensig.systems.lead_in import simulate_with_lead_in
 
 ACCEPTED = 1e-6  # of a record's RMS, where the processor or a library is another
 DECIDING = ("cpu_model", "python", "numpy", "scipy", "numba")  # facts of an environment that bits may depend on
@@ -122,16 +123,19 @@ def simulate_twin(config: Mapping[str, Any], row: Mapping[str, Any]) -> Record:
         if record.values.get("status") == "failed":
             raise SimulationError(f"record {row['record_id']} failed: {record.values['status_reason']}")
     signals = dict(twin.signals)
+    sound: dict[str, Any] = {"severity": 0.0, "faults_json": "[]", "fault_gear": "", "fault_tooth": -1}
     if not np.array_equal(signals["noise_power"], original.signals["noise_power"]):
         # noise follows the record, so that the twin alone would have another
-        (healthy,) = simulate_together([row_run(sham, record_system(config, row_values(row)), row)])
+        system = record_system(config, row_values(row))
+        instrument = row_instrument(config, system, row)
+        (healthy,) = simulate_with_lead_in([row_run(sham, system, row)])
         if isinstance(healthy, SimulationError):
             raise healthy
         rng = stream(read_seed(config), Stream.NOISE, int(str(row["record_id"]).lstrip("r")))
         signals["noise_power"] = original.signals["noise_power"]
-        noisy = add_noise(healthy.acceleration, signals["noise_power"], rng)
+        noisy, clipped = instrument.record(instrument.measure(healthy.acceleration), signals["noise_power"], rng)
         signals["acceleration"] = noisy.astype(np.float32)
-    sound = {"severity": 0.0, "faults_json": "[]", "fault_gear": "", "fault_tooth": -1}
+        sound |= clipping(system, clipped)
     return Record(signals=signals, values={**twin.values, **sound})
 
 

@@ -59,7 +59,8 @@ class RecordStream:
     @property
     def channels(self) -> list[str]:
         """Names along the channel axis."""
-        return list(self.config["sensing"]["channels"])
+        sensing = self.config["sensing"]
+        return list(sensing["channels"] if sensing["sensors"] is None else sensing["sensors"])
 
     channel_names = channels  # as a stored data set calls them
 

@@ -41,6 +41,7 @@ UNITS: dict[str, tuple[float, str]] = {
 T = TypeVar("T")
 
 
+@functools.lru_cache(maxsize=1024)
 def split_unit(name: str) -> tuple[str, str | None]:
     """Split a boundary name into its bare name and its unit suffix (None where it has none)."""
     for suffix in UNITS:

@@ -109,8 +109,9 @@ def plot_record(system: SpurPair, acceleration: NDArray[np.float32], values: dic
     from gensig.signals.envelope import envelope_spectrum
     from gensig.signals.spectrum import amplitude_spectrum
 
-    name = "pinion_y" if "pinion_y" in system.sensing.channels else system.sensing.channels[0]
-    signal = acceleration[system.sensing.channels.index(name)].astype(np.float64)
+    names = system.sensing.channel_names
+    name = "pinion_y" if "pinion_y" in names else names[0]
+    signal = acceleration[names.index(name)].astype(np.float64)
     rate = system.sensing.sampling_rate
     unit = "rad/s$^2$" if name.endswith("rotation") else "m/s$^2$"
     shaft, mesh = values["speed_rpm"] / 60.0, values["mesh_frequency_hz"]

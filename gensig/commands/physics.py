@@ -167,7 +167,7 @@ def _write_record(config: dict[str, Any], system: SpurPair, record: Record, outp
     else:
         acceleration = record.signals["acceleration"]
         time = np.arange(acceleration.shape[1]) / system.sensing.sampling_rate
-        header = ",".join(["time_s", *(f"{name}_{_unit_suffix(name)}" for name in system.sensing.channels)])
+        header = ",".join(["time_s", *(f"{name}_{_unit_suffix(name)}" for name in system.sensing.channel_names)])
         with replaced_file(path) as temporary:
             np.savetxt(temporary, np.column_stack([time, *acceleration]), "%.9g", ",", header=header, comments="")
 
@@ -183,7 +183,7 @@ def _print_record(system: SpurPair, acceleration: NDArray[np.float32], values: d
     print(f"speed {values['speed_rpm']:.3f} r/min, mesh frequency {values['mesh_frequency_hz']:.2f} Hz")
     print(f"{'channel':<16}{'RMS m/s2':>12}{'kurtosis':>12}{'crest':>12}")
     table = zip(
-        system.sensing.channels, rms(acceleration), kurtosis(acceleration), crest_factor(acceleration), strict=True
+        system.sensing.channel_names, rms(acceleration), kurtosis(acceleration), crest_factor(acceleration), strict=True
     )
     for name, level, fourth, crest in table:
         print(f"{name:<16}{level:>12.4g}{fourth:>12.3f}{crest:>12.3f}")

@@ -3,7 +3,7 @@
 import csv
 import io
 import re
-from collections.abc import Mapping
+from collections.abc import Iterator, Mapping
 from dataclasses import dataclass
 from pathlib import Path
 from types import MappingProxyType
@@ -197,6 +197,50 @@ def read_plan(path: Path) -> Plan:
         return Plan(columns={name: _parsed(name, cells) for name, cells in zip(header, columns, strict=True)})
     except DatasetError as error:
         raise DatasetError(f"{path}: {error}") from error
+
+
+class PlanRows:
+    """Rows of a `plan.csv` without the others: where its lines begin is all that is kept of a plan of millions.
+
+    Parameters
+    ----------
+    path : Path    no cell holds a line break: control characters are not allowed
+
+    Raises
+    ------
+    DatasetError    for a file that cannot be read or has not the rows asked for
+    """
+
+    def __init__(self, path: Path) -> None:
+        self.path = path
+        try:
+            with path.open("rb") as file:
+                lengths = np.fromiter((len(line) for line in file), dtype=np.int64)
+        except OSError as error:
+            raise DatasetError(f"{path} cannot be read: {error}; check its permissions") from error
+        self._begins = np.concatenate([[0], np.cumsum(lengths)])
+        self.names = next(self._cells(0, 1), [])
+
+    def _cells(self, first_line: int, n_lines: int) -> Iterator[list[str]]:
+        begin, end = self._begins[[first_line, first_line + n_lines]].tolist()
+        try:
+            with self.path.open("rb") as file:
+                file.seek(begin)
+                lines = file.read(end - begin).decode("utf-8").removesuffix("\n").split("\n")
+            yield from csv.reader(lines, strict=True)
+        except (OSError, ValueError, csv.Error) as error:
+            raise DatasetError(f"{self.path} is damaged ({error}); restore it from a copy") from error
+
+    def records(self, first: int, n_records: int) -> list[dict[str, str | int | float]]:
+        """All values of some records, as `Plan.record` gives them."""
+        if n_records < 1 or first + n_records > len(self._begins) - 2:
+            raise DatasetError(f"{self.path} has no records {first} to {first + n_records - 1}; restore it from a copy")
+        rows = list(self._cells(1 + first, n_records))
+        if len(rows) != n_records or any(len(cells) != len(self.names) for cells in rows):
+            raise DatasetError(f"{self.path} is cut or damaged near record {first}; restore it from a copy")
+        columns = zip(self.names, zip(*rows, strict=True), strict=True)
+        values = {name: _parsed(name, cells).tolist() for name, cells in columns}
+        return [dict(zip(values, row, strict=True)) for row in zip(*values.values(), strict=True)]
 
 
 def _infer(cells: tuple[str, ...] | list[str]) -> str:

@@ -111,8 +111,17 @@ COLUMNS: dict[str, Column] = _table(
         "float64",
         "1",
         "fault",
-        "d' of the best detector, which knows what the fault adds, in the record's noise; NaN where not asked for",
+        "d' of the best detector, which knows what the fault adds, in the record's noise; NaN where not asked for, "
+        "and where the noise is not white over the whole band",
     ),
+    (
+        "clipped_fraction",
+        "float64",
+        "1",
+        "result",
+        "share of the samples of all channels outside the converter's range; 0 without one, NaN in a failed record",
+    ),
+    ("clipped", "int8", "1", "result", "1 where that is above sensing.sensor.max_clipped_fraction"),
 )
 
 SIGNALS: dict[str, Column] = {
@@ -121,7 +130,9 @@ SIGNALS: dict[str, Column] = {
         Column(name="acceleration", dtype="float32", unit="m/s^2", role="result", axes=("channel", "sample"),
                description="what the sensors report, noise included"),
         Column(name="acceleration_clean", dtype="float32", unit="m/s^2", role="result", axes=("channel", "sample"),
-               description="the same without noise (optional)"),
+               description="the same without noise, offset and converter (optional)"),
+        Column(name="acceleration_source", dtype="float32", unit="m/s^2", role="result", axes=("source", "sample"),
+               description="accelerations at the bearings, before path and sensor, by source_names (optional)"),
         Column(name="acceleration_scale", dtype="float64", unit="m/s^2", role="result", axes=("channel",),
                description="value of one count of acceleration, NaN in a failed record (only where that is int16)"),
         Column(name="acceleration_clean_scale", dtype="float64", unit="m/s^2", role="result", axes=("channel",),
@@ -145,9 +156,9 @@ SIGNALS: dict[str, Column] = {
         Column(name="fault_multihot", dtype="int8", unit="1", role="label", axes=("class",),
                description="1 for the record's class and those of a compound fault's parts, by class_names (optional)"),
         Column(name="signal_power", dtype="float64", unit="(m/s^2)^2", role="result", axes=("channel",),
-               description="mean square of the signal without noise (optional)"),
+               description="mean square of the signal without noise, in the band of snr_db (optional)"),
         Column(name="noise_power", dtype="float64", unit="(m/s^2)^2", role="noise", axes=("channel",),
-               description="mean square of the noise (optional)"),
+               description="mean square of the noise, in the band of snr_db (optional)"),
     )
 }  # fmt: skip
 
@@ -171,6 +182,8 @@ DEFAULTS: dict[str, str | float] = {
     "integration_check": "none",
     "contact_loss_fraction": float("nan"),
     "detectability": float("nan"),
+    "clipped_fraction": float("nan"),
+    "clipped": 0,
 }
 
 PARAMS = "params"

@@ -13,8 +13,8 @@ from gensig.geometry.gear import Gear
 from gensig.material import Material
 from gensig.mesh.options import read_mesh_options
 from gensig.operating import Operating, read_profile
-from gensig.sensing.chain import Sensing
 from gensig.sensing.manufacturing import Quality
+from gensig.sensing.reading import read_sensing
 from gensig.systems.spur_pair import SpurPair
 from gensig.units import read, to_si
 
@@ -52,7 +52,7 @@ def read_spur_pair(config: Mapping[str, Any]) -> SpurPair:
         pinion=_read_body(gears["pinion"], sides["pinion"], material),
         wheel=_read_body(gears["wheel"], sides["wheel"], material),
         operating=_read_operating(section(config, "operating")),
-        sensing=read(Sensing, section(config, "sensing"), "sensing"),
+        sensing=read_sensing(section(config, "sensing")),
         quality=read(Quality, section(config, "quality"), "quality"),
         solver=read(Solver, section(config, "solver"), "solver"),
         motor=_read_rotor("system.motor", machine.get("motor")),

@@ -140,6 +140,7 @@ class SpurPair:
         check_memory(operating.duration, sensing.sampling_rate, len(sensing.channels), self.solver.precision)
         nominal = Run(system=self, faults=()).dynamics()
         check_channels(sensing.channels, nominal.dofs)
+        sensing.check(operating.duration)
         check_step(nominal, sensing.sampling_rate, self.solver.oversampling)
 
     def simulate(

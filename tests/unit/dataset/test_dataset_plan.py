@@ -10,7 +10,7 @@ from dataset_samples import make_plan
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from gensig.dataset.plan import Plan, plan_text, read_plan, record_ids, shard_places, write_plan
+from gensig.dataset.plan import Plan, PlanRows, plan_text, read_plan, record_ids, shard_places, write_plan
 from gensig.errors import DatasetError
 
 
@@ -41,6 +41,45 @@ def test_round_trip_is_exact(floats: list[float], integer: int, text: str) -> No
     with tempfile.TemporaryDirectory() as folder:
         write_plan(Path(folder) / "plan.csv", plan)
         _same(plan, read_plan(Path(folder) / "plan.csv"))
+
+
+@settings(max_examples=40, deadline=None)
+@given(
+    texts=st.lists(st.text(st.characters(blacklist_categories=("Cc", "Cs")), max_size=8), min_size=1, max_size=7),
+    depth=st.floats(),
+    data=st.data(),
+)
+def test_some_rows_are_those_of_the_whole(texts: list[str], depth: float, data: st.DataObject) -> None:
+    """Line separators that are no control characters (U+2028, U+0085 is one) belong to the text."""
+    n = len(texts)
+    plan = _plan(unit_id=np.array(texts), **{"params/depth_mm": np.full(n, depth)}, label=np.arange(n))
+    first = data.draw(st.integers(0, n - 1))
+    n_records = data.draw(st.integers(1, n - first))
+    with tempfile.TemporaryDirectory() as folder:
+        write_plan(Path(folder) / "plan.csv", plan)
+        rows = PlanRows(Path(folder) / "plan.csv")
+        assert rows.names == list(plan.columns)
+        found = rows.records(first, n_records)
+    assert repr(found) == repr([plan.record(first + k) for k in range(n_records)])
+
+
+@pytest.mark.parametrize(("first", "n_records"), [(0, 0), (2, 3), (4, 1)])
+def test_rows_that_are_not_there_are_refused(tmp_path: Path, first: int, n_records: int) -> None:
+    write_plan(tmp_path / "plan.csv", _plan(label=np.arange(4)))
+    with pytest.raises(DatasetError, match="has no records"):
+        PlanRows(tmp_path / "plan.csv").records(first, n_records)
+
+
+def test_a_damaged_row_is_refused(tmp_path: Path) -> None:
+    write_plan(tmp_path / "plan.csv", _plan(label=np.arange(4)))
+    lines = (tmp_path / "plan.csv").read_text().splitlines()
+    (tmp_path / "plan.csv").write_text("\n".join([*lines[:3], lines[3].rpartition(",")[0], *lines[4:]]) + "\n")
+    rows = PlanRows(tmp_path / "plan.csv")
+    assert len(rows.records(0, 2)) == 2
+    with pytest.raises(DatasetError, match="cut or damaged near record 2"):
+        rows.records(2, 1)
+    with pytest.raises(DatasetError, match="cannot be read"):
+        PlanRows(tmp_path / "no.csv")
 
 
 def test_round_trip_check_can_fail() -> None:

@@ -1,0 +1,70 @@
+"""Tables that users give: measured responses and backgrounds. Their content is data; every mistake is one line."""
+
+from __future__ import annotations
+
+import csv
+import math
+from pathlib import Path
+
+import numpy as np
+from numpy.typing import NDArray
+
+from gensig.errors import ConfigError
+
+Array = NDArray[np.float64]
+
+MOST_BYTES = 500_000_000
+RATE_TOLERANCE = 1e-3  # relative
+
+
+def read_table(key: str, file: str, *, least_rows: int) -> tuple[list[str], Array]:
+    """Names of the columns and the values, (column, row), of a CSV file with a header.
+
+    Raises
+    ------
+    ConfigError    naming ``key`` and the file: not there, no numbers, NaN, rows of other lengths, too short
+    """
+    path = Path(file).expanduser()
+    where = f"{key} = {file}"
+    try:
+        if path.stat().st_size > MOST_BYTES:
+            raise ConfigError(f"{where} is larger than {MOST_BYTES // 1_000_000} MB; cut it")
+        with path.open(newline="", encoding="utf-8-sig") as stream:
+            names = [name.strip() for name in next(csv.reader(stream), [])]
+            values = np.loadtxt(stream, delimiter=",", ndmin=2, dtype=np.float64)
+    except (OSError, UnicodeDecodeError, csv.Error) as error:
+        reason = error.strerror if isinstance(error, OSError) else "it is no text in UTF-8"
+        raise ConfigError(f"{where} cannot be read: {reason}") from None
+    except ValueError as error:
+        raise ConfigError(f"{where}: {str(error).splitlines()[0].rstrip('.')}; give numbers under one header") from None
+    if len(names) != len(set(names)) or (values.size and values.shape[1] != len(names)):
+        raise ConfigError(f"{where}: {len(names)} names in the header for {values.shape[1]} columns; name each, once")
+    if len(values) < least_rows:
+        raise ConfigError(f"{where} is too short: {len(values)} rows, at least {least_rows} are needed")
+    bad = np.argwhere(~np.isfinite(values))
+    if len(bad):
+        row, column = bad[0]
+        raise ConfigError(f"{where}: row {row + 2}, column {names[column]} is no finite number")
+    return names, np.ascontiguousarray(values.T)
+
+
+def check_columns(key: str, file: str, found: list[str], wanted: list[str]) -> None:
+    """Raise ConfigError unless the file has exactly these columns, in any order."""
+    missing = [name for name in wanted if name not in found]
+    unknown = [name for name in found if name not in wanted]
+    if missing or unknown:
+        what = f"no column {missing[0]}" if missing else f"unknown column {unknown[0]}"
+        raise ConfigError(f"{key} = {file}: {what}; it must have {', '.join(wanted)}")
+
+
+def check_rate(key: str, file: str, time: Array, sampling_rate: float) -> None:
+    """Raise ConfigError unless the times are even and have the sampling rate."""
+    step = np.diff(time)
+    mean = float(np.mean(step))
+    if not mean > 0.0 or np.max(np.abs(step - mean)) > 0.1 * mean:
+        raise ConfigError(f"{key} = {file}: time_s must rise in even steps")
+    if not math.isclose(1.0 / mean, sampling_rate, rel_tol=RATE_TOLERANCE):
+        raise ConfigError(
+            f"{key} = {file} has {1.0 / mean:g} samples a second, sensing.sampling_rate_hz = {sampling_rate:g}; "
+            "resample it first"
+        )

@@ -1,0 +1,89 @@
+"""An accelerometer's response, its scatter and its converter."""
+
+import re
+from dataclasses import replace
+
+import numpy as np
+import pytest
+from numpy.testing import assert_allclose
+
+from gensig.errors import ConfigError
+from gensig.sensing.accelerometer import Accelerometer, draw_sensors
+
+RATE = 51200.0
+IDEAL = Accelerometer(
+    sensitivity_tolerance=0.0, transverse_sensitivity=0.0, mounted_resonance=None, resonance_damping_ratio=0.02,
+    low_cutoff=None, dc_offset_m_per_s2=0.0, adc_range_m_per_s2=None, adc_bits=None, max_clipped_fraction=0.001,
+)  # fmt: skip
+
+
+def gain(sensor, frequency):
+    time = np.arange(51200) / RATE
+    answer = sensor.filtered(np.sin(2 * np.pi * frequency * time)[None], RATE)[0, 25_600:]
+    return np.sqrt(2.0 * np.mean(answer**2))
+
+
+def test_ideal_changes_no_bit():
+    signal = np.random.default_rng(0).standard_normal((2, 300))
+    assert IDEAL.is_ideal
+    assert np.array_equal(IDEAL.filtered(signal, RATE), signal)
+    same, clipped = IDEAL.digitised(signal)
+    assert same is signal
+    assert clipped == 0.0
+
+
+@pytest.mark.parametrize("frequency", [1000.0, 8000.0, 18_000.0])
+@pytest.mark.parametrize("resonance", [12_000.0, 25_000.0, 40_000.0])
+def test_mounted_resonance_also_above_half_the_rate(resonance, frequency):
+    sensor = replace(IDEAL, mounted_resonance=resonance)
+    ratio = frequency / resonance
+    exact = 1.0 / abs(1.0 - ratio**2 + 0.04j * ratio)
+    assert_allclose(gain(sensor, frequency), exact, rtol=2e-3, atol=0)
+
+
+@pytest.mark.parametrize("frequency", [2.0, 5.0, 10.0, 20.0, 200.0])
+def test_low_cut_off_is_of_first_order(frequency):
+    exact = 1.0 / np.sqrt(1.0 + (10.0 / frequency) ** 2)
+    assert_allclose(gain(replace(IDEAL, low_cutoff=10.0), frequency), exact, rtol=0.01, atol=0)
+
+
+@pytest.mark.parametrize("bits", [8, 12, 16])
+def test_converter_steps_and_range(bits):
+    sensor = replace(IDEAL, adc_range_m_per_s2=10.0, adc_bits=bits)
+    signal = np.linspace(-11.0, 11.0, 100_001)[None]
+    found, clipped = sensor.digitised(signal)
+    step = 10.0 / 2 ** (bits - 1)
+    assert_allclose(found / step, np.rint(found / step), rtol=0, atol=1e-9)
+    inside = np.abs(signal) < 10.0 - step
+    assert np.abs(found - signal)[inside].max() <= 0.5 * step * (1 + 1e-9)
+    assert_allclose([found.min(), found.max()], [-10.0, 10.0 - step], rtol=1e-12, atol=0)
+    assert_allclose(clipped, 2.0 / 22.0, rtol=0, atol=step)
+
+
+def test_scatter_stays_within_the_data_sheet():
+    sensor = replace(IDEAL, sensitivity_tolerance=0.1, transverse_sensitivity=0.05, dc_offset_m_per_s2=0.3)
+    drawn = [draw_sensors(np.random.default_rng(seed), sensor, 3) for seed in range(300)]
+    for name, middle, most in (("gain", 1.0, 0.1), ("transverse", 0.0, 0.05), ("offset", 0.0, 0.3)):
+        values = np.concatenate([getattr(one, name) for one in drawn]) - middle
+        assert 0.97 * most < np.abs(values).max() <= most * (1 + 1e-12)
+        assert abs(values.mean()) < 0.1 * most
+
+
+@pytest.mark.parametrize(
+    ("changes", "text"),
+    [
+        ({"sensitivity_tolerance": 0.6}, "sensing.sensor.sensitivity_tolerance = 0.6 must lie in 0..0.5"),
+        ({"transverse_sensitivity": -0.1}, "sensing.sensor.transverse_sensitivity = -0.1"),
+        ({"mounted_resonance": 10.0}, "sensing.sensor.mounted_resonance_hz = 10"),
+        ({"resonance_damping_ratio": 0.0}, "sensing.sensor.resonance_damping_ratio = 0"),
+        ({"low_cutoff": 0.0}, "sensing.sensor.low_cutoff_hz = 0"),
+        ({"dc_offset_m_per_s2": -1.0}, "sensing.sensor.dc_offset_m_per_s2 = -1"),
+        ({"adc_bits": 12}, "give both adc_range_m_per_s2 and adc_bits"),
+        ({"adc_bits": 30, "adc_range_m_per_s2": 1.0}, "sensing.sensor.adc_bits = 30 must lie in 4..24"),
+        ({"adc_bits": 12, "adc_range_m_per_s2": 0.0}, "sensing.sensor.adc_range_m_per_s2 = 0 must be positive"),
+        ({"max_clipped_fraction": 2.0}, "sensing.sensor.max_clipped_fraction = 2"),
+    ],
+)
+def test_values_out_of_range(changes, text):
+    with pytest.raises(ConfigError, match=re.escape(text)):
+        replace(IDEAL, **changes)

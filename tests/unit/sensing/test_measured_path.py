@@ -1,0 +1,101 @@
+"""Measured responses: what they do to a signal, and every file that is refused."""
+
+import re
+
+import numpy as np
+import pytest
+from numpy.testing import assert_allclose
+
+from gensig.errors import ConfigError
+from gensig.sensing.measured_path import MeasuredPath, read_responses
+from gensig.sensing.transfer_path import mode_section
+
+RATE = 51200.0
+CHANNELS, SENSORS = ("pinion_y", "wheel_y"), ("housing",)
+PAIRS = ("pinion_y_to_housing", "wheel_y_to_housing")
+
+
+def write(path, names, columns):
+    np.savetxt(path, np.column_stack(columns), "%.12g", ",", header=",".join(names), comments="")
+    return str(path)
+
+
+def impulse_file(path, taps, *, rate=RATE, names=PAIRS):
+    return write(path, ["time_s", *names], [np.arange(len(taps[0])) / rate, *taps])
+
+
+def frequency_file(path, response, *, low=0.0, high=25_600.0, step=10.0):
+    frequency = np.arange(low, high + 0.5 * step, step)
+    values = [response(frequency), 0.5 * response(frequency)]
+    names = [f"{pair}_{part}" for pair in PAIRS for part in ("real", "imaginary")]
+    columns = [part for value in values for part in (value.real, value.imag)]
+    return write(path, ["frequency_hz", *names], [frequency, *columns])
+
+
+def read(file):
+    return read_responses(MeasuredPath(file=file), CHANNELS, SENSORS, RATE)
+
+
+def mode(frequency, natural=2000.0, damping=0.03):
+    ratio = frequency / natural
+    return 1.0 / (1.0 - ratio**2 + 2j * damping * ratio)
+
+
+def test_impulse_response_is_a_convolution(tmp_path):
+    rng = np.random.default_rng(1)
+    taps, source = rng.standard_normal((2, 64)), rng.standard_normal((2, 500))
+    found = read(impulse_file(tmp_path / "h.csv", taps)).apply(source, RATE)
+    expected = sum(np.convolve(row, tap)[:500] for row, tap in zip(source, taps, strict=True))
+    assert_allclose(found, [expected], rtol=0, atol=1e-9)
+
+
+def test_linear_and_causal(tmp_path):
+    path = read(frequency_file(tmp_path / "f.csv", mode))
+    one, other = np.random.default_rng(2).standard_normal((2, 2, 3000))
+    together = path.apply(one + 2.0 * other, RATE)
+    assert_allclose(together, path.apply(one, RATE) + 2.0 * path.apply(other, RATE), rtol=0, atol=1e-9)
+    late = one.copy()
+    late[:, 1500:] = 0.0
+    difference = np.abs(path.apply(one, RATE) - path.apply(late, RATE))
+    assert difference[:, :1500].max() < 1e-9 * difference.max()
+
+
+def test_frequency_response_of_a_mode_rings_as_the_mode_does(tmp_path):
+    from scipy.signal import sosfilt
+
+    path = read(frequency_file(tmp_path / "f.csv", mode, step=5.0))
+    time = np.arange(8000) / RATE
+    smooth = np.exp(-0.5 * ((time - 0.02) / 1e-4) ** 2)
+    found = path.apply(np.stack([smooth, 0.0 * smooth]), RATE)[0]
+    expected = sosfilt(mode_section(2000.0, 0.03, RATE), smooth)
+    assert_allclose(found, expected, rtol=0, atol=0.01 * np.abs(expected).max())
+
+
+def test_refused_files(tmp_path):
+    taps, file = np.ones((2, 32)), tmp_path / "h.csv"
+    cases = {
+        "cannot be read": str(tmp_path / "none.csv"),
+        "unknown column wheel_z_to_housing": impulse_file(
+            file.with_stem("a"), [*taps, taps[0]], names=(*PAIRS, "wheel_z_to_housing")
+        ),
+        "no column wheel_y_to_housing": impulse_file(file.with_stem("b"), taps[:1], names=PAIRS[:1]),
+        "row 4, column wheel_y_to_housing is no finite number": impulse_file(
+            file.with_stem("c"), [taps[0], np.where(np.arange(32) == 2, np.nan, 1.0)]
+        ),
+        "too short: 8 rows, at least 16": impulse_file(file.with_stem("d"), taps[:, :8]),
+        "has 25600 samples a second, sensing.sampling_rate_hz = 51200": impulse_file(
+            file.with_stem("e"), taps, rate=25_600
+        ),
+        "reaches from 0 to 5000 Hz; 20 to 20000 Hz is needed": frequency_file(file.with_stem("f"), mode, high=5000.0),
+        "comes before time 0": frequency_file(file.with_stem("g"), lambda f: np.conj(mode(f))),
+    }  # fmt: skip
+    backwards = write(file.with_stem("i"), ["time_s", *PAIRS], [-np.arange(32) / RATE, *taps])
+    cases["time_s must rise in even steps"] = backwards
+    words = tmp_path / "words.csv"
+    words.write_text("time_s,a\n1,two\n" * 20)
+    cases["give numbers under one header"] = str(words)
+    for text, name in cases.items():
+        with pytest.raises(ConfigError, match=re.escape(text)) as caught:
+            read(name)
+        assert "\n" not in str(caught.value)
+        assert str(caught.value).startswith("sensing.path.file = ")

@@ -1,0 +1,153 @@
+"""Noise of every kind at its level, and with the spectrum that its name says."""
+
+import re
+
+import numpy as np
+import pytest
+from numpy.testing import assert_allclose
+
+from gensig.errors import ConfigError
+from gensig.sensing.noise import PARTS, Place, band_power, read_noise
+
+RATE = 51200.0
+MACHINE = {
+    "kind": "machine", "share": 1.0, "shaft_hz": 25.0, "frequency_scatter": 0.0, "n_shaft_orders": 3,
+    "bearing_order": 3.6, "n_bearing_harmonics": 4, "n_teeth": 31, "n_mesh_harmonics": 3,
+}  # fmt: skip
+KINDS = {
+    "white": {"kind": "white", "share": 1.0},
+    "pink": {"kind": "pink", "share": 1.0, "lowest_hz": 5.0},
+    "path": {"kind": "path", "share": 1.0},
+    "hum": {"kind": "hum", "share": 1.0, "mains_hz": 50.0, "n_harmonics": 3},
+    "impulsive": {"kind": "impulsive", "share": 1.0, "knocks_hz": 5.0, "ring_hz": 3000.0, "damping_ratio": 0.05},
+    "machine": MACHINE,
+}
+
+
+def place(n_samples=51200):
+    def through_path(rng):
+        return np.cumsum(rng.standard_normal((2, n_samples)), axis=1)
+
+    return Place(sensors=("a", "b"), n_samples=n_samples, sampling_rate=RATE, through_path=through_path)
+
+
+def noise(*kinds, band=None):
+    return read_noise({"parts": [KINDS[kind] for kind in kinds], "band_hz": band})
+
+
+def background(path, columns, *, rate=RATE, names=("background",)):
+    table = np.column_stack([np.arange(len(columns[0])) / rate, *columns])
+    np.savetxt(path, table, "%.9g", ",", header=",".join(["time_s", *names]), comments="")
+    return {"kind": "file", "share": 1.0, "file": str(path)}
+
+
+def density(signal):
+    return np.abs(np.fft.rfft(signal, axis=1)) ** 2
+
+
+def test_every_kind_is_tested():
+    assert set(KINDS) | {"file"} == set(PARTS)
+
+
+@pytest.mark.parametrize("n_samples", [2048, 51200])
+@pytest.mark.parametrize("kinds", [*[(kind,) for kind in KINDS], tuple(KINDS)], ids="-".join)
+def test_power_is_exact(kinds, n_samples):
+    power = np.array([2.0, 0.3])
+    made = noise(*kinds).make(power, np.random.default_rng(1), place(n_samples))
+    assert_allclose(np.var(made, axis=1), power, rtol=1e-9, atol=0)
+    assert_allclose(made.mean(axis=1), 0.0, rtol=0, atol=1e-9)
+
+
+@pytest.mark.parametrize("kinds", [("white",), ("pink", "hum"), tuple(KINDS)], ids="-".join)
+def test_power_in_a_band(kinds):
+    from scipy.signal import butter, sosfilt
+
+    made = noise(*kinds, band=[300.0, 8000.0]).make(np.array([2.0, 0.3]), np.random.default_rng(1), place())
+    within = sosfilt(butter(8, [300.0, 8000.0], "bandpass", fs=RATE, output="sos"), made, axis=1)
+    assert_allclose(np.var(within, axis=1), [2.0, 0.3], rtol=0.04, atol=0)
+    assert np.all(np.var(made, axis=1) > 1.02 * np.array([2.0, 0.3]))
+
+
+def test_band_power_of_a_tone():
+    tone = 3.0 * np.sin(2 * np.pi * 1000.0 * np.arange(51200) / RATE)[None] + 5.0
+    assert_allclose(band_power(tone, RATE, (900.0, 1100.0)), 4.5, rtol=1e-9, atol=0)
+    assert_allclose(band_power(tone, RATE, (0.0, 25_600.0)), band_power(tone, RATE, None), rtol=1e-9, atol=0)
+    assert_allclose(band_power(tone, RATE, (1200.0, 2000.0)), 0.0, rtol=0, atol=1e-9)
+
+
+def test_shares_are_of_the_power():
+    parts = [{**KINDS["white"], "share": 3.0}, {**KINDS["hum"], "share": 1.0}]
+    made = read_noise({"parts": parts, "band_hz": None}).make(np.ones(2), np.random.default_rng(2), place())
+    lines = 2.0 * density(made)[:, [50, 100, 150]] / 51200**2
+    assert_allclose(lines.sum(axis=1), 0.25, rtol=0.02, atol=0)
+    assert_allclose(lines[:, 1] / lines[:, 0], 0.25, rtol=0.1, atol=0)
+
+
+def test_pink_falls_by_three_decibel_an_octave():
+    made = noise("pink").make(np.ones(2), np.random.default_rng(3), place())
+    octaves = [density(made)[:, low : 2 * low].mean() for low in (64, 256, 1024, 4096)]
+    assert_allclose(np.array(octaves[1:]) / octaves[:-1], 0.25, rtol=0.15, atol=0)
+
+
+def test_impulsive_has_a_high_kurtosis_and_rings_where_it_says():
+    made = noise("impulsive").make(np.ones(2), np.random.default_rng(4), place())
+    assert np.all(np.mean(made**4, axis=1) > 20.0)
+    assert abs(np.argmax(density(made).sum(axis=0)) - 3000) < 200
+
+
+def test_another_machine_has_its_orders_and_nothing_else():
+    made = noise("machine").make(np.ones(2), np.random.default_rng(5), place())
+    orders = [*range(1, 4), *(3.6 * k + s for k in range(1, 5) for s in (-1, 0, 1)),
+              *(31 * k + s for k in range(1, 4) for s in (-1, 0, 1))]  # fmt: skip
+    lines = density(made).sum(axis=0)
+    ours = lines[[round(25 * order) for order in orders]]
+    assert np.all(ours > 0.0)
+    assert_allclose(ours.sum(), lines.sum(), rtol=1e-9, atol=0)
+
+
+def test_background_takes_a_stretch(tmp_path):
+    recording = np.random.default_rng(6).standard_normal((2, 5000))
+    part = background(tmp_path / "two.csv", recording, names=("a", "b"))
+    made = read_noise({"parts": [part], "band_hz": None}).make(np.ones(2), np.random.default_rng(7), place(1000))
+    starts = [int(np.argmax(np.correlate(recording[k], made[k], "valid"))) for k in range(2)]
+    assert starts[0] == starts[1]
+    for k in range(2):
+        assert np.corrcoef(recording[k, starts[k] : starts[k] + 1000], made[k])[0, 1] > 1 - 1e-6
+
+
+def test_refused_backgrounds(tmp_path):
+    rng = np.random.default_rng(8)
+    cases = {
+        "too short: 900 rows, at least 1000": background(tmp_path / "a.csv", rng.standard_normal((1, 900))),
+        "no column a": background(tmp_path / "b.csv", rng.standard_normal((1, 2000)), names=("c",)),
+        "samples a second": background(tmp_path / "c.csv", rng.standard_normal((1, 2000)), rate=8000),
+        "one value throughout": background(tmp_path / "d.csv", np.ones((1, 2000))),
+        "row 2, column background is no finite number": background(tmp_path / "e.csv", np.full((1, 2000), np.nan)),
+    }
+    for text, part in cases.items():
+        found = read_noise({"parts": [part], "band_hz": None})
+        with pytest.raises(ConfigError, match=re.escape(text)):
+            found.make(np.ones(2), rng, place(1000))
+
+
+@pytest.mark.parametrize(
+    ("parts", "band", "text"),
+    [
+        ([], None, "sensing.noise.parts = [] has no part"),
+        ("white", None, "must be a list"),
+        ([{"kind": "brown", "share": 1}], None, "sensing.noise.parts[0]: kind = 'brown'; allowed: white, pink"),
+        ([{"kind": "white", "share": 0.0}], None, "sensing.noise.parts[0].share = 0 must be positive"),
+        ([{"kind": "white"}], None, "sensing.noise.parts[0]: missing share"),
+        ([KINDS["white"], {"kind": "pink", "share": 1, "lowest": 2}], None, "write it as 'lowest_hz'"),
+        ([{**KINDS["impulsive"], "damping_ratio": 2.0}], None, "damping_ratio = 2 must lie in 0.001..1"),
+        ([{**MACHINE, "frequency_scatter": 0.9}], None, "frequency_scatter = 0.9 must lie in 0..0.5"),
+        ([KINDS["white"]], [100.0], "sensing.noise.band_hz = [100.0] must be [low, high]"),
+        ([KINDS["white"]], [200.0, 100.0], "must be [low, high], ordered"),
+        ([KINDS["white"]], "all", "must be [low, high] in Hz, or null"),
+        ([KINDS["hum"]], [100.0, 200.0], "tones alone may miss the band"),
+    ],
+)
+def test_mistakes(parts, band, text):
+    with pytest.raises(ConfigError, match=re.escape(text)) as caught:
+        read_noise({"parts": parts, "band_hz": band})
+    assert "\n" not in str(caught.value)

@@ -1,0 +1,95 @@
+"""A bank of housing modes: linear, causal, with the frequencies, damping and gain at rest that it states."""
+
+import re
+
+import numpy as np
+import pytest
+from numpy.testing import assert_allclose
+
+from gensig.errors import ConfigError
+from gensig.sensing.transfer_path import ModalPath, draw_housing, mode_section
+
+RATE = 51200.0
+RANGES = {"n_modes": (8, 20), "natural_frequency": (300.0, 12e3), "damping_ratio": (0.01, 0.05)}
+
+
+def housing(seed=0, **changes):
+    path = ModalPath(**{**RANGES, "transmissibility": 0.2, **changes})
+    return draw_housing(np.random.default_rng(seed), path, 4, 3)
+
+
+def signals(*shape):
+    return np.random.default_rng(7).standard_normal(shape)
+
+
+def test_linear():
+    path, one, other = housing(), signals(2, 4, 2000)[0], signals(2, 4, 2000)[1]
+    together = path.apply(2.0 * one - 3.0 * other, RATE)
+    apart = 2.0 * path.apply(one, RATE) - 3.0 * path.apply(other, RATE)
+    assert_allclose(together, apart, rtol=0, atol=1e-12 * np.abs(together).max())
+
+
+def test_causal():
+    path, source = housing(), signals(4, 2000)
+    changed = source.copy()
+    changed[:, 1000:] = 0.0
+    before, after = (np.abs(path.apply(source, RATE) - path.apply(changed, RATE))[:, part].max()
+                     for part in (slice(0, 1000), slice(1000, None)))  # fmt: skip
+    assert before == 0.0
+    assert after > 0.1
+
+
+@pytest.mark.parametrize("frequency", [100.0, 800.0, 1000.0, 1250.0, 3000.0])
+def test_a_mode_answers_a_tone_as_its_formula_says(frequency):
+    from scipy.signal import sosfreqz
+
+    found = sosfreqz(mode_section(1000.0, 0.03, RATE), [frequency], fs=RATE)[1][0]
+    ratio = frequency / 1000.0
+    # the input goes straight from sample to sample, which takes the square of a sinc
+    exact = np.sinc(frequency / RATE) ** 2 / (1.0 - ratio**2 + 0.06j * ratio)
+    assert_allclose(abs(found), abs(exact), rtol=2e-3, atol=0)
+    assert abs(np.angle(found / exact)) < 0.01
+
+
+def test_gain_at_rest_has_the_stated_size():
+    squares = []
+    for seed in range(300):
+        path = housing(seed)
+        squares.append(np.mean((path.to_sensors @ path.from_bearings) ** 2))
+    assert_allclose(np.sqrt(np.mean(squares)), 0.2, rtol=0.05, atol=0)
+
+
+def test_ranges_are_kept_and_used():
+    drawn = [housing(seed) for seed in range(200)]
+    counts = [len(path.natural_frequency) for path in drawn]
+    assert (min(counts), max(counts)) == (8, 20)
+    for name, (low, high) in (("natural_frequency", (300.0, 12e3)), ("damping_ratio", (0.01, 0.05))):
+        values = np.concatenate([getattr(path, name) for path in drawn])
+        assert low <= values.min() < 1.02 * low
+        assert 0.98 * high < values.max() <= high
+    assert all(np.all(np.diff(path.natural_frequency) >= 0.0) for path in drawn)
+
+
+def test_memory_is_when_the_slowest_mode_has_died_out():
+    path = housing(n_modes=(1, 1), natural_frequency=(500.0, 500.0), damping_ratio=(0.02, 0.02))
+    impulse = np.zeros((4, 20_000))
+    impulse[:, 0] = 1.0
+    answer = np.abs(path.apply(impulse, RATE)[0])
+    late = answer[round(path.memory * RATE) :].max() / answer.max()
+    assert 0.5 * np.exp(-5.0) < late < 1.5 * np.exp(-5.0)
+
+
+@pytest.mark.parametrize(
+    ("changes", "text"),
+    [
+        ({"n_modes": (0, 3)}, "sensing.path.n_modes = [0, 3] must be two ordered numbers"),
+        ({"n_modes": (9, 3)}, "sensing.path.n_modes = [9, 3]"),
+        ({"n_modes": (3,)}, "sensing.path.n_modes = [3]"),
+        ({"natural_frequency": (0.0, 3e3)}, "sensing.path.natural_frequency_hz"),
+        ({"damping_ratio": (0.01, 0.9)}, "sensing.path.damping_ratio"),
+        ({"transmissibility": 0.0}, "sensing.path.transmissibility = 0 must lie in 0..1000"),
+    ],
+)
+def test_values_out_of_range(changes, text):
+    with pytest.raises(ConfigError, match=re.escape(text)):
+        housing(**changes)
