@@ -7,7 +7,6 @@ What the lines mean: ``docs/howto/benchmarks.md``.
 
 from __future__ import annotations
 
-import argparse
 import os
 import subprocess
 import sys
@@ -15,7 +14,7 @@ import tempfile
 import time
 
 from benchmarks import _end_to_end, _rates
-from benchmarks._measure import machine, print_figures, print_machine, write_json
+from benchmarks._measure import begin, print_figures, write_json
 from benchmarks._peak import roof
 from benchmarks._ross_time import stored_rate
 from gensig.dynamics._vector import LANES, PRECISIONS
@@ -105,12 +104,7 @@ def _goal(name: str, value: float) -> str:
 
 def main() -> None:
     """Measure and print."""
-    parser = argparse.ArgumentParser(prog="python -m benchmarks", description=__doc__.split("\n")[0])
-    parser.add_argument("--runs", type=int, default=3, help="the least of so many (default 3)")
-    parser.add_argument("--json", help="also write the figures to this file")
-    arguments = parser.parse_args()
-    named, begun = machine(), time.perf_counter()
-    print_machine(named)
+    arguments, named, begun = begin("benchmarks", __doc__ or "")
     sections: dict[str, dict[str, float]] = {}
 
     def show(section: str, values: dict[str, float]) -> None:

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import argparse
 import json
 import math
 import os
@@ -39,6 +40,17 @@ def least(work: Callable[[], Any], runs: int) -> float:
     return in_turn({"": work}, runs)[""]
 
 
+def begin(program: str, about: str) -> tuple[argparse.Namespace, dict[str, Any], float]:
+    """``--runs`` and ``--json`` as given, the machine, which is printed, and when it began."""
+    parser = argparse.ArgumentParser(prog=f"python -m {program}", description=about.split("\n")[0])
+    parser.add_argument("--runs", type=int, default=3, help="the least of so many (default 3)")
+    parser.add_argument("--json", help="also write the figures to this file")
+    arguments = parser.parse_args()
+    named, begun = machine(), time.perf_counter()
+    print_machine(named)
+    return arguments, named, begun
+
+
 def in_turn(works: Mapping[str, Callable[[], Any]], runs: int) -> dict[str, float]:
     """Least CPU time of each work, s; they take turns, so that what disturbs the machine for a while disturbs all."""
     found = dict.fromkeys(works, math.inf)
@@ -55,7 +67,7 @@ def print_figures(section: str, values: Mapping[str, float], *columns: Callable[
     print(f"\n{section}")
     for name, value in values.items():
         cells = "".join(f"{column(value):>20}" for column in columns)
-        print(f"  {name:<64}{value:>12.4g}{cells}")
+        print(f"  {name:<64}{value:>12.4g}{cells}", flush=True)
 
 
 def write_json(path: str | None, named: Mapping[str, Any], figures: Figures) -> None:

@@ -7,7 +7,6 @@ distinct teeth, and the degrees of freedom; peak memory of the processes that ma
 
 from __future__ import annotations
 
-import argparse
 import json
 import resource
 import subprocess
@@ -21,7 +20,7 @@ from pathlib import Path
 
 import numpy as np
 
-from benchmarks._measure import in_turn, machine, print_machine, write_json
+from benchmarks._measure import begin, in_turn, print_figures, write_json
 from gensig.config import read_request
 from gensig.dynamics._vector import LANES
 from gensig.errors import SimulationError
@@ -198,21 +197,14 @@ def against_freedom(runs: int) -> dict[str, float]:
 
 def main() -> None:
     """Measure and print."""
-    parser = argparse.ArgumentParser(prog="python -m benchmarks.scaling", description=__doc__.split("\n")[0])
-    parser.add_argument("--runs", type=int, default=3, help="the least of so many (default 3)")
-    parser.add_argument("--json", help="also write the figures to this file")
-    arguments = parser.parse_args()
-    named, begun = machine(), time.perf_counter()
-    print_machine(named)
+    arguments, named, begun = begin("benchmarks.scaling", __doc__ or "")
     sections: dict[str, dict[str, float]] = {}
 
     def show(measure: Callable[[int], dict[str, float] | tuple[dict[str, float], ...]], *titles: str) -> None:
         found = measure(arguments.runs)
         for title, values in zip(titles, found if isinstance(found, tuple) else (found,), strict=True):
             sections[title] = values
-            print(f"\n{title}")
-            for name, value in values.items():
-                print(f"  {name:<64}{value:>12.4g}", flush=True)
+            print_figures(title, values)
 
     show(against_number, "number of records: CPU ms a record")
     show(memory, "peak memory, MB")

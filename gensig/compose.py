@@ -162,7 +162,8 @@ def _explain(error: Exception, config_name: str, overrides: Sequence[str]) -> st
     if found := re.search(r"Could not override '([^']+)'\. No match in the defaults list", text):
         return f"unknown group '{found.group(1)}'{_nearest(found.group(1), _groups())}"
     if found := re.search(r"Missing mandatory value: (\S+)", text):
-        return f"{found.group(1)} is required: give {found.group(1)}=..."
+        key = getattr(error, "full_key", None) or found.group(1)
+        return f"{key} is required: give {key}=..."
     return text.removesuffix(".")
 
 

@@ -70,6 +70,7 @@ class TestMistakes:
             (["operating"], ["cannot read the override", "operating"]),
             (["fault=("], ["cannot read the override"]),
             (["out=???"], ["out is required"]),
+            (["sensing=measured"], ["sensing.path.file is required"]),
         ],
     )
     def test_composing(self, words, needles):
