@@ -349,7 +349,8 @@ NUMBERS = {  # keys of the configuration that are pure numbers; every other that
     "poisson_ratio", "damping_ratio", "friction_coefficient", "friction_transition", "points_per_pitch",
     "oversampling", "max_error", "iso1328_grade", "used_share_low", "used_share_high", "support_stiffness_scatter",
     "support_damping_scatter", "drive_damping_ratio", "gain_scatter", "tooth", "pitted_share", "diameter_scatter",
-    "depth_ratio", "region_low", "region_high", "pit_seed", "profile_waves",
+    "depth_ratio", "region_low", "region_high", "pit_seed", "profile_waves", "sensitivity_tolerance",
+    "transverse_sensitivity", "resonance_damping_ratio", "max_clipped_fraction",
 }  # fmt: skip
 
 
@@ -364,7 +365,7 @@ def numbers_in(tree, path=""):
 
 def has_unit(key):
     leaf = key.rpartition(".")[2]
-    return split_unit(leaf)[1] is not None or leaf.endswith("_kg_per_m3")
+    return split_unit(leaf)[1] is not None or leaf.endswith(("_kg_per_m3", "_m_per_s2"))
 
 
 def test_whatever_can_be_drawn_carries_its_unit():
