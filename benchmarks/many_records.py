@@ -60,6 +60,10 @@ def main() -> int:
                 time.sleep(EVERY_S)
             if run.poll() is None:
                 run.send_signal(signal.SIGINT)
+                try:
+                    run.wait(timeout=30.0)
+                except subprocess.TimeoutExpired:  # a shell that starts jobs in the background lets them ignore it
+                    run.terminate()
         n_shards = len(list((out / "shards").glob("shard-*.h5")))
     told = "within" if peak < LIMIT_MB * 1e6 else "beyond"
     print(
