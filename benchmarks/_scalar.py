@@ -33,6 +33,8 @@ class Machine(NamedTuple):
     wheel_kind: NDArray[np.int64]
     pinion_error: Array
     wheel_error: Array
+    pinion_tilt: Array
+    wheel_tilt: Array
     table: Array
     inverse_mass: Array
     stiffness: Array
@@ -52,6 +54,8 @@ def machine(dynamics: PairDynamics) -> Machine:
         wheel_kind=_kinds(table.wheel),
         pinion_error=dynamics.pinion_error,
         wheel_error=dynamics.wheel_error,
+        pinion_tilt=dynamics.pinion_tilt,
+        wheel_tilt=dynamics.wheel_tilt,
         table=pinion[:, None] + wheel[None],
         inverse_mass=1.0 / system.mass,
         stiffness=np.diag(system.stiffness).copy(),
@@ -95,9 +99,10 @@ def accelerations(m, time, q, v, work, a):
         bend = 0.5 * part * (1.0 - part) / mesh.nodes_per_meter
         low, step = m.table[kind_p, kind_w, cell, 3], m.table[kind_p, kind_w, cell + 1, 3]
         step -= low
-        gap_slope = low + part * step
+        tilt = m.pinion_tilt[tooth_p] + m.wheel_tilt[tooth_w]
+        gap_slope = low + part * step + tilt
         gap = m.table[kind_p, kind_w, cell, 2]
-        gap += part * (m.table[kind_p, kind_w, cell + 1, 2] - gap) - bend * step
+        gap += part * (m.table[kind_p, kind_w, cell + 1, 2] - gap) - bend * step + tilt * (position - mesh.pitch_point)
         bite = approach - gap - m.pinion_error[tooth_p] - m.wheel_error[tooth_w]
         if bite > 0.0:
             first, last = min(first, k), k + 1

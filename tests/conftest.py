@@ -71,7 +71,9 @@ def gear_with(xiamen) -> Callable[..., Gear]:
 def dynamics_of() -> Callable[..., PairDynamics]:
     """Equations of motion of a machine with perfect teeth, or with the given tooth errors."""
 
-    def make(system: SpurPair, faults=(), *, phase=0.3, pinion_error=None, wheel_error=None) -> PairDynamics:
+    def make(system: SpurPair, faults=(), *, phase=0.3, **errors: Any) -> PairDynamics:
+        counts = {"pinion": system.pair.pinion.n_teeth, "wheel": system.pair.wheel.n_teeth}
+        perfect = {f"{gear}_{key}": np.zeros(n) for gear, n in counts.items() for key in ("error", "tilt")}
         return PairDynamics(
             table=system.mesh_table(faults),
             pinion=system.pinion,
@@ -79,8 +81,7 @@ def dynamics_of() -> Callable[..., PairDynamics]:
             motor=system.motor,
             load=system.load,
             operating=system.operating,
-            pinion_error=np.zeros(system.pair.pinion.n_teeth) if pinion_error is None else pinion_error,
-            wheel_error=np.zeros(system.pair.wheel.n_teeth) if wheel_error is None else wheel_error,
+            **{**perfect, **errors},
             start_tooth_pinion=0,
             start_tooth_wheel=0,
             start_phase=phase,

@@ -43,7 +43,8 @@ COLUMNS = FOUR  # of a table: compliance, its slope, gap, its slope
 BITE = N_SLOTS * SLOT_ROWS
 MARGIN = BITE + N_PAIRS  # twice N_PAIRS: at the first and at the last stage of a step
 ERROR = MARGIN + 2 * N_PAIRS
-AHEAD = ERROR + N_PAIRS  # roll of a slot, less that at the begin of the step
+TILT = ERROR + N_PAIRS
+AHEAD = TILT + N_PAIRS  # roll of a slot, less that at the begin of the step
 WITHIN = AHEAD + N_SLOTS
 FLAGS = WITHIN + 1
 MOTION = FLAGS + 1  # roll less that at the begin of the step, approach, its rate, the roll's rate
@@ -68,7 +69,8 @@ class Group(NamedTuple):
     distinct teeth (pinion's times wheel's, node, [c, c', g, g']), or where those are many the distinct teeth of the
     pinion and then those of the wheel, whose ``WHEEL_ROWS`` is then not 0. ``bend`` (lane, 4) is half the distance of
     nodes where a column is followed by its slope, else 0: values bend between nodes as their slopes say.
-    ``tooth_row`` and ``tooth_error`` are the row of every tooth (-1 for a missing one) and its gap offset in m.
+    ``tooth_row`` is the row of every tooth (-1 for a missing one), ``tooth_error`` its gap in m at the pitch point,
+    ``tooth_tilt`` how fast that grows along the path in m/m.
 
     The machine is M q'' + C q' + K q = f + mesh forces; q is the deviation from nominal rotation and begins with pinion
     x, y, rotation, wheel x, y, rotation. The state is q less ``rest`` (dof, lane), a static equilibrium, so that it
@@ -86,6 +88,7 @@ class Group(NamedTuple):
     bend: Any
     tooth_row: Any
     tooth_error: Any
+    tooth_tilt: Any
     one_sided: bool
     consistent: bool
     inverse_mass: Any

@@ -28,6 +28,7 @@ from gensig.dynamics._layout import (
     PINION_TEETH,
     PINION_TOOTH,
     PITCH,
+    PITCH_POINT,
     POSITION,
     RAW,
     ROLL,
@@ -39,6 +40,7 @@ from gensig.dynamics._layout import (
     STIFFNESS,
     STRIDE,
     TABLE,
+    TILT,
     WHEEL_ROWS,
     WHEEL_TEETH,
     WHEEL_TOOTH,
@@ -80,6 +82,7 @@ def _meet(group, lane, newest, work, near):
         near[(AT_PINION + k) * n + lane] = start + pinion * stride if there else -1
         near[(AT_WHEEL + k) * n + lane] = wheel
         work[(ERROR + k) * n + lane] = group.tooth_error[first_p + tooth_p] + group.tooth_error[first_w + tooth_w]
+        work[(TILT + k) * n + lane] = group.tooth_tilt[first_p + tooth_p] + group.tooth_tilt[first_w + tooth_w]
         tooth_p = tooth_p - 1 if tooth_p > 0 else n_pinion - 1
         tooth_w = tooth_w - 1 if tooth_w > 0 else n_wheel - 1
 
@@ -125,7 +128,8 @@ def gather(group, slot, renew, work, wide, near):
                 bent = (part * (1.0 - part)) * load_four(group.bend, lane * COLUMNS)
                 store(work, here, low + part * step - bent * second_and_fourth(step))
                 first, last = min(first, k), max(last, k + 1)
-                if work[here + GAP] + work[(ERROR + k) * n + lane] < within:
+                tilted = work[(TILT + k) * n + lane] * (position - group.numbers[PITCH_POINT * n + lane])
+                if work[here + GAP] + work[(ERROR + k) * n + lane] + tilted < within:
                     near_first, near_last = min(near_first, k), max(near_last, k + 1)
             else:
                 work[here + OWN], work[here + OWN_SLOPE] = YIELDING, 0.0
@@ -153,8 +157,10 @@ def _spread_rows(group, slot, k, work):
         own = own - load_four(group.numbers, SHARED * n + lane)
         store(work, pair + OWN * n + lane, own)
         store(work, pair + OWN_SLOPE * n + lane, own_slope)
-        store(work, pair + GAP * n + lane, gap + load_four(work, (ERROR + k) * n + lane))
-        store(work, pair + GAP_SLOPE * n + lane, gap_slope)
+        tilt = load_four(work, (TILT + k) * n + lane)
+        beyond = load_four(work, pair + POSITION * n + lane) - load_four(group.numbers, PITCH_POINT * n + lane)
+        store(work, pair + GAP * n + lane, gap + load_four(work, (ERROR + k) * n + lane) + tilt * beyond)
+        store(work, pair + GAP_SLOPE * n + lane, gap_slope + tilt)
         store(work, pair + STIFFNESS * n + lane, 1.0 / own)
 
 

@@ -99,6 +99,7 @@ def pack(
         bend=np.outer(0.5 / exact[NODES_PER_METER], [1.0, 0.0, 1.0, 0.0]).astype(precision).ravel(),
         tooth_row=np.concatenate(rows),
         tooth_error=np.concatenate([error for one in lanes for error in (one.pinion_error, one.wheel_error)]),
+        tooth_tilt=np.concatenate([tilt for one in lanes for tilt in (one.pinion_tilt, one.wheel_tilt)]),
         one_sided=options.law == "one_sided",
         consistent=options.roll_torque == "consistent",
         inverse_mass=side_by_side(1.0 / mass),

@@ -81,7 +81,11 @@ def solid_disc(radius: float, bore_radius: float, width: float, density: float) 
 
 @dataclass(frozen=True, kw_only=True, eq=False)
 class PairDynamics:
-    """Everything that decides the motion of one gear pair. No slots: the equations are kept once they are made."""
+    """Everything that decides the motion of one gear pair. No slots: the equations are kept once they are made.
+
+    ``pinion_error``, ``wheel_error`` (tooth,) m open the gaps of their teeth at the pitch point, ``pinion_tilt``,
+    ``wheel_tilt`` (tooth,) m/m by as much more for every metre that the contact is further along the path.
+    """
 
     table: PairTable
     pinion: Body
@@ -89,6 +93,8 @@ class PairDynamics:
     operating: Operating
     pinion_error: Array
     wheel_error: Array
+    pinion_tilt: Array
+    wheel_tilt: Array
     start_tooth_pinion: int
     start_tooth_wheel: int
     start_phase: float
@@ -242,9 +248,13 @@ class PairDynamics:
     def _near_positions(self) -> tuple[float, float]:
         """Positions s outside of which no pair comes within ``FAR_NEAR`` of touching, m."""
         table = self.table
+        beyond = table.position - table.pair.pitch_point
         nearest = [
-            side.gap[side.present].min(axis=0) + error.min()
-            for side, error in ((table.pinion, self.pinion_error), (table.wheel, self.wheel_error))
+            side.gap[side.present].min(axis=0) + error.min() + np.minimum(tilt.min() * beyond, tilt.max() * beyond)
+            for side, error, tilt in (
+                (table.pinion, self.pinion_error, self.pinion_tilt),
+                (table.wheel, self.wheel_error, self.wheel_tilt),
+            )
         ]
         near = np.flatnonzero(nearest[0] + nearest[1] < FAR_NEAR)
         if len(near) == 0:  # every pair may be as near as any other
@@ -306,6 +316,8 @@ class PairDynamics:
             start_tooth_wheel=self.start_tooth_wheel,
             pinion_error=self.pinion_error,
             wheel_error=self.wheel_error,
+            pinion_tilt=self.pinion_tilt,
+            wheel_tilt=self.wheel_tilt,
         )
 
 

@@ -47,10 +47,13 @@ def pair_states(
     start_tooth_wheel: int = 0,
     pinion_error: Array | None = None,
     wheel_error: Array | None = None,
+    pinion_tilt: Array | None = None,
+    wheel_tilt: Array | None = None,
 ) -> PairStates:
     """Pairs at the pinion's roll, (phase,) m along the line of action; at 0 the start teeth enter at A.
 
-    ``pinion_error`` and ``wheel_error`` (tooth,) m open the gaps of their teeth.
+    ``pinion_error`` and ``wheel_error`` (tooth,) m open the gaps of their teeth at the pitch point, ``pinion_tilt`` and
+    ``wheel_tilt`` (tooth,) m/m by as much more for every metre that the contact is further along the path.
     """
     pitch = table.pair.base_pitch
     newest = np.floor(roll / pitch).astype(np.int64)
@@ -58,12 +61,17 @@ def pair_states(
     position = roll[:, None] - index * pitch
     compliance = np.full(position.shape, -table.shared_compliance)
     gap = np.zeros(position.shape)
-    sides = ((table.pinion, start_tooth_pinion, pinion_error), (table.wheel, start_tooth_wheel, wheel_error))
-    for side, start, error in sides:
+    sides = (
+        (table.pinion, start_tooth_pinion, pinion_error, pinion_tilt),
+        (table.wheel, start_tooth_wheel, wheel_error, wheel_tilt),
+    )
+    for side, start, error, tilt in sides:
         teeth = (index + start) % len(side.kind)
         kinds = side.kind[teeth]
         if error is not None:
             gap += error[teeth]
+        if tilt is not None:
+            gap += tilt[teeth] * (position - table.pair.pitch_point)
         for kind in np.unique(kinds):
             here = kinds == kind
             compliance[here] += np.interp(position[here], table.position, side.compliance[kind])

@@ -163,6 +163,8 @@ def pair_dynamics(case: Case) -> PairDynamics:
         operating=system.operating,
         pinion_error=np.zeros(system.pair.pinion.n_teeth),
         wheel_error=np.zeros(system.pair.wheel.n_teeth),
+        pinion_tilt=np.zeros(system.pair.pinion.n_teeth),
+        wheel_tilt=np.zeros(system.pair.wheel.n_teeth),
         start_tooth_pinion=0,
         start_tooth_wheel=0,
         start_phase=0.0,

@@ -63,15 +63,16 @@ class Reference:
         for index in range(newest, newest - 4, -1):
             position = roll - index * self.pair.base_pitch
             row, there = np.array([position, 0.0, 0.0, 0.0, 0.0]), True
-            for side, start, error in (
-                (self.table.pinion, self.d.start_tooth_pinion, self.d.pinion_error),
-                (self.table.wheel, self.d.start_tooth_wheel, self.d.wheel_error),
+            for side, start, error, tilt in (
+                (self.table.pinion, self.d.start_tooth_pinion, self.d.pinion_error, self.d.pinion_tilt),
+                (self.table.wheel, self.d.start_tooth_wheel, self.d.wheel_error, self.d.wheel_tilt),
             ):
                 tooth = (index + start) % len(side.kind)
                 kind = side.kind[tooth]
                 there = there and bool(side.present[kind])
                 row[1:] += columns(side, kind, np.array([position]), self.table.position)[:, 0]
-                row[3] += error[tooth]
+                row[3] += error[tooth] + tilt[tooth] * (position - self.pair.pitch_point)
+                row[4] += tilt[tooth]
             if there:
                 rows.append(row)
         return np.array(rows).T
@@ -156,7 +157,8 @@ class Reference:
 @pytest.fixture(scope="module", params=FAULTS)
 def dynamics(request, xiamen, dynamics_of):
     rng = np.random.default_rng(5)
-    errors = {"pinion_error": rng.normal(0, 2e-6, 23), "wheel_error": rng.normal(0, 2e-6, 84)}
+    errors = {"pinion_error": rng.normal(0, 2e-6, 23), "wheel_error": rng.normal(0, 2e-6, 84),
+              "pinion_tilt": rng.normal(0, 3e-4, 23), "wheel_tilt": rng.normal(0, 3e-4, 84)}  # fmt: skip
     return dynamics_of(xiamen, FAULTS[request.param], **errors)
 
 
