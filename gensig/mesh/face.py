@@ -12,6 +12,7 @@ from gensig.mesh.local_contact import ContactLaw
 
 Array = NDArray[np.float64]
 
+SHAPE_DECIMALS = 15  # of a metre: rounding noise does not make two slices different
 # law=paper knows no gap: flank deeper than this share of the module below the rest of its tooth does not bear
 LOST_DEPTH = 0.04
 
@@ -47,8 +48,22 @@ def slice_gaps(tooth: Tooth, curvature_radius: Array, relative_radius: Array) ->
     even = np.all(standing_back == level, axis=1)
     gap = np.repeat(level, len(center), axis=1)
     if not even.all():
-        gap[~even] = envelope(standing_back[~even]) - envelope(np.zeros((1, len(arc))))
+        shapes, which, moved = _shapes(standing_back[~even])
+        gap[~even] = (envelope(shapes) - envelope(np.zeros((1, len(arc)))))[which] + moved
     return gap[:, place]
+
+
+def _shapes(standing_back: Array) -> tuple[Array, NDArray[np.int64], Array]:
+    """Rows that differ by more than how far back they stand as a whole, which of them each row is, and how far back.
+
+    Slices of one flank that is only moved or tilted across the face share their envelope.
+    """
+    moved = np.where(np.isfinite(standing_back[:, :1]), standing_back[:, :1], 0.0)
+    known: dict[bytes, int] = {}
+    which = [known.setdefault(row.tobytes(), len(known)) for row in np.round(standing_back - moved, SHAPE_DECIMALS)]
+    place = np.array(which, dtype=np.int64)
+    first = np.unique(place, return_index=True)[1]
+    return standing_back[first] - moved[first], place, moved
 
 
 def face_contact(

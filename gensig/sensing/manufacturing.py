@@ -1,48 +1,107 @@
-"""What differs from one specimen and one gearbox to the next."""
+"""What differs from one specimen and one gearbox to the next; see ``docs/theory/manufacturing.md``."""
 
 from __future__ import annotations
 
+import math
 from dataclasses import dataclass
 
 import numpy as np
 from numpy.typing import NDArray
 
 from gensig.errors import ConfigError
+from gensig.faults.base import ALL
+from gensig.faults.flank_form import FlankForm, Misalignment, ProfileError
 from gensig.geometry.gear import Gear
+from gensig.sensing.gear_tolerances import (
+    HIGHEST_GRADE,
+    LOWEST_GRADE,
+    check_covered,
+    cumulative_pitch_limit,
+    profile_form_limit,
+    profile_slope_limit,
+    runout_limit,
+    single_pitch_limit,
+)
+from gensig.units import from_si, unit
 
 Array = NDArray[np.float64]
+
+FORM_WAVES = 3  # most waves of the form deviation from end to end; whole ones have no slope of their own
+RUNOUT_STEPS = 20  # in which the eccentricity is made smaller until the index deviation fits its limit
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Quality:
-    """Manufacturing grade and scatter between gearboxes.
+    """Manufacturing grade and scatter between gears and between gearboxes.
 
-    ``iso1328_grade`` limits the single pitch deviation; a gear uses a share of the limit between ``used_share_low``
-    and ``used_share_high``. None makes perfect gears. The support scatters are standard deviations of the logarithm.
+    Every deviation of a gear uses the same share of its ISO 1328-1 limit, between ``used_share_low`` and
+    ``used_share_high``. ``iso1328_grade`` None makes perfect gears: only the supports scatter. ``tooth_share`` is the
+    part of the profile slope that differs from tooth to tooth, ``undulation_share`` that of the profile form that is
+    ``undulation_waves`` waves. Misalignment and backlash are uniform within plus and minus ``misalignment`` and
+    ``backlash_scatter``. The support scatters are standard deviations of the logarithm.
     """
 
     iso1328_grade: float | None
     used_share_low: float
     used_share_high: float
+    profile_errors: bool
+    tooth_share: float
+    undulation_share: float
+    undulation_waves: int
+    misalignment: float = unit("um")
+    backlash_scatter: float = unit("um")
     support_stiffness_scatter: float
     support_damping_scatter: float
 
     def __post_init__(self) -> None:
-        if self.iso1328_grade is not None and not 1 <= self.iso1328_grade <= 11:
-            raise ConfigError(f"quality.iso1328_grade = {self.iso1328_grade:g} must lie in 1..11, or be null")
+        if self.iso1328_grade is not None and not LOWEST_GRADE <= self.iso1328_grade <= HIGHEST_GRADE:
+            grades = f"{LOWEST_GRADE}..{HIGHEST_GRADE}"
+            raise ConfigError(f"quality.iso1328_grade = {self.iso1328_grade:g} must lie in {grades}, or be null")
         if not 0.0 <= self.used_share_low <= self.used_share_high <= 1.0:
             raise ConfigError("quality.used_share_low and used_share_high must be ordered and lie in 0..1")
-        for key in ("support_stiffness_scatter", "support_damping_scatter"):
+        for key in ("tooth_share", "undulation_share", "support_stiffness_scatter", "support_damping_scatter"):
             if not 0.0 <= getattr(self, key) <= 1.0:
                 raise ConfigError(f"quality.{key} = {getattr(self, key):g} must lie in 0..1")
+        if not 1 <= self.undulation_waves <= 50:
+            raise ConfigError(f"quality.undulation_waves = {self.undulation_waves} must lie in 1..50")
+        for key in ("misalignment_um", "backlash_scatter_um"):
+            value = getattr(self, key.removesuffix("_um"))
+            if value < 0.0:
+                raise ConfigError(f"quality.{key} = {from_si(key, value):g} must not be negative")
+
+    def check_backlash(self, backlash: float) -> None:
+        """Raise ConfigError where a drawn backlash could be negative; the nominal one in m."""
+        if self.iso1328_grade is not None and self.backlash_scatter > backlash:
+            raise ConfigError(
+                f"quality.backlash_scatter_um = {self.backlash_scatter * 1e6:g} must not be above "
+                f"gear.backlash_um = {backlash * 1e6:g}"
+            )
+
+    def check_covered(self, *gears: Gear) -> None:
+        """Raise ConfigError where there is a grade and a gear that the standard does not cover."""
+        if self.iso1328_grade is not None:
+            for gear in gears:
+                check_covered(gear)
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Specimen:
-    """A set of gears: position error of every tooth as a gap offset, (tooth,) m."""
+    """A set of gears.
+
+    Parameters
+    ----------
+    pinion_error, wheel_error : (tooth,) m    how far every tooth stands back at the pitch point, as a gap
+    pinion_tilt, wheel_tilt : (tooth,) m/m    how fast that grows with the contact's position along the path; 0: nowhere
+    forms : what the flanks of all teeth share, as transforms that come before a record's own faults
+    backlash_change : m    along the line of action
+    """
 
     pinion_error: Array
     wheel_error: Array
+    pinion_tilt: Array | float = 0.0
+    wheel_tilt: Array | float = 0.0
+    forms: tuple[FlankForm, ...] = ()
+    backlash_change: float = 0.0
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -54,33 +113,110 @@ class Gearbox:
     gain: Array
 
 
-def single_pitch_limit(gear: Gear, grade: float) -> float:
-    """Limit of the single pitch deviation, m.
-
-    Source: ISO 1328-1:2013, f_pT = (0.001 d + 0.4 m + 5) sqrt(2)^(A - 5) with d and m in mm, result in micrometres.
-    """
-    diameter, module = 2e3 * gear.pitch_radius, 1e3 * gear.normal_module
-    return 1e-6 * (0.001 * diameter + 0.4 * module + 5.0) * np.sqrt(2.0) ** (grade - 5.0)
-
-
 def draw_specimen(rng: np.random.Generator, pinion: Gear, wheel: Gear, quality: Quality) -> Specimen:
-    """Independent tooth positions whose largest step between neighbours is the used share of the limit."""
-    errors = []
-    for gear in (pinion, wheel):
-        shape = rng.standard_normal(gear.n_teeth)
-        share = rng.uniform(quality.used_share_low, quality.used_share_high)
-        if quality.iso1328_grade is None:
-            errors.append(np.zeros(gear.n_teeth))
-            continue
-        largest_step = np.abs(np.diff(np.append(shape, shape[0]))).max()
-        error = shape / largest_step * share * single_pitch_limit(gear, quality.iso1328_grade)
-        errors.append(error - error.mean())
-    return Specimen(pinion_error=errors[0], wheel_error=errors[1])
+    """Draw a set of gears within its grade.
+
+    What is drawn does not depend on what is switched on, so that one key leaves the other deviations alone.
+
+    Raises
+    ------
+    ConfigError    for a gear that the standard does not cover
+    """
+    drawn = [_draw_gear(rng, gear, quality) for gear in (pinion, wheel)]
+    tilted, play = rng.uniform(-1.0, 1.0, 2)
+    if quality.iso1328_grade is None:
+        return perfect_specimen(pinion, wheel)
+    (pinion_error, pinion_tilt, pinion_forms), (wheel_error, wheel_tilt, wheel_forms) = drawn
+    misalignment = Misalignment(
+        gear=pinion.name, tooth=ALL, misalignment=tilted * quality.misalignment, limit=max(quality.misalignment, 1e-6)
+    )
+    return Specimen(
+        pinion_error=pinion_error,
+        wheel_error=wheel_error,
+        pinion_tilt=pinion_tilt,
+        wheel_tilt=wheel_tilt,
+        forms=(*pinion_forms, *wheel_forms, *((misalignment,) if misalignment.misalignment else ())),
+        backlash_change=play * quality.backlash_scatter,
+    )
+
+
+def _draw_gear(rng: np.random.Generator, gear: Gear, quality: Quality) -> tuple[Array, Array, tuple[FlankForm, ...]]:
+    """Errors (tooth,) m, tilts (tooth,) m/m and the common form of the flanks of one gear."""
+    share = rng.uniform(quality.used_share_low, quality.used_share_high)
+    runout_share, angle = rng.random(), rng.uniform(0.0, 2.0 * math.pi)
+    shape, of_teeth = rng.standard_normal(gear.n_teeth), rng.uniform(-1.0, 1.0, gear.n_teeth)
+    sign, waves = rng.choice((-1.0, 1.0)), int(rng.integers(1, FORM_WAVES + 1))
+    if quality.iso1328_grade is None:
+        return np.zeros(gear.n_teeth), np.zeros(gear.n_teeth), ()
+    eccentricity, pitch_error = _scaled_index(gear, quality.iso1328_grade, share, runout_share, angle, shape)
+    turn = 2.0 * math.pi / gear.n_teeth * np.arange(gear.n_teeth) - angle
+    # the same turning point of an eccentric gear for all teeth in contact: its teeth do not step, see the theory
+    error = eccentricity * np.cos(turn) + pitch_error
+    tilt = -eccentricity / gear.base_radius * np.sin(turn)
+    if not quality.profile_errors:
+        return error, tilt, ()
+    slope = share * profile_slope_limit(gear, quality.iso1328_grade)
+    form = share * profile_form_limit(gear, quality.iso1328_grade)
+    involute = math.sqrt(gear.tip_radius**2 - gear.base_radius**2) - gear.junction_curvature_radius
+    towards_tip = 1.0 if gear.name == "pinion" else -1.0  # as the contact runs along the path
+    tilt = tilt + towards_tip * quality.tooth_share * slope / involute * of_teeth
+    parts = (
+        (sign * (1.0 - quality.tooth_share) * slope, (1.0 - quality.undulation_share) * form, waves),
+        (0.0, quality.undulation_share * form, quality.undulation_waves),
+    )
+    forms = tuple(
+        ProfileError(
+            gear=gear.name,
+            tooth=ALL,
+            profile_slope=float(own_slope),
+            profile_form=float(height),
+            profile_waves=float(n_waves),
+            limit=slope + form,
+        )
+        for own_slope, height, n_waves in parts
+        if own_slope or height
+    )
+    return error, tilt, forms
+
+
+def _scaled_index(
+    gear: Gear, grade: float, share: float, runout_share: float, angle: float, shape: Array
+) -> tuple[float, Array]:
+    """Eccentricity in m and random pitch errors (tooth,) m that keep to the share of three limits.
+
+    The random part has no once-per-turn part of its own, so that all runout is the eccentricity's. It is as large as
+    the single pitch deviation allows; the eccentricity starts at ``runout_share`` of what the runout allows and shrinks
+    until the total index deviation fits. Arcs on the reference circle are cos(alpha) long along the line of action.
+    """
+    turn = 2.0 * math.pi / gear.n_teeth * np.arange(gear.n_teeth)
+    random = shape - shape.mean()
+    for once in (np.cos(turn), np.sin(turn)):
+        random = random - 2.0 / gear.n_teeth * (random @ once) * once
+    once = np.cos(turn - angle)
+    arc = share * math.cos(gear.pressure_angle)
+    step, total = arc * single_pitch_limit(gear, grade), arc * cumulative_pitch_limit(gear, grade)
+    steps, steps_once = (np.diff(part, append=part[0]) for part in (random, once))
+    tried = np.linspace(0.5 * runout_share * share * runout_limit(gear, grade), 0.0, RUNOUT_STEPS + 1)
+    # the largest random part at which no step of the sum is above its limit
+    room = np.where(
+        np.abs(steps_once) * tried[:, None] <= step, step - np.sign(steps) * tried[:, None] * steps_once, 0.0
+    )
+    height = (room / np.maximum(np.abs(steps), 1e-300)).min(axis=1)
+    fits = (np.ptp(tried[:, None] * once + height[:, None] * random, axis=1) <= total) & (height > 0.0)
+    if fits.any():
+        first = int(fits.argmax())
+        return float(tried[first]), height[first] * random
+    return 0.0, min(float(height[-1]), total / float(np.ptp(random))) * random
 
 
 def perfect_specimen(pinion: Gear, wheel: Gear) -> Specimen:
     """Gears without errors."""
-    return Specimen(pinion_error=np.zeros(pinion.n_teeth), wheel_error=np.zeros(wheel.n_teeth))
+    return Specimen(
+        pinion_error=np.zeros(pinion.n_teeth),
+        wheel_error=np.zeros(wheel.n_teeth),
+        pinion_tilt=np.zeros(pinion.n_teeth),
+        wheel_tilt=np.zeros(wheel.n_teeth),
+    )
 
 
 def draw_gearbox(rng: np.random.Generator, n_channels: int, quality: Quality, gain_scatter: float) -> Gearbox:

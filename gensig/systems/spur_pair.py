@@ -127,6 +127,13 @@ class SpurPair:
         """Compliance and gap tables with the given faults."""
         return _mesh_table(self.pair, self.material, self.mesh, tuple(faults), self.mesh_force)
 
+    def _specimen_table(self, faults: Sequence[Fault], specimen: Specimen) -> PairTable:
+        """The faults on the flanks of a set of gears, at its backlash; which asks for no tables of its own."""
+        table = self.mesh_table((*specimen.forms, *faults))
+        if specimen.backlash_change == 0.0:
+            return table
+        return replace(table, pair=replace(self.pair, backlash=self.pair.backlash + specimen.backlash_change))
+
     @property
     def mesh_force(self) -> float:
         """Normal force of the set torque, N."""
@@ -136,6 +143,7 @@ class SpurPair:
         """Raise for what would stop every record: interrupted drive, fits out of range, channels, step length."""
         self.pair.require_continuous_drive()
         self.mesh_table()
+        self.quality.check_covered(self.pair.pinion, self.pair.wheel)
         sensing, operating = self.sensing, self.operating
         check_memory(operating.duration, sensing.sampling_rate, len(sensing.channels), self.solver.precision)
         nominal = Run(system=self, faults=()).dynamics()
@@ -160,12 +168,14 @@ class SpurPair:
 
     def _dynamics(self, faults: Sequence[Fault], start: Start, specimen: Specimen, gearbox: Gearbox) -> PairDynamics:
         return PairDynamics(
-            table=self.mesh_table(faults),
+            table=self._specimen_table(faults, specimen),
             pinion=_scaled(self.pinion, gearbox.stiffness_factor[:2], gearbox.damping_factor[:2]),
             wheel=_scaled(self.wheel, gearbox.stiffness_factor[2:], gearbox.damping_factor[2:]),
             operating=self.operating,
             pinion_error=specimen.pinion_error,
             wheel_error=specimen.wheel_error,
+            pinion_tilt=specimen.pinion_tilt + np.zeros(self.pair.pinion.n_teeth),
+            wheel_tilt=specimen.wheel_tilt + np.zeros(self.pair.wheel.n_teeth),
             start_tooth_pinion=start.tooth_pinion,
             start_tooth_wheel=start.tooth_wheel,
             start_phase=start.phase,
