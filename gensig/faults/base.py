@@ -96,9 +96,10 @@ def faulty_teeth(pair: GearPair, faults: Iterable[Fault]) -> dict[tuple[str, int
     teeth: dict[tuple[str, int], Tooth] = {}
     for fault in faults:
         gear = gears[fault.gear]
+        sound = healthy_tooth(gear)
         made: dict[int, Tooth] = {}
         for number in fault.teeth(gear):
-            before = teeth.get((fault.gear, number), healthy_tooth(gear))
+            before = teeth.get((fault.gear, number), sound)
             known = made.get(id(before)) if fault.alike else None
             after = fault.apply(before, number) if known is None else known
             made[id(before)] = teeth[fault.gear, number] = after

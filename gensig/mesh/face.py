@@ -49,7 +49,8 @@ def slice_gaps(tooth: Tooth, curvature_radius: Array, relative_radius: Array) ->
     gap = np.repeat(level, len(center), axis=1)
     if not even.all():
         shapes, which, moved = _shapes(standing_back[~even])
-        gap[~even] = (envelope(shapes) - envelope(np.zeros((1, len(arc)))))[which] + moved
+        beyond = np.maximum(np.maximum(center - arc[-1], arc[0] - center), 0.0)  # of a nominal flank the end touches
+        gap[~even] = (envelope(shapes) - beyond**2 / (2.0 * relative_radius))[which] + moved
     return gap[:, place]
 
 
@@ -78,6 +79,8 @@ def face_contact(
     bending : (phase,) m/N    of both teeth over the whole face, where every slice bends by itself, else 0
     """
     gaps = slice_gaps(tooth, curvature_radius, relative_radius)
+    if len(gaps) == 1 and np.isfinite(gaps).all():  # one slice bears as a sound flank does
+        return gaps[0], law.compliance(tooth.gear.face_width, load)
     gap, compliance = np.empty_like(load), np.empty_like(load)
     unit = bending * tooth.gear.face_width
     share_over_slices(gaps, tooth.slice_width, load, law.factor, law.constant, law.log_weight, unit, gap, compliance)
