@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 from numpy.typing import NDArray
@@ -19,6 +19,7 @@ class Quality:
 
     ``iso1328_grade`` limits the single pitch deviation; a gear uses a share of the limit between ``used_share_low``
     and ``used_share_high``. None makes perfect gears. The support scatters are standard deviations of the logarithm.
+    Where the damping ratios are given, each support of a gearbox has one between them, and their scatter is not read.
     """
 
     iso1328_grade: float | None
@@ -26,6 +27,8 @@ class Quality:
     used_share_high: float
     support_stiffness_scatter: float
     support_damping_scatter: float
+    support_damping_ratio_low: float | None = None
+    support_damping_ratio_high: float | None = None
 
     def __post_init__(self) -> None:
         if self.iso1328_grade is not None and not 1 <= self.iso1328_grade <= 11:
@@ -35,6 +38,18 @@ class Quality:
         for key in ("support_stiffness_scatter", "support_damping_scatter"):
             if not 0.0 <= getattr(self, key) <= 1.0:
                 raise ConfigError(f"quality.{key} = {getattr(self, key):g} must lie in 0..1")
+        low, high = self.support_damping_ratio_low, self.support_damping_ratio_high
+        if (low is None) != (high is None) or (low is not None and high is not None and not 0.0 < low <= high <= 1.0):
+            raise ConfigError(
+                f"quality.support_damping_ratio_low = {low} and support_damping_ratio_high = {high} must be ordered, "
+                "above 0 and at most 1, or both null"
+            )
+
+    @property
+    def support_damping_ratio(self) -> float | None:
+        """The ratio in the middle of its range on a logarithmic scale; None where supports give their damping."""
+        low, high = self.support_damping_ratio_low, self.support_damping_ratio_high
+        return None if low is None or high is None else float(np.sqrt(low * high))
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -47,11 +62,15 @@ class Specimen:
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Gearbox:
-    """Housing, bearings and sensors: factors on the supports (pinion x, y, wheel x, y) and gains of the channels."""
+    """Housing, bearings and sensors: factors on the supports (pinion x, y, wheel x, y) and gains of the channels.
+
+    ``damping_ratio`` (support,) of the gears on their supports; None leaves the damping that the supports are given.
+    """
 
     stiffness_factor: Array
     damping_factor: Array
     gain: Array
+    damping_ratio: Array | None = None
 
 
 def single_pitch_limit(gear: Gear, grade: float) -> float:
@@ -95,3 +114,11 @@ def draw_gearbox(rng: np.random.Generator, n_channels: int, quality: Quality, ga
 def nominal_gearbox(n_channels: int) -> Gearbox:
     """The gearbox as configured: no scatter."""
     return Gearbox(stiffness_factor=np.ones(4), damping_factor=np.ones(4), gain=np.ones(n_channels))
+
+
+def with_damping_ratio(gearbox: Gearbox, rng: np.random.Generator, quality: Quality) -> Gearbox:
+    """The gearbox with a damping ratio for each of its four supports, log-uniform, where ``quality`` has a range."""
+    low, high = quality.support_damping_ratio_low, quality.support_damping_ratio_high
+    if low is None or high is None:
+        return gearbox
+    return replace(gearbox, damping_ratio=np.exp(rng.uniform(np.log(low), np.log(high), 4)))
