@@ -3,6 +3,7 @@
 import math
 import re
 from dataclasses import replace
+from pathlib import Path
 
 import numpy as np
 import pytest
@@ -25,6 +26,7 @@ BEARINGS = {
     "quality.support_damping_ratio_high": 0.1,
 }
 SIDES = ("pinion", "wheel")
+DOCS = Path(__file__).parents[3] / "docs" / "theory" / "supports.md"
 
 
 def supports(dynamics):
@@ -77,6 +79,18 @@ class TestStiffness:
         for side in SIDES:
             for key in ("stiffness_x", "stiffness_y"):
                 assert getattr(getattr(high, side).support, key) > 1.3 * getattr(getattr(low, side).support, key)
+
+    def test_the_table_of_the_docs(self, machine):
+        """docs/theory/supports.md prints stiffness in N/um and frequencies in Hz."""
+        lines = DOCS.read_text().splitlines()
+        rows = [line.strip("| ").split(" | ") for line in lines if " | pinion | " in line or " | wheel | " in line]
+        assert len(rows) == 8
+        for torque, side, *printed in rows:
+            system = machine({**BEARINGS, "operating.torque_nm": float(torque)})
+            body = getattr(system, side)
+            stiffness = np.array([body.support.stiffness_x, body.support.stiffness_y])
+            expected = [*(1e-6 * stiffness), *(np.sqrt(stiffness / body.mass) / (2 * math.pi))]
+            assert_allclose([float(value) for value in printed[-4:]], expected, rtol=5e-3, atol=0)
 
 
 class TestDamping:
