@@ -20,7 +20,7 @@ from gensig.faults.registry import read_faults
 from gensig.mesh.pair_table import N_PAIRS
 from gensig.sensing.chain import detectability
 from gensig.sensing.instrument import Instrument, draw_instrument
-from gensig.sensing.manufacturing import Gearbox, Specimen, draw_gearbox, draw_specimen
+from gensig.sensing.manufacturing import Gearbox, Specimen, draw_gearbox, draw_specimen, with_damping_ratio
 from gensig.systems.lead_in import simulate_with_lead_in
 from gensig.systems.registry import read_system
 from gensig.systems.spur_pair import CleanRecord, Run, SpurPair, Start
@@ -57,6 +57,7 @@ class Stream(IntEnum):
     NOISE = 7
     PATH = 8
     SENSOR = 9
+    SUPPORT = 14
 
 
 def stream(seed: int, cause: Stream, index: int = 0) -> np.random.Generator:
@@ -342,11 +343,12 @@ def _unit(config: Mapping[str, Any], system: SpurPair, row: Mapping[str, Any]) -
     """Specimen and gearbox of a row, drawn from their own streams."""
     seed, quality = read_seed(config), system.quality
     specimen, gearbox = (int(str(row[name]).rpartition("-")[2]) for name in ("specimen_id", "gearbox_id"))
+    box = draw_gearbox(
+        stream(seed, Stream.GEARBOX, gearbox), len(system.sensing.channels), quality, system.sensing.gain_scatter
+    )
     return (
         draw_specimen(stream(seed, Stream.SPECIMEN, specimen), system.pair.pinion, system.pair.wheel, quality),
-        draw_gearbox(
-            stream(seed, Stream.GEARBOX, gearbox), len(system.sensing.channels), quality, system.sensing.gain_scatter
-        ),
+        with_damping_ratio(box, stream(seed, Stream.SUPPORT, gearbox), quality),
     )
 
 

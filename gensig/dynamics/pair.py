@@ -43,6 +43,14 @@ class Support:
             if value < 0.0:
                 raise ConfigError(f"support.{key} = {value:g} must not be negative")
 
+    def damped(self, mass: float, ratio_x: float, ratio_y: float) -> Support:
+        """The support with c = 2 zeta sqrt(k m) for a gear of ``mass`` in kg on it alone."""
+        return replace(
+            self,
+            damping_x=2.0 * ratio_x * math.sqrt(self.stiffness_x * mass),
+            damping_y=2.0 * ratio_y * math.sqrt(self.stiffness_y * mass),
+        )
+
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Body:

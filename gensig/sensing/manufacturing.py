@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import math
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 from numpy.typing import NDArray
@@ -38,7 +38,8 @@ class Quality:
     ``used_share_high``. ``iso1328_grade`` None makes perfect gears: only the supports scatter. ``tooth_share`` is the
     part of the profile slope that differs from tooth to tooth, ``undulation_share`` that of the profile form that is
     ``undulation_waves`` waves. Misalignment and backlash are uniform within plus and minus ``misalignment`` and
-    ``backlash_scatter``. The support scatters are standard deviations of the logarithm.
+    ``backlash_scatter``. The support scatters are standard deviations of the logarithm. Where the damping ratios are
+    given, each support of a gearbox has one between them, and their scatter is not read.
     """
 
     iso1328_grade: float | None
@@ -52,6 +53,8 @@ class Quality:
     backlash_scatter: float = unit("um")
     support_stiffness_scatter: float
     support_damping_scatter: float
+    support_damping_ratio_low: float | None = None
+    support_damping_ratio_high: float | None = None
 
     def __post_init__(self) -> None:
         if self.iso1328_grade is not None and not LOWEST_GRADE <= self.iso1328_grade <= HIGHEST_GRADE:
@@ -69,6 +72,13 @@ class Quality:
             if value < 0.0:
                 raise ConfigError(f"quality.{key} = {from_si(key, value):g} must not be negative")
 
+        low, high = self.support_damping_ratio_low, self.support_damping_ratio_high
+        if (low is None) != (high is None) or (low is not None and high is not None and not 0.0 < low <= high <= 1.0):
+            raise ConfigError(
+                f"quality.support_damping_ratio_low = {low} and support_damping_ratio_high = {high} must be ordered, "
+                "above 0 and at most 1, or both null"
+            )
+
     def check_backlash(self, backlash: float) -> None:
         """Raise ConfigError where a drawn backlash could be negative; the nominal one in m."""
         if self.iso1328_grade is not None and self.backlash_scatter > backlash:
@@ -82,6 +92,12 @@ class Quality:
         if self.iso1328_grade is not None:
             for gear in gears:
                 check_covered(gear)
+
+    @property
+    def support_damping_ratio(self) -> float | None:
+        """The ratio in the middle of its range on a logarithmic scale; None where supports give their damping."""
+        low, high = self.support_damping_ratio_low, self.support_damping_ratio_high
+        return None if low is None or high is None else float(np.sqrt(low * high))
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -106,11 +122,15 @@ class Specimen:
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Gearbox:
-    """Housing, bearings and sensors: factors on the supports (pinion x, y, wheel x, y) and gains of the channels."""
+    """Housing, bearings and sensors: factors on the supports (pinion x, y, wheel x, y) and gains of the channels.
+
+    ``damping_ratio`` (support,) of the gears on their supports; None leaves the damping that the supports are given.
+    """
 
     stiffness_factor: Array
     damping_factor: Array
     gain: Array
+    damping_ratio: Array | None = None
 
 
 def draw_specimen(rng: np.random.Generator, pinion: Gear, wheel: Gear, quality: Quality) -> Specimen:
@@ -231,3 +251,11 @@ def draw_gearbox(rng: np.random.Generator, n_channels: int, quality: Quality, ga
 def nominal_gearbox(n_channels: int) -> Gearbox:
     """The gearbox as configured: no scatter."""
     return Gearbox(stiffness_factor=np.ones(4), damping_factor=np.ones(4), gain=np.ones(n_channels))
+
+
+def with_damping_ratio(gearbox: Gearbox, rng: np.random.Generator, quality: Quality) -> Gearbox:
+    """The gearbox with a damping ratio for each of its four supports, log-uniform, where ``quality`` has a range."""
+    low, high = quality.support_damping_ratio_low, quality.support_damping_ratio_high
+    if low is None or high is None:
+        return gearbox
+    return replace(gearbox, damping_ratio=np.exp(rng.uniform(np.log(low), np.log(high), 4)))

@@ -16,6 +16,7 @@ from gensig.operating import Operating, read_profile
 from gensig.sensing.manufacturing import Quality
 from gensig.sensing.reading import read_sensing
 from gensig.systems.spur_pair import SpurPair
+from gensig.systems.supports import AS_GIVEN, on_bearings, put_on_bearings, read_holding
 from gensig.units import read, to_si
 
 SIDES = ("pinion", "wheel")
@@ -26,8 +27,8 @@ COMMON_GEAR_KEYS = (
     "clearance_coefficient",
     "cutter_tip_radius_coefficient",
 )
-BODY_KEYS = ("mass_kg", "inertia_kg_m2", "support")
-SYSTEM_KEYS = ("kind", "motor", "load")
+BODY_KEYS = ("mass_kg", "inertia_kg_m2", "support", "bearing", "shaft")
+SYSTEM_KEYS = ("kind", "supports", "motor", "load")
 PROFILE_KEYS = ("speed_profile", "torque_profile")
 
 
@@ -46,15 +47,21 @@ def read_spur_pair(config: Mapping[str, Any]) -> SpurPair:
             raise ConfigError(f"system: unknown key '{key}'; known: {', '.join(SYSTEM_KEYS)}")
     gears = {name: _read_gear(name, gear) for name in SIDES}
     pair = GearPair(**gears, backlash=_number("gear.backlash_um", gear["backlash_um"]))
+    operating = _read_operating(section(config, "operating"))
     quality = read(Quality, section(config, "quality"), "quality")
     quality.check_backlash(pair.backlash)
+    bodies = {name: _read_body(gears[name], sides[name], material) for name in SIDES}
+    held = {name: read_holding(gears[name], sides[name]) for name in SIDES}
+    if on_bearings(machine.get("supports", AS_GIVEN), quality):
+        force = operating.torque / gears["pinion"].base_radius
+        bodies = {name: put_on_bearings(bodies[name], gears[name], held[name], material, force) for name in SIDES}
     return SpurPair(
         pair=pair,
         material=material,
         mesh=read_mesh_options(section(config, "mesh")),
-        pinion=_read_body(gears["pinion"], sides["pinion"], material),
-        wheel=_read_body(gears["wheel"], sides["wheel"], material),
-        operating=_read_operating(section(config, "operating")),
+        pinion=bodies["pinion"],
+        wheel=bodies["wheel"],
+        operating=operating,
         sensing=read_sensing(section(config, "sensing")),
         quality=quality,
         solver=read(Solver, section(config, "solver"), "solver"),

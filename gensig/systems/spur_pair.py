@@ -22,7 +22,7 @@ from gensig.dynamics.integrator import (
     settling_oversampling,
 )
 from gensig.dynamics.mesh_state import MeshState, mesh_state
-from gensig.dynamics.pair import Body, PairDynamics, Rotor, Support
+from gensig.dynamics.pair import Body, PairDynamics, Rotor
 from gensig.errors import FaultError, SimulationError
 from gensig.faults.base import Fault, faulty_teeth
 from gensig.geometry.contact import GearPair
@@ -35,6 +35,7 @@ from gensig.operating import Operating
 from gensig.sensing.agreement import agreement
 from gensig.sensing.chain import Sensing
 from gensig.sensing.manufacturing import Gearbox, Quality, Specimen, nominal_gearbox, perfect_specimen
+from gensig.systems.supports import in_gearbox
 from gensig.units import from_si
 
 Array = NDArray[np.float64]
@@ -169,8 +170,8 @@ class SpurPair:
     def _dynamics(self, faults: Sequence[Fault], start: Start, specimen: Specimen, gearbox: Gearbox) -> PairDynamics:
         return PairDynamics(
             table=self._specimen_table(faults, specimen),
-            pinion=_scaled(self.pinion, gearbox.stiffness_factor[:2], gearbox.damping_factor[:2]),
-            wheel=_scaled(self.wheel, gearbox.stiffness_factor[2:], gearbox.damping_factor[2:]),
+            pinion=in_gearbox(self.pinion, gearbox, slice(0, 2), self.quality),
+            wheel=in_gearbox(self.wheel, gearbox, slice(2, 4), self.quality),
             operating=self.operating,
             pinion_error=specimen.pinion_error,
             wheel_error=specimen.wheel_error,
@@ -379,16 +380,3 @@ def _mesh_table(
     pair: GearPair, material: Material, mesh: MeshOptions, faults: tuple[Fault, ...], force: float
 ) -> PairTable:
     return loaded_pair_table(pair, material, mesh, faulty_teeth(pair, faults), force=force)
-
-
-def _scaled(body: Body, stiffness: Array, damping: Array) -> Body:
-    support = body.support
-    return replace(
-        body,
-        support=Support(
-            stiffness_x=support.stiffness_x * float(stiffness[0]),
-            stiffness_y=support.stiffness_y * float(stiffness[1]),
-            damping_x=support.damping_x * float(damping[0]),
-            damping_y=support.damping_y * float(damping[1]),
-        ),
-    )

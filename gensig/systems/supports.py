@@ -1,0 +1,98 @@
+"""What holds a gear: supports as given, or stiffness from its bearings and shaft; damping as given, or from a ratio."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from dataclasses import dataclass, replace
+from typing import Any
+
+import numpy as np
+
+from gensig.dynamics.bearing import BallBearing, Shaft, support_stiffness
+from gensig.dynamics.pair import Body, Support
+from gensig.errors import ConfigError
+from gensig.geometry.gear import Gear
+from gensig.material import Material
+from gensig.sensing.manufacturing import Gearbox, Quality
+from gensig.units import from_si, read
+
+AS_GIVEN = "as_given"
+KINDS = (AS_GIVEN, "bearings")
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class Holding:
+    """Shaft of a gear and the bearing at either end of it; None where they are not known."""
+
+    bearing: BallBearing | None
+    shaft: Shaft | None
+
+
+def read_holding(gear: Gear, values: Mapping[str, Any]) -> Holding:
+    """Bearing and shaft of the boundary keys of one gear; a shaft whose diameter is null fills the bore.
+
+    Raises
+    ------
+    ConfigError    for sizes that make none
+    """
+    bearing, shaft = values.get("bearing"), values.get("shaft")
+    if isinstance(shaft, Mapping) and shaft.get("diameter_mm", 0.0) is None:
+        shaft = {**shaft, "diameter_mm": from_si("diameter_mm", 2.0 * gear.bore_radius)}
+    try:
+        return Holding(
+            bearing=None if bearing is None else read(BallBearing, bearing, "bearing"),
+            shaft=None if shaft is None else read(Shaft, shaft, "shaft"),
+        )
+    except ConfigError as error:
+        raise ConfigError(f"gear.{gear.name}.{error}") from None
+
+
+def on_bearings(kind: Any, quality: Quality) -> bool:
+    """Whether ``system.supports`` asks for stiffness from bearings; ConfigError for what cannot be used."""
+    if kind not in KINDS:
+        raise ConfigError(f"system.supports = {kind!r}; allowed: {', '.join(KINDS)}")
+    if kind == AS_GIVEN:
+        return False
+    if quality.support_damping_ratio is None:
+        raise ConfigError(
+            "system.supports = bearings says nothing of damping; give quality.support_damping_ratio_low and "
+            "support_damping_ratio_high, for instance 0.01 and 0.1"
+        )
+    return True
+
+
+def put_on_bearings(body: Body, gear: Gear, holding: Holding, material: Material, force: float) -> Body:
+    """The gear held by its shaft and bearings under the static mesh ``force`` in N; its damping is left to a ratio.
+
+    Raises
+    ------
+    ConfigError    where bearing or shaft are not known
+    """
+    if holding.bearing is None or holding.shaft is None:
+        key = "bearing" if holding.bearing is None else "shaft"
+        raise ConfigError(
+            f"gear.{gear.name}.{key} = null: system.supports = bearings needs its sizes; give them, or take "
+            "system.supports=as_given"
+        )
+    across, along = support_stiffness(holding.bearing, holding.shaft, material, force)
+    return replace(body, support=Support(stiffness_x=across, stiffness_y=along, damping_x=0.0, damping_y=0.0))
+
+
+def in_gearbox(body: Body, gearbox: Gearbox, axes: slice, quality: Quality) -> Body:
+    """A gear on its support in one gearbox; ``axes`` are the two places of its x and y among the four supports.
+
+    Stiffness scatters about what it is. So does damping, unless ``quality`` has a range of damping ratios: then the
+    ratio is the gearbox's, and without one the middle of the range.
+    """
+    support, stiffness, damping = body.support, gearbox.stiffness_factor[axes], gearbox.damping_factor[axes]
+    scattered = Support(
+        stiffness_x=support.stiffness_x * float(stiffness[0]),
+        stiffness_y=support.stiffness_y * float(stiffness[1]),
+        damping_x=support.damping_x * float(damping[0]),
+        damping_y=support.damping_y * float(damping[1]),
+    )
+    nominal = quality.support_damping_ratio
+    if nominal is not None:
+        ratio = np.full(2, nominal) if gearbox.damping_ratio is None else gearbox.damping_ratio[axes]
+        scattered = scattered.damped(body.mass, float(ratio[0]), float(ratio[1]))
+    return replace(body, support=scattered)
