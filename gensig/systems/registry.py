@@ -12,9 +12,9 @@ from gensig.geometry.contact import GearPair
 from gensig.geometry.gear import Gear
 from gensig.material import Material
 from gensig.mesh.options import read_mesh_options
-from gensig.operating import Operating, read_profile
 from gensig.sensing.manufacturing import Quality
 from gensig.sensing.reading import read_sensing
+from gensig.systems.operation import read_operating
 from gensig.systems.spur_pair import SpurPair
 from gensig.units import read, to_si
 
@@ -28,7 +28,6 @@ COMMON_GEAR_KEYS = (
 )
 BODY_KEYS = ("mass_kg", "inertia_kg_m2", "support")
 SYSTEM_KEYS = ("kind", "motor", "load")
-PROFILE_KEYS = ("speed_profile", "torque_profile")
 
 
 def read_spur_pair(config: Mapping[str, Any]) -> SpurPair:
@@ -51,7 +50,7 @@ def read_spur_pair(config: Mapping[str, Any]) -> SpurPair:
         mesh=read_mesh_options(section(config, "mesh")),
         pinion=_read_body(gears["pinion"], sides["pinion"], material),
         wheel=_read_body(gears["wheel"], sides["wheel"], material),
-        operating=_read_operating(section(config, "operating")),
+        operating=read_operating(section(config, "operating")),
         sensing=read_sensing(section(config, "sensing")),
         quality=read(Quality, section(config, "quality"), "quality"),
         solver=read(Solver, section(config, "solver"), "solver"),
@@ -118,12 +117,6 @@ def _read_rotor(place: str, values: Any) -> Rotor | None:
         return read(Rotor, values, "rotor")
     except ConfigError as error:
         raise ConfigError(f"{place}{str(error).removeprefix('rotor')}") from None
-
-
-def _read_operating(values: Mapping[str, Any]) -> Operating:
-    profiles = {key: read_profile(f"operating.{key}", values.get(key)) for key in PROFILE_KEYS}
-    plain = {key: value for key, value in values.items() if key not in PROFILE_KEYS}
-    return read(Operating, plain, "operating", **profiles)
 
 
 def _number(key: str, value: Any) -> float:
