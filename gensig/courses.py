@@ -21,7 +21,7 @@ Array = NDArray[np.float64]
 MOST_POINTS = 100_000
 LATEST = 1e6  # s
 SHORTEST_PIECE = 1e-3  # s; the integration takes the course as straight through every millisecond
-FASTEST_RIPPLE = 100.0  # Hz; ten pieces a period, which take sinc^2(0.1) of it: 3.3 % too little, the points are exact
+FASTEST_RIPPLE = 100.0  # Hz; ten pieces a period, which take sinc^2(0.1) of it: 3.2 % too little, the points are exact
 EARLIEST = -2.0  # s; a walk begins here, before any machine begins to settle
 POINTS_PER_CORRELATION_TIME = 20  # straight lines between points take 1.6 % of the variance
 WALK_LIMIT = 4.0  # standard deviations at which a walk is cut, so that its slowest is known; 6e-5 of the time
@@ -128,7 +128,7 @@ class RandomWalk:
         step = self.correlation_time / POINTS_PER_CORRELATION_TIME
         n_points = math.ceil((duration - EARLIEST) / step) + 2
         if n_points > MOST_POINTS:
-            least = POINTS_PER_CORRELATION_TIME * (duration - EARLIEST) / (MOST_POINTS - 2)
+            least = 1.01 * POINTS_PER_CORRELATION_TIME * (duration - EARLIEST) / (MOST_POINTS - 2)
             raise ConfigError(
                 f"correlation_time_s = {self.correlation_time:g} needs {n_points} points for {duration:g} s, more than "
                 f"{MOST_POINTS}; give {least:.3g} or more"
