@@ -10,6 +10,7 @@ from pathlib import Path
 from typing import Any
 
 from gensig.compose import compose, options, override_keys, typed_mapping
+from gensig.course_plan import settle_courses
 from gensig.errors import ConfigError
 from gensig.faults.registry import COMPOUND, fault_parts
 from gensig.systems.registry import SIDES
@@ -83,6 +84,7 @@ def read_request(overrides: Sequence[str], *, config_dir: str | Path | None = No
     plan["vary"] = {key: value for key, value in {**plan_option, **plan_vary}.items() if key not in typed}
     config = {**base, "fault": selected, "classes": classes}
     _reset_derived(config, set(typed) | set(plan["vary"]))
+    settle_courses(config, typed)
     return Request(config=config, overrides=as_typed)
 
 

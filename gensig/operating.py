@@ -3,61 +3,16 @@
 from __future__ import annotations
 
 import math
-import sys
-from dataclasses import dataclass
-from itertools import pairwise
-from typing import TYPE_CHECKING, Any
+from dataclasses import dataclass, replace
 
 import numpy as np
 from numpy.typing import NDArray
 
+from gensig.courses import FASTEST_RIPPLE, SHORTEST_PIECE, Profile, Ripple
 from gensig.errors import ConfigError
 from gensig.units import from_si, unit
 
-if TYPE_CHECKING:
-    from scipy.interpolate import PPoly
-
 Array = NDArray[np.float64]
-
-MOST_POINTS = 10_000
-LATEST = 1e6  # s
-SHORTEST_PIECE = 1e-3  # s; the integration takes the course as straight through every millisecond
-
-
-@dataclass(frozen=True, slots=True, kw_only=True)
-class Profile:
-    """A factor over time, piecewise linear; it holds its first value before its first time and its last value after.
-
-    ``times`` in s from the first recorded sample, ``factors`` as many shares of the set-point.
-    """
-
-    times: tuple[float, ...]
-    factors: tuple[float, ...]
-
-    def __post_init__(self) -> None:
-        n = len(self.times)
-        if n != len(self.factors):
-            raise ConfigError(f"{n} times and {len(self.factors)} factors; give one factor a time")
-        if not 2 <= n <= MOST_POINTS:
-            raise ConfigError(f"{n} points; give 2 to {MOST_POINTS}")
-        for place, (time, factor) in enumerate(zip(self.times, self.factors, strict=True)):
-            if not (abs(time) <= LATEST and math.isfinite(factor)):
-                raise ConfigError(
-                    f"point {place} = [{time:g}, {factor:g}]; give a time within {LATEST:g} s and a finite factor"
-                )
-        for earlier, later in pairwise(self.times):
-            if not later - earlier >= SHORTEST_PIECE * (1.0 - 1e-9):
-                raise ConfigError(
-                    f"the time {later:g} s follows {earlier:g} s; times must increase, by {SHORTEST_PIECE:g} s or more"
-                )
-
-    def curve(self) -> PPoly:
-        """The factor as a function of time in s; its derivative at a point is that of the piece that begins there."""
-        from scipy.interpolate import PPoly
-
-        times = np.array([self.times[0] - 1.0, *self.times, self.times[-1] + 1.0])
-        factors = np.array([self.factors[0], *self.factors, self.factors[-1]])
-        return PPoly([np.diff(factors) / np.diff(times), factors[:-1]], times)
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -81,7 +36,7 @@ class Operating:
 
     The driver is T = T_set + k (integral of the set speed - angle) + c (set speed - speed), with k and c giving
     ``drive_frequency`` and ``drive_damping_ratio`` on the inertia reduced to the pinion. The profiles are shares of
-    ``speed`` and ``torque``; None is constant.
+    ``speed`` and ``torque``, None is constant; the ripples are on top of them.
     """
 
     speed: float = unit("rpm")
@@ -91,6 +46,8 @@ class Operating:
     drive_damping_ratio: float
     speed_profile: Profile | None = None
     torque_profile: Profile | None = None
+    speed_ripple: Ripple | None = None
+    torque_ripple: Ripple | None = None
 
     def __post_init__(self) -> None:
         for key, suffix in (("speed", "rpm"), ("torque", "nm"), ("duration", "s"), ("drive_frequency", "hz")):
@@ -106,18 +63,69 @@ class Operating:
             raise ConfigError(
                 f"operating.torque_profile: factor {min(self.torque_profile.factors):g} must not be negative"
             )
+        for key, ripple in (("speed_ripple", self.speed_ripple), ("torque_ripple", self.torque_ripple)):
+            if ripple is not None:
+                self._check_ripple(f"operating.{key}", ripple)
 
-    def time_at_set_speed(self, times: Array) -> Array:
-        """Time in which the set speed would turn as far as the nominal motion turns from time 0, (time,) s."""
+    def _check_ripple(self, key: str, ripple: Ripple) -> None:
+        most = 1.0 if self.speed_profile is None else max(self.speed_profile.factors)
+        fastest = float(ripple.rate(np.array([most * self.speed]))[0]) / (2.0 * math.pi)
+        if fastest > FASTEST_RIPPLE:
+            told = "frequency_hz = " if ripple.order is None else f"order {ripple.order:g} makes up to "
+            raise ConfigError(
+                f"{key}: {told}{fastest:g} Hz, above {FASTEST_RIPPLE:g} Hz; the course runs straight through every "
+                f"{SHORTEST_PIECE * 1e3:g} ms, which is too coarse for it"
+            )
+
+    @property
+    def is_steady(self) -> bool:
+        """Whether neither speed nor torque changes."""
+        courses = (self.speed_profile, self.torque_profile, self.speed_ripple, self.torque_ripple)
+        return all(course is None for course in courses)
+
+    @property
+    def without_ripple(self) -> Operating:
+        """The same without what goes to and fro."""
+        return replace(self, speed_ripple=None, torque_ripple=None)
+
+    def earlier(self, lead: float, duration: float) -> Operating:
+        """The same courses as told by a record of ``duration`` s that begins ``lead`` s before this one."""
+        turned = -float(self._set_angle(np.array([-lead]))[0])
+        return replace(
+            self,
+            duration=duration,
+            speed_profile=None if self.speed_profile is None else self.speed_profile.later(lead),
+            torque_profile=None if self.torque_profile is None else self.torque_profile.later(lead),
+            speed_ripple=None if self.speed_ripple is None else self.speed_ripple.later(lead, turned),
+            torque_ripple=None if self.torque_ripple is None else self.torque_ripple.later(lead, turned),
+        )
+
+    def _profile_time(self, times: Array) -> Array:
+        """As ``time_at_set_speed``, of the profile alone, (time,) s."""
         if self.speed_profile is None:
             return times
         turned = self.speed_profile.curve().antiderivative()
         return np.asarray(turned(times) - turned(0.0))
 
+    def _set_angle(self, times: Array) -> Array:
+        """Angle of the pinion at the set speed without its ripple, (time,) rad since time 0."""
+        return self.speed * self._profile_time(times)
+
+    def time_at_set_speed(self, times: Array) -> Array:
+        """Time in which the set speed would turn as far as the nominal motion turns from time 0, (time,) s."""
+        smooth = self._profile_time(times)
+        if self.speed_ripple is None:
+            return smooth
+        return smooth + self.speed_ripple.gained(times, self.speed * smooth, self.speed, self.speed_profile)
+
     def nominal(self, times: Array) -> Nominal:
         """Nominal motion and torque at times in s from the first recorded sample, (time,)."""
         speed, speed_slope = _factor_and_slope(self.speed_profile, times)
         torque, torque_slope = _factor_and_slope(self.torque_profile, times)
+        if self.speed_ripple is not None or self.torque_ripple is not None:
+            angle, set_speed = self._set_angle(times), self.speed * speed
+            speed, speed_slope = _rippled(self.speed_ripple, speed, speed_slope, times, angle, set_speed)
+            torque, torque_slope = _rippled(self.torque_ripple, torque, torque_slope, times, angle, set_speed)
         return Nominal(
             angle=self.speed * self.time_at_set_speed(times),
             speed=self.speed * speed,
@@ -134,27 +142,12 @@ def _factor_and_slope(profile: Profile | None, times: Array) -> tuple[Array, Arr
     return curve(times), curve.derivative()(times)
 
 
-def read_profile(key: str, value: Any) -> Profile | None:
-    """Profile of a list of [time_s, factor] pairs, as a configuration has it; None for null.
-
-    Raises
-    ------
-    ConfigError    for anything else, naming ``key``
-    """
-    if value is None:
-        return None
-    if not isinstance(value, list | tuple):
-        raise ConfigError(f"{key} = {value!r} is no list; give [time_s, factor] pairs, or null for a constant")
-    for place, point in enumerate(value):
-        if not (isinstance(point, list | tuple) and len(point) == 2 and all(_is_number(one) for one in point)):
-            raise ConfigError(f"{key}: point {place} = {point!r}; give two finite numbers, [time_s, factor]")
-    try:
-        return Profile(
-            times=tuple(float(time) for time, _ in value), factors=tuple(float(factor) for _, factor in value)
-        )
-    except ConfigError as error:
-        raise ConfigError(f"{key}: {error}") from None
-
-
-def _is_number(value: Any) -> bool:
-    return isinstance(value, int | float) and not isinstance(value, bool) and abs(value) <= sys.float_info.max
+def _rippled(
+    ripple: Ripple | None, factor: Array, slope: Array, times: Array, set_angle: Array, set_speed: Array
+) -> tuple[Array, Array]:
+    """A factor and its slope with the ripple on them, (time,) each."""
+    if ripple is None:
+        return factor, slope
+    psi = ripple.psi(times, set_angle)
+    whole = 1.0 + ripple.share * np.sin(psi)
+    return factor * whole, slope * whole + factor * ripple.share * np.cos(psi) * ripple.rate(set_speed)

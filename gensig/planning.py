@@ -270,7 +270,8 @@ def record_bytes(config: Mapping[str, Any], *, as_stored: bool = False) -> int:
 
 def check_switches(config: Mapping[str, Any]) -> None:
     """Raise ConfigError for a switch of ``dataset`` that is neither true nor false."""
-    for key in ("store_clean", "store_source", "store_shaft_angle", "store_mesh_state", "store_detectability"):
+    switches = ("clean", "source", "shaft_angle", "operating", "mesh_state", "detectability")
+    for key in [f"store_{switch}" for switch in switches]:
         if not isinstance(config["dataset"][key], bool):
             raise ConfigError(f"dataset.{key} = {config['dataset'][key]!r} must be true or false")
 

@@ -22,6 +22,7 @@ from gensig.sensing.chain import detectability
 from gensig.sensing.instrument import Instrument, draw_instrument
 from gensig.sensing.manufacturing import Gearbox, Specimen, draw_gearbox, draw_specimen, with_damping_ratio
 from gensig.systems.lead_in import simulate_with_lead_in
+from gensig.systems.operation import operating_signals
 from gensig.systems.registry import read_system
 from gensig.systems.spur_pair import CleanRecord, Run, SpurPair, Start
 from gensig.units import from_si
@@ -37,6 +38,7 @@ FIXED_KEYS = (
     "sensing.sampling_rate_hz",
     "sensing.path.",
     "operating.duration_s",
+    "operating.turns",
     "plan.",
     "dataset.",
     "executor.",
@@ -189,6 +191,9 @@ def _finish(
     if config["dataset"]["store_shaft_angle"]:
         failed = np.full(n_samples, MISSING)
         signals["shaft_angle"] = failed if isinstance(result, SimulationError) else result.shaft_angle
+    if config["dataset"]["store_operating"]:
+        angle = np.full(n_samples, MISSING) if isinstance(result, SimulationError) else result.shaft_angle
+        signals |= operating_signals(system.operating, sensing.sampling_rate, angle)
     if config["dataset"]["store_mesh_state"]:
         signals |= _mesh_signals(result.mesh if isinstance(result, CleanRecord) else None, n_samples)
     columns = {key: value for key, value in row.items() if key not in ("shard", "row")}
@@ -239,6 +244,8 @@ def signal_shapes(config: Mapping[str, Any], system: SpurPair) -> dict[str, tupl
         shapes["acceleration_source"] = (len(system.sensing.channels), n_samples)
     if dataset["store_shaft_angle"]:
         shapes["shaft_angle"] = (n_samples,)
+    if dataset["store_operating"]:
+        shapes |= {"shaft_speed": (n_samples,), "torque_set": (n_samples,)}
     if dataset["store_mesh_state"]:
         shapes |= {name: values.shape for name, values in _mesh_signals(None, n_samples).items()}
     return shapes

@@ -126,8 +126,7 @@ def _nominal(lanes: Sequence[PairDynamics], span: tuple[float, float]) -> tuple[
 
     Speed and torque run straight through a cell; where neither changes there is one cell.
     """
-    steady = all(one.operating.speed_profile is None and one.operating.torque_profile is None for one in lanes)
-    if steady:
+    if all(one.operating.is_steady for one in lanes):
         profile = np.zeros((1, N_PROFILE, len(lanes)))
         profile[0, NOMINAL_SPEED], profile[0, TORQUE] = [one.operating.speed for one in lanes], 1.0
         return profile.ravel(), 0, 1.0

@@ -288,11 +288,11 @@ class PairDynamics:
     def static_start(self, time: float) -> Array:
         """Equilibrium at a nominal time: deflected supports and couplings, approach of the pairs in contact, (dof,).
 
-        Under a nominal acceleration it is that of the accelerated machine.
+        Under a nominal acceleration it is that of the accelerated machine; a ripple is too quick to be at rest with.
         """
         pair, system, (driver, driven) = self.table.pair, self.system(), self._ends
-        nominal = self.nominal(np.array([time]))
-        factor, acceleration = float(nominal.torque_factor[0]), float(nominal.acceleration[0])
+        nominal, smooth = (one.nominal(np.array([time])) for one in (self.operating, self.operating.without_ripple))
+        factor, acceleration = float(nominal.torque_factor[0]), float(smooth.acceleration[0])
         wheel_acceleration = acceleration / pair.ratio
         force = factor * self.mesh_force + wheel_acceleration * self.driven_inertia / pair.wheel.base_radius
         start = np.zeros(len(system.mass))

@@ -10,7 +10,6 @@ import numpy as np
 
 from gensig.dynamics.mesh_state import MeshState
 from gensig.errors import SimulationError
-from gensig.operating import Profile
 from gensig.systems.spur_pair import CleanRecord, Run, Start, simulate_together
 
 
@@ -37,12 +36,7 @@ def earlier(run: Run) -> Run:
     turned = operating.speed * float(operating.time_at_set_speed(np.array([-lead]))[0])
     pitches = start.phase + turned * pair.pinion.n_teeth / (2.0 * math.pi)
     teeth = math.floor(pitches)
-    longer = replace(
-        operating,
-        duration=(round(operating.duration * rate) + n_lead) / rate,
-        speed_profile=_later(operating.speed_profile, lead),
-        torque_profile=_later(operating.torque_profile, lead),
-    )
+    longer = operating.earlier(lead, (round(operating.duration * rate) + n_lead) / rate)
     return replace(
         run,
         system=replace(run.system, operating=longer),
@@ -52,10 +46,6 @@ def earlier(run: Run) -> Run:
             phase=pitches - teeth,
         ),
     )
-
-
-def _later(profile: Profile | None, lead: float) -> Profile | None:
-    return None if profile is None else replace(profile, times=tuple(time + lead for time in profile.times))
 
 
 def _cut(record: CleanRecord, run: Run) -> CleanRecord:

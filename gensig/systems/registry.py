@@ -12,9 +12,9 @@ from gensig.geometry.contact import GearPair
 from gensig.geometry.gear import Gear
 from gensig.material import Material
 from gensig.mesh.options import read_mesh_options
-from gensig.operating import Operating, read_profile
 from gensig.sensing.manufacturing import Quality
 from gensig.sensing.reading import read_sensing
+from gensig.systems.operation import read_operating
 from gensig.systems.spur_pair import SpurPair
 from gensig.systems.supports import AS_GIVEN, on_bearings, put_on_bearings, read_holding
 from gensig.units import read, to_si
@@ -29,7 +29,6 @@ COMMON_GEAR_KEYS = (
 )
 BODY_KEYS = ("mass_kg", "inertia_kg_m2", "support", "bearing", "shaft")
 SYSTEM_KEYS = ("kind", "supports", "motor", "load")
-PROFILE_KEYS = ("speed_profile", "torque_profile")
 
 
 def read_spur_pair(config: Mapping[str, Any]) -> SpurPair:
@@ -47,7 +46,7 @@ def read_spur_pair(config: Mapping[str, Any]) -> SpurPair:
             raise ConfigError(f"system: unknown key '{key}'; known: {', '.join(SYSTEM_KEYS)}")
     gears = {name: _read_gear(name, gear) for name in SIDES}
     pair = GearPair(**gears, backlash=_number("gear.backlash_um", gear["backlash_um"]))
-    operating = _read_operating(section(config, "operating"))
+    operating = read_operating(section(config, "operating"))
     quality = read(Quality, section(config, "quality"), "quality")
     quality.check_backlash(pair.backlash)
     bodies = {name: _read_body(gears[name], sides[name], material) for name in SIDES}
@@ -128,12 +127,6 @@ def _read_rotor(place: str, values: Any) -> Rotor | None:
         return read(Rotor, values, "rotor")
     except ConfigError as error:
         raise ConfigError(f"{place}{str(error).removeprefix('rotor')}") from None
-
-
-def _read_operating(values: Mapping[str, Any]) -> Operating:
-    profiles = {key: read_profile(f"operating.{key}", values.get(key)) for key in PROFILE_KEYS}
-    plain = {key: value for key, value in values.items() if key not in PROFILE_KEYS}
-    return read(Operating, plain, "operating", **profiles)
 
 
 def _number(key: str, value: Any) -> float:

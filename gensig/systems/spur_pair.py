@@ -257,9 +257,8 @@ class Run:
         """What runs that are simulated side by side share."""
         system = self.system
         operating = system.operating
-        steady = operating.speed_profile is None and operating.torque_profile is None
         sensing = (system.sensing.sampling_rate, system.sensing.channels, operating.duration)
-        machine = (system.motor is None, system.load is None, steady, self.tell_mesh)
+        machine = (system.motor is None, system.load is None, operating.is_steady, self.tell_mesh)
         return (*sensing, *machine, system.solver, system.mesh.law, system.mesh.roll_torque)
 
     def finer(self) -> Run:

@@ -12,9 +12,10 @@ from numpy.testing import assert_allclose
 from scipy.integrate import quad
 
 from gensig.config import read_request
+from gensig.courses import MOST_POINTS, Profile
 from gensig.errors import ConfigError
-from gensig.operating import MOST_POINTS, Profile, read_profile
 from gensig.records import record_system
+from gensig.systems.operation import read_profile
 from gensig.systems.registry import read_system
 
 POINTS = ((-0.2, 0.5), (0.3, 0.8), (0.7, 1.0), (1.0, 0.25))
@@ -130,12 +131,13 @@ class TestConfiguration:
     @pytest.mark.parametrize(
         ("value", "text"),
         [
-            (3, " = 3 is no list; give [time_s, factor] pairs, or null for a constant"),
+            (3, " = 3 is no list; give [time_s, factor] pairs, a group with a kind, or null for a constant"),
             ("ramp", " = 'ramp' is no list; give [time_s, factor] pairs"),
-            ({"a": 1}, " = {'a': 1} is no list; give [time_s, factor] pairs"),
-            ([], ": 0 points; give 2 to 10000"),
-            ([[0, 1]], ": 1 points; give 2 to 10000"),
-            ([[place, 1] for place in range(10_001)], ": 10001 points; give 2 to 10000"),
+            ({"a": 1}, ".kind = None; allowed: ramp, random_walk, file"),
+            ({"kind": "sine"}, ".kind = 'sine'; allowed: ramp, random_walk, file"),
+            ([], ": 0 points; give 2 to 100000"),
+            ([[0, 1]], ": 1 points; give 2 to 100000"),
+            ([[place, 1] for place in range(100_001)], ": 100001 points; give 2 to 100000"),
             ([0, 1], ": point 0 = 0; give two finite numbers, [time_s, factor]"),
             ([[0, 1], [1]], ": point 1 = [1]; give two finite numbers, [time_s, factor]"),
             ([[0, 1], [1, 1, 1]], ": point 1 = [1, 1, 1]; give two finite numbers"),

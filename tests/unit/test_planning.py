@@ -310,7 +310,8 @@ def typed(value):
 
 class TestRefusals:
     @pytest.mark.parametrize("key", ["gear.pinion.n_teeth", "seed", "operating.duration_s", "plan.n_records",
-                                     "sensing.sampling_rate_hz", "system.kind", "executor.n_workers"])  # fmt: skip
+                                     "sensing.sampling_rate_hz", "system.kind", "executor.n_workers",
+                                     "operating.turns"])  # fmt: skip
     def test_keys_of_the_whole_data_set(self, planned, key):
         vary = {key: {"distribution": "uniform", "low": 1, "high": 2}}
         with pytest.raises(ConfigError, match=re.escape(f"plan.vary: '{key}' is one value for a whole data set")):

@@ -1,0 +1,205 @@
+"""Courses over time: factors that are piecewise linear, ramp or wander, and the ripple on them."""
+
+from __future__ import annotations
+
+import itertools
+import math
+from dataclasses import dataclass, replace
+from typing import TYPE_CHECKING
+
+import numpy as np
+from numpy.typing import NDArray
+
+from gensig.errors import ConfigError
+from gensig.units import unit
+
+if TYPE_CHECKING:
+    from scipy.interpolate import PPoly
+
+Array = NDArray[np.float64]
+
+MOST_POINTS = 100_000
+LATEST = 1e6  # s
+SHORTEST_PIECE = 1e-3  # s; the integration takes the course as straight through every millisecond
+FASTEST_RIPPLE = 100.0  # Hz; ten pieces a period, which take sinc^2(0.1) of it: 3.2 % too little, the points are exact
+EARLIEST = -2.0  # s; a walk begins here, before any machine begins to settle
+POINTS_PER_CORRELATION_TIME = 20  # straight lines between points take 1.6 % of the variance
+WALK_LIMIT = 4.0  # standard deviations at which a walk is cut, so that its slowest is known; 6e-5 of the time
+MOST_SCATTER = 0.2
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class Profile:
+    """A factor over time, piecewise linear; it holds its first value before its first time and its last value after.
+
+    ``times`` in s from the first recorded sample, ``factors`` as many shares of the set-point.
+    """
+
+    times: tuple[float, ...]
+    factors: tuple[float, ...]
+
+    def __post_init__(self) -> None:
+        n = len(self.times)
+        if n != len(self.factors):
+            raise ConfigError(f"{n} times and {len(self.factors)} factors; give one factor a time")
+        if not 2 <= n <= MOST_POINTS:
+            raise ConfigError(f"{n} points; give 2 to {MOST_POINTS}")
+        for place, (time, factor) in enumerate(zip(self.times, self.factors, strict=True)):
+            if not (abs(time) <= LATEST and math.isfinite(factor)):
+                raise ConfigError(
+                    f"point {place} = [{time:g}, {factor:g}]; give a time within {LATEST:g} s and a finite factor"
+                )
+        for earlier, later in itertools.pairwise(self.times):
+            if not later - earlier >= SHORTEST_PIECE * (1.0 - 1e-9):
+                raise ConfigError(
+                    f"the time {later:g} s follows {earlier:g} s; times must increase, by {SHORTEST_PIECE:g} s or more"
+                )
+
+    @property
+    def least(self) -> float:
+        """The smallest factor."""
+        return min(self.factors)
+
+    def curve(self) -> PPoly:
+        """The factor as a function of time in s; its derivative at a point is that of the piece that begins there."""
+        from scipy.interpolate import PPoly
+
+        times = np.array([self.times[0] - 1.0, *self.times, self.times[-1] + 1.0])
+        factors = np.array([self.factors[0], *self.factors, self.factors[-1]])
+        return PPoly([np.diff(factors) / np.diff(times), factors[:-1]], times)
+
+    def later(self, delay: float) -> Profile:
+        """The same course, ``delay`` s later."""
+        return replace(self, times=tuple(time + delay for time in self.times))
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class Ramp:
+    """From one factor to another, in s from the first recorded sample; an ``end`` of None is that of the record."""
+
+    first_factor: float
+    last_factor: float
+    begin: float = unit("s", default=0.0)
+    end: float | None = unit("s", default=None)
+
+    @property
+    def least(self) -> float:
+        """The smallest factor."""
+        return min(self.first_factor, self.last_factor)
+
+    def profile(self, duration: float) -> Profile:
+        """The course of a record of ``duration`` s."""
+        end = duration if self.end is None else self.end
+        return Profile(times=(self.begin, end), factors=(self.first_factor, self.last_factor))
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class RandomWalk:
+    """A factor that wanders about 1 and comes back: an Ornstein-Uhlenbeck process.
+
+    ``scatter`` is its standard deviation, ``correlation_time`` in s the time after which its autocorrelation
+    exp(-|t| / correlation_time) has fallen to 1/e.
+
+    Source: Uhlenbeck & Ornstein (1930). Sampled exactly at even points (Gillespie 1996, eq. 1.9),
+    x_k+1 = rho x_k + sqrt(1 - rho^2) n_k with rho = exp(-step / correlation_time) and n_k standard normal; linear
+    between them.
+    """
+
+    scatter: float
+    correlation_time: float = unit("s")
+
+    def __post_init__(self) -> None:
+        if not 0.0 <= self.scatter <= MOST_SCATTER:
+            raise ConfigError(f"scatter = {self.scatter:g} must lie in 0..{MOST_SCATTER:g}")
+        least = POINTS_PER_CORRELATION_TIME * SHORTEST_PIECE
+        if not least <= self.correlation_time <= LATEST:
+            raise ConfigError(f"correlation_time_s = {self.correlation_time:g} must lie in {least:g}..{LATEST:g}")
+
+    @property
+    def least(self) -> float:
+        """The smallest factor that can be drawn."""
+        return 1.0 - WALK_LIMIT * self.scatter
+
+    def profile(self, duration: float, rng: np.random.Generator) -> Profile:
+        """A course for a record of ``duration`` s; that of a longer record goes on from it.
+
+        It is a function of the absolute time: where the simulation of a record begins does not change it.
+        """
+        step = self.correlation_time / POINTS_PER_CORRELATION_TIME
+        n_points = math.ceil((duration - EARLIEST) / step) + 2
+        if n_points > MOST_POINTS:
+            least = 1.01 * POINTS_PER_CORRELATION_TIME * (duration - EARLIEST) / (MOST_POINTS - 2)
+            raise ConfigError(
+                f"correlation_time_s = {self.correlation_time:g} needs {n_points} points for {duration:g} s, more than "
+                f"{MOST_POINTS}; give {least:.3g} or more"
+            )
+        rho = math.exp(-step / self.correlation_time)
+        fresh = math.sqrt(1.0 - rho * rho)
+        normal = rng.standard_normal(n_points).tolist()
+        walk = itertools.accumulate(normal, lambda value, draw: rho * value + fresh * draw)
+        factors = tuple(1.0 + self.scatter * min(max(value, -WALK_LIMIT), WALK_LIMIT) for value in walk)
+        return Profile(times=tuple(EARLIEST + step * place for place in range(n_points)), factors=factors)
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class Ripple:
+    """A course times 1 + ``share`` sin(psi): psi is ``order`` times the pinion's set angle, or of a fixed frequency.
+
+    The set angle is that of the speed without its ripple, 0 at the first recorded sample; ``frequency`` in Hz,
+    ``phase`` in rad is psi at the first recorded sample.
+    """
+
+    share: float
+    order: float | None = None
+    frequency: float | None = unit("hz", default=None)
+    phase: float = unit("deg", default=0.0)
+
+    def __post_init__(self) -> None:
+        if not 0.0 <= self.share < 1.0:
+            raise ConfigError(f"share = {self.share:g} must lie in 0..1, 1 not included")
+        if (self.order is None) == (self.frequency is None):
+            raise ConfigError("give order (of the pinion's turn) or frequency_hz, one of the two")
+        for key, value in (("order", self.order), ("frequency_hz", self.frequency)):
+            if value is not None and not value > 0.0:
+                raise ConfigError(f"{key} = {value:g} must be positive")
+
+    @property
+    def _fixed_rate(self) -> float:
+        """Circular frequency of a ripple that has one, else 0, rad/s."""
+        return 2.0 * math.pi * (self.frequency or 0.0)
+
+    def rate(self, speed: Array) -> Array:
+        """Growth of psi at set speeds of the pinion in rad/s, (time,) rad/s."""
+        return (self.order or 0.0) * speed + self._fixed_rate
+
+    def psi(self, times: Array, set_angle: Array) -> Array:
+        """The angle of the sine at times in s with their set angles in rad, (time,) rad."""
+        return (self.order or 0.0) * set_angle + self._fixed_rate * times + self.phase
+
+    def gained(self, times: Array, set_angle: Array, set_speed: float, profile: Profile | None) -> Array:
+        """Integral of profile x share x sin(psi) from time 0, (time,) s.
+
+        With an order it is share / (order set_speed) [-cos psi], since the set angle grows by profile x set_speed.
+        With a frequency, [-profile cos psi] / w and the integral by parts: on each piece the slope is constant.
+        """
+        if self.order is not None:
+            psi = self.psi(times, set_angle)
+            return self.share / (self.order * set_speed) * (math.cos(self.phase) - np.cos(psi))
+        rate = self._fixed_rate
+        course = profile or Profile(times=(0.0, 1.0), factors=(1.0, 1.0))
+        knots, factors = course.times, course.factors
+
+        def primitive(time: Array) -> Array:
+            held = np.clip(time, knots[0], knots[-1])
+            piece = np.clip(np.searchsorted(knots, held, side="right") - 1, 0, len(knots) - 2)
+            sine = np.sin(rate * np.array(knots) + self.phase) / rate
+            slope = np.diff(factors) / np.diff(knots)
+            before = np.concatenate([[0.0], np.cumsum(slope * np.diff(sine))])
+            partly = before[piece] + slope[piece] * (np.sin(rate * held + self.phase) / rate - sine[piece])
+            return np.asarray((partly - np.interp(time, knots, factors) * np.cos(rate * time + self.phase)) / rate)
+
+        return self.share * (primitive(np.asarray(times, dtype=np.float64)) - primitive(np.zeros(1)))
+
+    def later(self, delay: float, set_angle: float) -> Ripple:
+        """The same ripple, ``delay`` s and ``set_angle`` rad later."""
+        return replace(self, phase=self.phase - (self.order or 0.0) * set_angle - self._fixed_rate * delay)

@@ -1,0 +1,66 @@
+"""Data sets whose speed and load vary: the same promises, traces in the file, and the how-to's own commands."""
+
+import re
+import shlex
+import subprocess
+from pathlib import Path
+
+import numpy as np
+import pytest
+import yaml
+from small_sets import TINY, make
+
+from gensig.cli import main
+from gensig.dataset.reader import open_dataset
+
+HOWTO = Path(__file__).resolve().parents[2] / "docs" / "howto" / "operation.md"
+BLOCKS = re.findall(r"```sh\n(.*?)```", HOWTO.read_text(encoding="utf-8"), flags=re.DOTALL)
+SMALLER = {"plan.n_records=40": "plan.n_records=4", "plan.n_units=10": "plan.n_units=1"}
+
+
+@pytest.fixture(scope="module")
+def folder(tmp_path_factory):
+    return make(tmp_path_factory.mktemp("drifting") / "data", "operating=drifting", "dataset.store_operating=true")
+
+
+def test_generate_verify_reproduce(folder, capsys):
+    assert main(["verify", str(folder)]) == 0
+    assert main(["reproduce", str(folder), "--records", "2"]) == 0
+    assert "2 of 2 records have the same bits" in capsys.readouterr().out
+
+
+def test_the_traces_are_in_the_file(folder):
+    data = open_dataset(folder)
+    for name in ("shaft_speed", "torque_set"):
+        assert data.trace(0, name).shape == (1024,)
+    speed = np.array([data.trace(place, "shaft_speed").mean() for place in range(data.n_records)])
+    np.testing.assert_allclose(speed * 30 / np.pi, data.column("speed_rpm"), rtol=1e-4, atol=0)
+    assert len(np.unique(data.column("params/operating.course_seed"))) == 3
+
+
+def test_the_configuration_tells_the_duration_of_turns(tmp_path):
+    words = [word for word in TINY if not word.startswith("operating.")]
+    out = tmp_path / "data"
+    assert main(["generate", "--quiet", *words, "executor.n_workers=1", "operating.turns=1", f"out={out}"]) == 0
+    told = yaml.safe_load((out / "config.yaml").read_text(encoding="utf-8"))["operating"]
+    assert told["turns"] == 1
+    assert told["duration_s"] == pytest.approx(1 / 30, abs=1 / 51200)
+    assert open_dataset(out).signals(0).shape == (1, 1707)
+    assert main(["reproduce", str(out), "--records", "1"]) == 0
+
+
+@pytest.mark.parametrize("value", ["1", "null", "yes"])
+def test_the_switch_is_true_or_false(value, tmp_path, capsys):
+    assert main(["generate", *TINY, f"dataset.store_operating={value}", f"out={tmp_path / 'x'}"]) != 0
+    assert "dataset.store_operating = " in capsys.readouterr().err
+
+
+@pytest.mark.parametrize("block", BLOCKS, ids=range(len(BLOCKS)))
+def test_commands_of_the_howto(block, tmp_path, monkeypatch):
+    monkeypatch.chdir(tmp_path)
+    for line in block.strip().splitlines():
+        if line.startswith("gensig "):
+            words = [SMALLER.get(word, word) for word in shlex.split(line)[1:]]
+            assert main([*words, *(["executor.n_workers=1"] if "generate" in words else [])]) == 0
+        else:
+            subprocess.run(["bash", "-c", line], check=True)
