@@ -10,6 +10,7 @@ from numpy.testing import assert_allclose
 from gensig.errors import ConfigError
 from gensig.sensing.bearing_waviness import bearing_orders
 from gensig.sensing.nuisance import KINDS, draw_tones, read_nuisances
+from gensig.sensing.tones import SENSE
 
 PARTS = {
     "unbalance": {"kind": "unbalance", "gear": "pinion", "iso21940_grade": 2.5, "used_share": [1.0, 1.0],
@@ -77,8 +78,6 @@ def test_the_senses_are_those_of_the_equations_of_motion():
 
     With x to y as positive the moment is arm_x F - arm_y F_f = R_p F + rho_1 F_f, so the pinion turns from y to x.
     """
-    from gensig.sensing.tones import SENSE
-
     radius, rho, along, friction = 0.02, 0.005, 100.0, 7.0
     from_x_to_y = radius * along + rho * friction
     assert_allclose(SENSE["pinion"] * from_x_to_y, -along * radius - rho * friction, rtol=1e-12, atol=0)
