@@ -22,6 +22,7 @@ from gensig.sensing.chain import detectability
 from gensig.sensing.instrument import Instrument, draw_instrument
 from gensig.sensing.manufacturing import Gearbox, Specimen, draw_gearbox, draw_specimen, with_damping_ratio
 from gensig.systems.lead_in import simulate_with_lead_in
+from gensig.systems.nuisances import with_nuisances
 from gensig.systems.operation import operating_signals
 from gensig.systems.registry import read_system
 from gensig.systems.spur_pair import CleanRecord, Run, SpurPair, Start
@@ -59,6 +60,8 @@ class Stream(IntEnum):
     NOISE = 7
     PATH = 8
     SENSOR = 9
+    NUISANCE = 10
+    NUISANCE_RECORD = 11
     SUPPORT = 14
 
 
@@ -120,20 +123,24 @@ def simulate_records(config: Mapping[str, Any], rows: Sequence[Mapping[str, Any]
     # the same machines without their faults, to see what the faults change
     asked = config["dataset"]["store_detectability"]
     sound = {place: replace(run, faults=(), tell_mesh=False) for place, run in enumerate(runs) if asked and run.faults}
-    results = simulate_with_lead_in([*runs, *further, *sound.values()])
-    without = dict(zip(sound, results[len(runs) + len(further) :], strict=True))
+    everything = [*runs, *further, *sound.values()]
+    results = simulate_with_lead_in(everything)
+    last = zip(sound, results[len(runs) + len(further) :], strict=True)
+    without = {place: shaken(config, rows[place], runs[place], result) for place, result in last}
     kept = {key: found for key in keys if (found := _TWINS.get(key)) is not None}
     _TWINS.clear()
     _TWINS.update(kept)
     for key, place in places.items():
-        twin, sharing = results[place], keys.index(key)
+        sharing = keys.index(key)
+        twin = shaken(config, rows[sharing], everything[place], results[place], twin=True)
         instrument = row_instrument(config, machines[sharing], rows[sharing])
         _TWINS[key] = (
             twin if isinstance(twin, SimulationError) else instrument.power(instrument.measure(twin.acceleration))
         )
+    own = [shaken(config, row, run, result) for row, run, result in zip(rows, runs, results, strict=False)]
     return [
         _finish(config, system, row, key, result, without.get(place, result) if asked else None)
-        for place, (system, row, key, result) in enumerate(zip(machines, rows, keys, results[: len(rows)], strict=True))
+        for place, (system, row, key, result) in enumerate(zip(machines, rows, keys, own, strict=True))
     ]
 
 
@@ -300,6 +307,27 @@ def row_instrument(config: Mapping[str, Any], system: SpurPair, row: Mapping[str
     seed, gearbox = read_seed(config), int(str(row["gearbox_id"]).rpartition("-")[2])
     causes = (stream(seed, cause, gearbox) for cause in (Stream.PATH, Stream.SENSOR))
     return draw_instrument(system.sensing, *causes)
+
+
+def shaken(
+    config: Mapping[str, Any],
+    row: Mapping[str, Any],
+    run: Run,
+    result: CleanRecord | SimulationError,
+    twin: bool = False,
+) -> CleanRecord | SimulationError:
+    """A motion with the nuisances of its unit.
+
+    Angles that no tooth tells are drawn for the record; those of a healthy twin for its condition, so that they do not
+    depend on which record asks for it first.
+    """
+    if isinstance(result, SimulationError) or not run.system.sensing.nuisances:
+        return result
+    seed = read_seed(config)
+    own, name = (Stream.TWIN, "condition_id") if twin else (Stream.NUISANCE_RECORD, "record_id")
+    place = {key: int(str(row[key]).rpartition("-")[2].lstrip("r")) for key in ("gearbox_id", "specimen_id", name)}
+    units = {level: stream(seed, Stream.NUISANCE, place[f"{level}_id"]) for level in ("gearbox", "specimen")}
+    return with_nuisances(run, result, units, stream(seed, own, place[name]))
 
 
 TwinKey = tuple[str, str]

@@ -28,6 +28,7 @@ from gensig.records import (
     row_instrument,
     row_run,
     row_values,
+    shaken,
     simulate_record,
     simulate_records,
     stream,
@@ -128,7 +129,8 @@ def simulate_twin(config: Mapping[str, Any], row: Mapping[str, Any]) -> Record:
         # noise follows the record, so that the twin alone would have another
         system = record_system(config, row_values(row))
         instrument = row_instrument(config, system, row)
-        (healthy,) = simulate_with_lead_in([row_run(sham, system, row)])
+        run = row_run(sham, system, row)
+        healthy = shaken(config, row, run, simulate_with_lead_in([run])[0])
         if isinstance(healthy, SimulationError):
             raise healthy
         rng = stream(read_seed(config), Stream.NOISE, int(str(row["record_id"]).lstrip("r")))

@@ -214,6 +214,11 @@ class PairDynamics:
         """Mean tangent stiffness of sound teeth over one base pitch under the set torque, N/m."""
         return _mean_mesh_stiffness(self.table, self.mesh_force)
 
+    @property
+    def mesh_damping(self) -> float:
+        """Damper along the line of action that the mesh's damping is on average, N s/m."""
+        return 2.0 * self.table.options.damping_ratio * math.sqrt(self.mean_mesh_stiffness * self.equivalent_mass)
+
     @cached_property
     def stiff_rates(self) -> NDArray[np.complex128]:
         """Eigenvalues with the mesh held somewhat above its mean stiffness, 1/s."""
@@ -222,7 +227,7 @@ class PairDynamics:
     def numbers(self, step: float, rest: Array) -> tuple[float, ...]:
         """The mesh as numbers, in the order of the rows of ``_layout.Group.numbers``."""
         table, options, pair = self.table, self.table.options, self.table.pair
-        viscous = 2.0 * options.damping_ratio * math.sqrt(self.mean_mesh_stiffness * self.equivalent_mass)
+        viscous = self.mesh_damping
         return (
             pair.pinion.base_radius,
             pair.wheel.base_radius,

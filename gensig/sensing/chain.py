@@ -14,6 +14,7 @@ from gensig.errors import ConfigError
 from gensig.sensing.accelerometer import Accelerometer
 from gensig.sensing.measured_path import ImpulseResponses, MeasuredPath, read_responses
 from gensig.sensing.noise import Background, Noise, Place, ThroughPath
+from gensig.sensing.tones import Nuisance
 from gensig.sensing.transfer_path import ModalPath
 from gensig.units import unit
 
@@ -31,7 +32,7 @@ class Sensing:
     ``channels`` are the simulated accelerations. Without a ``path`` they are what the sensors feel; else it leads from
     them to the ``sensors``. ``snr`` in dB; None records without noise. Its reference is the power of the same unit at
     the same condition without the fault (``healthy_twin``), so the floor cannot tell the class. None for ``sensor``
-    and ``noise``: an ideal one, and white noise over the whole band.
+    and ``noise``: an ideal one, and white noise over the whole band. ``nuisances`` shake the bearings of every class.
     """
 
     sampling_rate: float = unit("hz")
@@ -43,6 +44,7 @@ class Sensing:
     path: ModalPath | MeasuredPath | None = None
     sensor: Accelerometer | None = None
     noise: Noise | None = None
+    nuisances: tuple[Nuisance, ...] = ()
 
     def __post_init__(self) -> None:
         if not 1000.0 <= self.sampling_rate <= 1e6:

@@ -10,12 +10,13 @@ from gensig.sensing.accelerometer import Accelerometer
 from gensig.sensing.chain import Sensing
 from gensig.sensing.measured_path import MeasuredPath
 from gensig.sensing.noise import read_noise
+from gensig.sensing.nuisance import read_nuisances
 from gensig.sensing.transfer_path import ModalPath
 from gensig.units import read
 
 IDENTITY = "identity"
 PATHS: dict[str, type[ModalPath] | type[MeasuredPath]] = {"modal": ModalPath, "measured": MeasuredPath}
-NESTED = ("path", "sensor", "noise")
+NESTED = ("path", "sensor", "noise", "nuisances")
 
 
 def read_sensing(values: Mapping[str, Any]) -> Sensing:
@@ -35,6 +36,7 @@ def read_sensing(values: Mapping[str, Any]) -> Sensing:
         path=_read_path(values["path"]),
         sensor=read(Accelerometer, values["sensor"], "sensing.sensor"),
         noise=read_noise(values["noise"]),
+        nuisances=read_nuisances(values["nuisances"]),
     )
 
 

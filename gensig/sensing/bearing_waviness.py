@@ -1,0 +1,112 @@
+"""The tones of a sound ball bearing: its orders, and the waviness that drives them."""
+
+from __future__ import annotations
+
+import math
+from dataclasses import dataclass
+
+import numpy as np
+
+from gensig.dynamics.pair import PairDynamics
+from gensig.errors import ConfigError
+from gensig.sensing.tones import (
+    MOST_HARMONICS,
+    TURN,
+    Nuisance,
+    Tones,
+    check_number,
+    check_range,
+    fixed,
+    logarithmic,
+    make_tones,
+    turning,
+    uniform,
+)
+from gensig.units import unit
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class BearingOrders:
+    """Turns and passages per turn of the inner ring, the outer one at rest."""
+
+    cage: float
+    outer_race: float
+    inner_race: float
+    ball: float
+
+
+def bearing_orders(
+    n_balls: int, ball_diameter: float, pitch_diameter: float, contact_angle: float, slip: float = 0.0
+) -> BearingOrders:
+    """Orders of a ball bearing whose cage lags by the share ``slip`` and whose balls roll on the outer race.
+
+    Source: kinematics as in Harris & Kotzalas (2007), Essential Concepts of Bearing Technology, ch. 8.
+    """
+    ratio = ball_diameter / pitch_diameter * math.cos(contact_angle)
+    cage = 0.5 * (1.0 - ratio) * (1.0 - slip)
+    return BearingOrders(
+        cage=cage,
+        outer_race=n_balls * cage,
+        inner_race=n_balls * (1.0 - cage),
+        ball=cage * (1.0 + ratio) * pitch_diameter / ball_diameter,
+    )
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class Bearing(Nuisance):
+    """The waviness of a sound ball bearing, which pushes with the stiffness of the gear's support.
+
+    Four families: the outer race as balls pass it, k BPFO in a fixed direction; the inner race, k BPFI plus and minus
+    one shaft order, forward and backward; the balls, 2 k BSF plus and minus one cage order; balls of unlike size, one
+    force that turns with the cage. Harmonic k has k^-p of the family's waviness (uniform in its logarithm), p the
+    ``harmonic_exponent``. Slip of the cage (uniform) and the angles of cage and balls are drawn for the record.
+
+    Source: orders as in Wensing (1998), On the dynamics of ball bearings, ch. 2.
+    """
+
+    n_balls: int
+    ball_diameter: float = unit("mm")
+    pitch_diameter: float = unit("mm")
+    contact_angle: float = unit("deg")
+    waviness: tuple[float, ...] = unit("um")
+    slip: tuple[float, ...]
+    n_harmonics: int
+    harmonic_exponent: float
+
+    def __post_init__(self) -> None:
+        Nuisance.__post_init__(self)
+        check_number("n_balls", self.n_balls, 3, 200)
+        check_number("ball_diameter_mm", self.ball_diameter, 1e-4, 1.0)
+        check_number("pitch_diameter_mm", self.pitch_diameter, 1e-3, 10.0)
+        if not self.n_balls * self.ball_diameter < math.pi * self.pitch_diameter:
+            raise ConfigError(
+                f"{self.n_balls} balls of ball_diameter_mm = {1e3 * self.ball_diameter:g} do not fit on "
+                f"pitch_diameter_mm = {1e3 * self.pitch_diameter:g}"
+            )
+        check_number("contact_angle_deg", self.contact_angle, 0.0, math.radians(60.0))
+        check_range("waviness_um", self.waviness, 1e-10, 1e-4)
+        check_range("slip", self.slip, 0.0, 0.2)
+        check_number("n_harmonics", self.n_harmonics, 1, MOST_HARMONICS)
+        check_number("harmonic_exponent", self.harmonic_exponent, 0.0, 10.0)
+
+    def draw(self, unit_rng: np.random.Generator, record_rng: np.random.Generator, dynamics: PairDynamics) -> Tones:
+        """As ``Nuisance.draw``."""
+        n, count = self.n_balls, self.n_harmonics
+        outer, inner, ball, cage = (logarithmic(unit_rng, self.waviness) for _ in range(4))
+        along = fixed(TURN * unit_rng.random())
+        phases = TURN * unit_rng.random((5, MOST_HARMONICS))  # as many whatever n_harmonics is
+        slip, cage_angle, ball_angle = uniform(record_rng, self.slip), *(TURN * record_rng.random(2))
+        orders = bearing_orders(n, self.ball_diameter, self.pitch_diameter, self.contact_angle, slip)
+        forward, backward = turning(self.gear), turning(self.gear).conj()
+        multiples, forces = [(0, 1, 0)], [cage * np.exp(1j * phases[0, 0]) * forward]
+        for k in range(1, count + 1):
+            size = k**-self.harmonic_exponent * np.exp(1j * phases[:, k - 1])
+            multiples += [(0, k * n, 0), (k * n + 1, -k * n, 0), (k * n - 1, -k * n, 0), (0, 1, 2 * k), (0, -1, 2 * k)]
+            forces += [size[0] * outer * along, size[1] * inner * forward, size[2] * inner * backward]
+            forces += [size[3] * ball * forward, size[4] * ball * backward]
+        begin = np.exp(1j * np.array(multiples) @ np.array([0.0, cage_angle, ball_angle]))
+        support = getattr(dynamics, self.gear).support
+        stiffness = np.array([support.stiffness_x, support.stiffness_y, 0.0])
+        return make_tones(
+            self.gear, [1.0, orders.cage, orders.ball], multiples, begin[:, None] * forces * stiffness, "nothing"
+        )

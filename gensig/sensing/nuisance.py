@@ -1,0 +1,232 @@
+"""What a sound machine shakes with beside its mesh: forces at orders of its shafts, drawn alike for every class."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Mapping
+from dataclasses import dataclass
+from typing import Any, ClassVar
+
+import numpy as np
+
+from gensig.dynamics.pair import PairDynamics
+from gensig.errors import ConfigError
+from gensig.sensing.bearing_waviness import Bearing
+from gensig.sensing.tones import (
+    MOST_HARMONICS,
+    SENSE,
+    TURN,
+    Nuisance,
+    Tones,
+    check_number,
+    check_range,
+    fixed,
+    logarithmic,
+    make_tones,
+    shaft,
+    turning,
+    uniform,
+)
+from gensig.units import read, to_si, unit
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class Unbalance(Nuisance):
+    """A residual unbalance that turns with the shaft, at a fixed angle from tooth 0 of its gear.
+
+    The residual is a share, uniform in ``used_share``, of what the grade permits at ``rated_speed`` of the pinion.
+    ``rotor_mass`` is that of all that turns with the gear; None takes the gear's.
+
+    Source: ISO 21940-11, 4.4: e w = G mm/s at the highest speed of service; the force is m e w^2.
+    """
+
+    level: ClassVar[str] = "specimen"
+    iso21940_grade: float
+    used_share: tuple[float, ...]
+    rated_speed: float = unit("rpm")
+    rotor_mass: float | None = unit("kg")
+
+    def __post_init__(self) -> None:
+        Nuisance.__post_init__(self)
+        check_number("iso21940_grade", self.iso21940_grade, 0.1, 4000.0)
+        check_range("used_share", self.used_share, 0.0, 1.0)
+        check_number("rated_speed_rpm", self.rated_speed, to_si("rated_speed_rpm", 1.0), to_si("rated_speed_rpm", 1e6))
+        if self.rotor_mass is not None:
+            check_number("rotor_mass_kg", self.rotor_mass, 1e-3, 1e5)
+
+    def draw(self, unit_rng: np.random.Generator, record_rng: np.random.Generator, dynamics: PairDynamics) -> Tones:
+        """As ``Nuisance.draw``."""
+        share, angle = uniform(unit_rng, self.used_share), TURN * unit_rng.random()
+        eccentricity = share * 1e-3 * self.iso21940_grade / (self.rated_speed * shaft(dynamics, self.gear).speed_ratio)
+        mass = getattr(dynamics, self.gear).mass if self.rotor_mass is None else self.rotor_mass
+        force = mass * eccentricity * shaft(dynamics, self.gear).speed ** 2
+        rotating = np.exp(1j * angle) * force * turning(self.gear)
+        return make_tones(self.gear, [1.0], [[1]], [rotating], "speed_squared")
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class CouplingMisalignment(Nuisance):
+    """Reactions of a misaligned coupling: radial at 1, 2, ... times the shaft in a fixed direction, torque at twice.
+
+    ``force_share`` of the mean mesh force is drawn uniformly in its logarithm; order k has ``order_shares[k - 1]`` of
+    it. ``torque_share`` of the shaft's torque is drawn uniformly.
+
+    Source: orders and direction as in Gibbons (1976) and Xu & Marangoni (1994); a universal joint at an angle b turns
+    its shaft unevenly by b^2 / 2 at twice the speed.
+    """
+
+    force_share: tuple[float, ...]
+    order_shares: tuple[float, ...]
+    torque_share: tuple[float, ...]
+
+    def __post_init__(self) -> None:
+        Nuisance.__post_init__(self)
+        check_range("force_share", self.force_share, 1e-6, 1.0)
+        check_range("torque_share", self.torque_share, 0.0, 1.0)
+        check_number("number of order_shares", len(self.order_shares), 1, MOST_HARMONICS)
+        for share in self.order_shares:
+            check_number("order_shares", share, 0.0, 100.0)
+
+    def draw(self, unit_rng: np.random.Generator, record_rng: np.random.Generator, dynamics: PairDynamics) -> Tones:
+        """As ``Nuisance.draw``."""
+        radial = logarithmic(unit_rng, self.force_share) * dynamics.mesh_force
+        torque = uniform(unit_rng, self.torque_share) * shaft(dynamics, self.gear).torque
+        along, twist = fixed(TURN * unit_rng.random()), np.array([0.0, 0.0, 1.0])
+        twisting = torque * np.exp(1j * TURN * unit_rng.random()) * twist
+        phases = np.exp(1j * TURN * unit_rng.random(len(self.order_shares)))
+        forces = [radial * share * phase * along for share, phase in zip(self.order_shares, phases, strict=True)]
+        orders = [[k + 1] for k in range(len(forces))]
+        return make_tones(self.gear, [1.0], [[2], *orders], [twisting, *forces], "torque")
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class Looseness(Nuisance):
+    """A loose seat or foot: harmonics of the shaft up to ``n_orders`` and the half orders between, in one direction.
+
+    ``force_share`` of the mean mesh force, uniform in its logarithm, is the amplitude of order 1; order k has k^-p of
+    it with p the ``harmonic_exponent``, half orders ``half_share`` (uniform) of that; order 1/2 counts as 1. Which of
+    two turns a record begins in is drawn for the record.
+
+    Source: orders as in Goldman & Muszynska (1999).
+    """
+
+    force_share: tuple[float, ...]
+    half_share: tuple[float, ...]
+    n_orders: int
+    harmonic_exponent: float
+
+    def __post_init__(self) -> None:
+        Nuisance.__post_init__(self)
+        check_range("force_share", self.force_share, 1e-6, 1.0)
+        check_range("half_share", self.half_share, 0.0, 1.0)
+        check_number("n_orders", self.n_orders, 1, MOST_HARMONICS)
+        check_number("harmonic_exponent", self.harmonic_exponent, 0.0, 10.0)
+
+    def draw(self, unit_rng: np.random.Generator, record_rng: np.random.Generator, dynamics: PairDynamics) -> Tones:
+        """As ``Nuisance.draw``."""
+        level = logarithmic(unit_rng, self.force_share) * dynamics.mesh_force
+        half_share, along = uniform(unit_rng, self.half_share), fixed(TURN * unit_rng.random())
+        halves = np.arange(1, 2 * self.n_orders + 1)
+        is_half = halves % 2 == 1
+        size = np.where(is_half, half_share, 1.0) * np.maximum(0.5 * halves, 1.0) ** -self.harmonic_exponent
+        second_turn = math.pi * halves * int(record_rng.integers(2))
+        phase = np.exp(1j * (TURN * unit_rng.random(len(halves)) + second_turn))
+        return make_tones(self.gear, [0.5], halves[:, None], level * (size * phase)[:, None] * along, "torque")
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class NeighbourMesh(Nuisance):
+    """The mesh of another stage whose one gear sits on this gear's shaft.
+
+    It carries the shaft's torque on ``base_radius``, along a line of action at ``line_of_action`` from this gear's x.
+    ``dynamic_share`` of that mean force, uniform in its logarithm, is the amplitude of the first harmonic; harmonic k
+    has k^-p of it, p the ``harmonic_exponent``, and each one sideband of ``sideband_share`` (uniform) of that on either
+    side at one order of either shaft. Where the mate's teeth stand is drawn for the record.
+    """
+
+    n_teeth: int
+    n_teeth_mate: int
+    base_radius: float = unit("mm")
+    line_of_action: float = unit("deg")
+    dynamic_share: tuple[float, ...]
+    n_harmonics: int
+    harmonic_exponent: float
+    sideband_share: tuple[float, ...]
+
+    def __post_init__(self) -> None:
+        Nuisance.__post_init__(self)
+        for key in ("n_teeth", "n_teeth_mate"):
+            check_number(key, getattr(self, key), 5, 1000)
+        check_number("base_radius_mm", self.base_radius, 1e-3, 10.0)
+        check_number("line_of_action_deg", self.line_of_action, -TURN, TURN)
+        check_range("dynamic_share", self.dynamic_share, 1e-6, 1.0)
+        check_number("n_harmonics", self.n_harmonics, 1, MOST_HARMONICS)
+        check_number("harmonic_exponent", self.harmonic_exponent, 0.0, 10.0)
+        check_range("sideband_share", self.sideband_share, 0.0, 1.0)
+
+    def draw(self, unit_rng: np.random.Generator, record_rng: np.random.Generator, dynamics: PairDynamics) -> Tones:
+        """As ``Nuisance.draw``."""
+        level = logarithmic(unit_rng, self.dynamic_share) * shaft(dynamics, self.gear).torque / self.base_radius
+        sideband, phases = uniform(unit_rng, self.sideband_share), TURN * unit_rng.random((5, MOST_HARMONICS))
+        mate_angle = TURN * record_rng.random()
+        along = fixed(self.line_of_action)
+        # the next stage's force holds the wheel's shaft back, that of the stage before drives the pinion's
+        along[2] = -SENSE[self.gear] * self.base_radius
+        offsets = np.array([(0, 0), (1, 0), (-1, 0), (0, 1), (0, -1)])
+        weight = np.array([1.0, sideband, sideband, sideband, sideband])
+        harmonic = np.arange(1, self.n_harmonics + 1)
+        multiples = offsets[:, None] + harmonic[:, None] * np.array([self.n_teeth, 0])  # (offset, harmonic, base)
+        size = weight[:, None] * harmonic**-self.harmonic_exponent
+        phase = phases[:, : self.n_harmonics] + offsets[:, 1, None] * mate_angle
+        force = level * (size * np.exp(1j * phase))[:, :, None] * along
+        orders = [1.0, self.n_teeth / self.n_teeth_mate]
+        return make_tones(self.gear, orders, multiples.reshape(-1, 2), force.reshape(-1, 3), "torque")
+
+
+KINDS: dict[str, type[Nuisance]] = {
+    "unbalance": Unbalance,
+    "coupling_misalignment": CouplingMisalignment,
+    "looseness": Looseness,
+    "bearing": Bearing,
+    "neighbour_mesh": NeighbourMesh,
+}
+
+
+def read_nuisances(values: Any) -> tuple[Nuisance, ...]:
+    """Nuisances of a configuration.
+
+    Raises
+    ------
+    ConfigError    for unknown kinds, keys or values, naming the part
+    """
+    where = "sensing.nuisances"
+    if not isinstance(values, list | tuple):
+        raise ConfigError(f"{where} = {values!r} must be a list of parts, [] for none; see sensing=machine")
+    parts = []
+    for number, part in enumerate(values):
+        place = f"{where}[{number}]"
+        kind = part.get("kind") if isinstance(part, Mapping) else None
+        if kind not in KINDS:
+            raise ConfigError(f"{place}: kind = {kind!r}; allowed: {', '.join(KINDS)}")
+        try:
+            parts.append(read(KINDS[kind], {key: value for key, value in part.items() if key != "kind"}, place))
+        except ConfigError as error:
+            text = str(error)
+            raise ConfigError(text if text.startswith(place) else f"{place}.{text}") from None
+    return tuple(parts)
+
+
+def draw_tones(
+    nuisances: tuple[Nuisance, ...],
+    dynamics: PairDynamics,
+    units: Mapping[str, np.random.Generator],
+    record_rng: np.random.Generator,
+) -> list[Tones]:
+    """Forces of every part, each from random numbers of its own, so that a part more at the end changes none.
+
+    ``units`` has one generator a level, ``record_rng`` is that of the record.
+    """
+    count = len(nuisances)
+    own = {level: rng.spawn(count) for level, rng in units.items()}
+    phases = record_rng.spawn(count)
+    return [part.draw(own[part.level][place], phases[place], dynamics) for place, part in enumerate(nuisances)]

@@ -1,0 +1,128 @@
+"""What a nuisance is: forces on one gear that follow angles of its machine, and how they are drawn."""
+
+from __future__ import annotations
+
+import math
+from abc import ABC, abstractmethod
+from dataclasses import dataclass
+from typing import Any, ClassVar
+
+import numpy as np
+from numpy.typing import NDArray
+
+from gensig.dynamics.pair import PairDynamics
+from gensig.errors import ConfigError
+from gensig.units import from_si
+
+Array = NDArray[np.float64]
+Complex = NDArray[np.complex128]
+
+# From x to y is +1. The pinion turns the other way: its friction moment is -rho F_f for a force +F_f along its x.
+SENSE = {"pinion": -1.0, "wheel": 1.0}
+TURN = 2.0 * math.pi
+MOST_HARMONICS = 50
+
+
+@dataclass(frozen=True, slots=True, kw_only=True, eq=False)
+class Tones:
+    """Forces on one gear that follow angles: of its shaft, of what rolls on it, of what it drives.
+
+    Each of ``base`` (base,) is an angle's order, its turns per turn of the gear's shaft. Tone t is
+    Re(force_t e^(i phase_t)), where the phase is the sum of ``multiple`` (tone, base) times base times the shaft's
+    angle from its tooth 0 on. ``force`` (tone, 3) acts on the gear's x and y in N and on its rotation in N m; it is
+    that at the set speed and torque, and grows as ``follows`` says: speed_squared, torque or nothing.
+    """
+
+    gear: str
+    base: Array
+    multiple: NDArray[np.int64]
+    force: Complex
+    follows: str
+
+    @property
+    def order(self) -> Array:
+        """Order of every tone, (tone,) of the gear's shaft."""
+        return np.asarray(self.multiple @ self.base)
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class Nuisance(ABC):
+    """One cause of vibration at one gear's shaft. Ranges are [low, high]; both ends alike give one value.
+
+    ``level`` says what the machine's part of it is drawn for: the gearbox, or the specimen, a set of gears.
+    """
+
+    level: ClassVar[str] = "gearbox"
+    gear: str
+
+    def __post_init__(self) -> None:
+        if self.gear not in SENSE:
+            raise ConfigError(f"gear = {self.gear!r}; allowed: {', '.join(SENSE)}")
+
+    @abstractmethod
+    def draw(self, unit_rng: np.random.Generator, record_rng: np.random.Generator, dynamics: PairDynamics) -> Tones:
+        """The forces of one unit, and what differs from one of its records to the next: angles that no tooth tells."""
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class Shaft:
+    """Speed in rad/s, its share of the pinion's, and torque in N m of one gear's shaft at the set point."""
+
+    speed: float
+    speed_ratio: float
+    torque: float
+
+
+def shaft(dynamics: PairDynamics, gear: str) -> Shaft:
+    """The shaft of one gear at the set point."""
+    ratio = 1.0 if gear == "pinion" else 1.0 / dynamics.table.pair.ratio
+    operating = dynamics.operating
+    return Shaft(speed=ratio * operating.speed, speed_ratio=ratio, torque=operating.torque / ratio)
+
+
+def make_tones(gear: str, base: list[float], multiple: Any, force: Any, follows: str) -> Tones:
+    """Tones of anything that arrays are made of."""
+    return Tones(
+        gear=gear,
+        base=np.array(base),
+        multiple=np.array(multiple, dtype=np.int64),
+        force=np.array(force, dtype=np.complex128),
+        follows=follows,
+    )
+
+
+def turning(gear: str) -> Complex:
+    """A unit force that turns with the shaft: along x first, a quarter of a turn later along y by the gear's sense."""
+    return np.array([1.0, -1j * SENSE[gear], 0.0])
+
+
+def fixed(angle: float) -> Array:
+    """A unit force in a fixed direction, from x towards y."""
+    return np.array([math.cos(angle), math.sin(angle), 0.0])
+
+
+def uniform(rng: np.random.Generator, ends: tuple[float, ...]) -> float:
+    """One number between two ends."""
+    return float(rng.uniform(ends[0], ends[1]))
+
+
+def logarithmic(rng: np.random.Generator, ends: tuple[float, ...]) -> float:
+    """One number between two ends, uniform in its logarithm."""
+    return math.exp(rng.uniform(math.log(ends[0]), math.log(ends[1])))
+
+
+def check_number(key: str, value: float, least: float, most: float) -> None:
+    """ConfigError for an SI value out of bounds; ``key`` is its name at the file boundary, with its unit."""
+    if not least <= value <= most:
+        low, given, high = (f"{from_si(key, one):g}" for one in (least, value, most))
+        raise ConfigError(f"{key} = {given} must lie in {low}..{high}")
+
+
+def check_range(key: str, ends: tuple[float, ...], least: float, most: float) -> None:
+    """The same for a range of two ordered ends."""
+    if len(ends) != 2 or not least <= ends[0] <= ends[1] <= most:
+        shown = [float(f"{from_si(key, end):g}") for end in ends]
+        raise ConfigError(
+            f"{key} = {shown} must be two ordered numbers, [low, high], in {from_si(key, least):g}.."
+            f"{from_si(key, most):g}"
+        )

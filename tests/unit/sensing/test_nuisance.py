@@ -1,0 +1,211 @@
+"""Nuisances by hand: orders, sizes, directions, what is drawn for whom, and bad input."""
+
+import math
+import re
+
+import numpy as np
+import pytest
+from numpy.testing import assert_allclose
+
+from gensig.errors import ConfigError
+from gensig.sensing.bearing_waviness import bearing_orders
+from gensig.sensing.nuisance import KINDS, draw_tones, read_nuisances
+from gensig.sensing.tones import SENSE
+
+PARTS = {
+    "unbalance": {"kind": "unbalance", "gear": "pinion", "iso21940_grade": 2.5, "used_share": [1.0, 1.0],
+                  "rated_speed_rpm": 3000, "rotor_mass_kg": 2.0},
+    "coupling_misalignment": {"kind": "coupling_misalignment", "gear": "pinion", "force_share": [0.01, 0.01],
+                              "order_shares": [0.5, 1.0, 0.3], "torque_share": [1e-3, 1e-3]},
+    "looseness": {"kind": "looseness", "gear": "wheel", "force_share": [0.01, 0.01], "half_share": [0.5, 0.5],
+                  "n_orders": 3, "harmonic_exponent": 1.0},
+    "bearing": {"kind": "bearing", "gear": "pinion", "n_balls": 9, "ball_diameter_mm": 7.94, "pitch_diameter_mm": 39.04,
+                "contact_angle_deg": 0, "waviness_um": [0.1, 0.1], "slip": [0.01, 0.01], "n_harmonics": 2,
+                "harmonic_exponent": 1.0},
+    "neighbour_mesh": {"kind": "neighbour_mesh", "gear": "wheel", "n_teeth": 25, "n_teeth_mate": 72,
+                       "base_radius_mm": 29.4, "line_of_action_deg": 60, "dynamic_share": [0.01, 0.01],
+                       "n_harmonics": 2, "harmonic_exponent": 1.0, "sideband_share": [0.2, 0.2]},
+}  # fmt: skip
+
+
+def draw(dynamics, *parts, unit=1, specimen=1, record=1):
+    units = {"gearbox": np.random.default_rng([0, unit]), "specimen": np.random.default_rng([1, specimen])}
+    return draw_tones(read_nuisances(list(parts)), dynamics, units, np.random.default_rng([2, record]))
+
+
+@pytest.fixture(scope="module")
+def dynamics(xiamen, dynamics_of):
+    return dynamics_of(xiamen)
+
+
+def test_every_kind_is_tested():
+    assert set(PARTS) == set(KINDS)
+
+
+def test_bearing_orders_are_those_of_the_textbook():
+    found = bearing_orders(9, 7.94e-3, 39.04e-3, 0.0)
+    assert_allclose([found.outer_race, found.inner_race], [3.585, 5.415], rtol=0, atol=5e-4)
+    assert_allclose([found.cage, found.ball], [0.3983, 2.357], rtol=0, atol=5e-4)
+    ratio = 7.94 / 39.04 * math.cos(0.3)
+    tilted = bearing_orders(9, 7.94e-3, 39.04e-3, 0.3)
+    assert_allclose(tilted.ball, 39.04 / (2 * 7.94) * (1 - ratio**2), rtol=1e-12, atol=0)
+    slipping = bearing_orders(9, 7.94e-3, 39.04e-3, 0.0, slip=0.02)
+    assert_allclose(slipping.outer_race, 0.98 * found.outer_race, rtol=1e-12, atol=0)
+    assert_allclose(slipping.inner_race + slipping.outer_race, 9.0, rtol=1e-12, atol=0)
+
+
+def test_the_force_of_an_unbalance_of_grade_g2_5(dynamics):
+    """2 kg at 3000 r/min: e = 2.5 mm/s / 314.16 rad/s = 7.958 um, and 2 kg x 7.958 um x (188.5 rad/s)^2 = 0.5655 N."""
+    (tones,) = draw(dynamics, PARTS["unbalance"])
+    assert tones.follows == "speed_squared"
+    assert_allclose(np.abs(tones.force), [[0.5655, 0.5655, 0.0]], rtol=1e-4, atol=0)
+    assert_allclose(tones.order, [1.0], rtol=0, atol=0)
+    (wheel,) = draw(dynamics, {**PARTS["unbalance"], "gear": "wheel"})
+    # the wheel turns slower by 23 / 84 in service and at the rated speed: e grows, w^2 falls
+    assert_allclose(np.abs(wheel.force), np.abs(tones.force) * 23 / 84, rtol=1e-12, atol=0)
+
+
+@pytest.mark.parametrize(("gear", "sense"), [("pinion", -1.0), ("wheel", 1.0)])
+def test_an_unbalance_turns_by_the_sense_of_its_gear(dynamics, gear, sense):
+    (tones,) = draw(dynamics, {**PARTS["unbalance"], "gear": gear})
+    turning = np.real(tones.force[0, :2] * np.exp(1j * np.array([0.0, 0.1]))[:, None])
+    angles = np.arctan2(turning[:, 1], turning[:, 0])
+    assert_allclose((angles[1] - angles[0] + np.pi) % (2 * np.pi) - np.pi, 0.1 * sense, rtol=1e-9, atol=0)
+
+
+def test_the_senses_are_those_of_the_equations_of_motion():
+    """Moment of a force (F_f, F) at the contact, arms (R_p, -rho_1): the pinion's equation has -F R_p - rho_1 F_f.
+
+    With x to y as positive the moment is arm_x F - arm_y F_f = R_p F + rho_1 F_f, so the pinion turns from y to x.
+    """
+    radius, rho, along, friction = 0.02, 0.005, 100.0, 7.0
+    from_x_to_y = radius * along + rho * friction
+    assert_allclose(SENSE["pinion"] * from_x_to_y, -along * radius - rho * friction, rtol=1e-12, atol=0)
+    assert SENSE["wheel"] == -SENSE["pinion"]
+
+
+def test_orders_and_sizes_of_a_coupling(dynamics):
+    (tones,) = draw(dynamics, PARTS["coupling_misalignment"])
+    assert_allclose(tones.order, [2, 1, 2, 3], rtol=0, atol=0)
+    assert_allclose(np.abs(tones.force[0]), [0.0, 0.0, 1e-3 * 20.0], rtol=1e-12, atol=0)
+    radial = np.linalg.norm(tones.force[1:, :2], axis=1)
+    assert_allclose(radial, 0.01 * dynamics.mesh_force * np.array([0.5, 1.0, 0.3]), rtol=1e-12, atol=0)
+    direction = tones.force[1:, 1] / tones.force[1:, 0]
+    assert_allclose(direction, direction[0].real, rtol=1e-9, atol=0)
+
+
+def test_orders_and_sizes_of_looseness(dynamics):
+    (tones,) = draw(dynamics, PARTS["looseness"])
+    assert_allclose(tones.order, np.arange(1, 7) / 2, rtol=0, atol=0)
+    wanted = 0.01 * dynamics.mesh_force * np.array([0.5, 1.0, 0.5 / 1.5, 0.5, 0.5 / 2.5, 1 / 3])
+    assert_allclose(np.linalg.norm(tones.force, axis=1), wanted, rtol=1e-12, atol=0)
+
+
+def test_orders_and_sizes_of_a_bearing(dynamics):
+    (tones,) = draw(dynamics, PARTS["bearing"])
+    orders = bearing_orders(9, 7.94e-3, 39.04e-3, 0.0, slip=0.01)
+    wanted = [orders.cage]
+    for k in (1, 2):
+        wanted += [k * orders.outer_race, k * orders.inner_race + 1, k * orders.inner_race - 1]
+        wanted += [2 * k * orders.ball + orders.cage, 2 * k * orders.ball - orders.cage]
+    assert_allclose(sorted(tones.order), sorted(wanted), rtol=1e-12, atol=0)
+    support, waviness = dynamics.pinion.support, 1e-7
+    forward = np.abs(tones.force[0])
+    assert_allclose(forward, [waviness * support.stiffness_x, waviness * support.stiffness_y, 0.0], rtol=1e-9, atol=0)
+    assert_allclose(np.abs(tones.force[6:]), 0.5 * np.abs(tones.force[1:6]), rtol=1e-9, atol=0)
+    assert np.all(tones.force[:, 2] == 0.0)
+
+
+def test_orders_and_sizes_of_a_neighbour(dynamics):
+    (tones,) = draw(dynamics, PARTS["neighbour_mesh"])
+    side = [0.0, 1.0, -1.0, 25 / 72, -25 / 72]
+    assert_allclose(sorted(tones.order), sorted([25 + one for one in side] + [50 + one for one in side]), atol=1e-12)
+    level = 0.01 * 20.0 * 84 / 23 / 29.4e-3
+    wanted = {25.0: level, 26.0: 0.2 * level, 50.0: level / 2, 51.0: 0.1 * level}
+    for order, size in wanted.items():
+        (force,) = tones.force[np.isclose(tones.order, order)]
+        assert_allclose(np.abs(force), size * np.array([0.5, math.sqrt(0.75), 29.4e-3]), rtol=1e-9, atol=0)
+
+
+@pytest.mark.parametrize("kind", KINDS)
+def test_a_unit_keeps_its_sizes_from_record_to_record(dynamics, kind):
+    (one,), (other,) = (draw(dynamics, PARTS[kind], record=record) for record in (1, 2))
+    assert_allclose(np.abs(one.force), np.abs(other.force), rtol=1e-12, atol=0)
+    differs = kind in ("looseness", "bearing", "neighbour_mesh")
+    found = [draw(dynamics, PARTS[kind], record=record)[0].force for record in range(8)]
+    assert any(not np.array_equal(found[0], force) for force in found) == differs
+
+
+@pytest.mark.parametrize("kind", KINDS)
+def test_it_belongs_to_the_gearbox_or_to_the_specimen(dynamics, kind):
+    (one,) = draw(dynamics, PARTS[kind])
+    (gearbox,), (specimen,) = draw(dynamics, PARTS[kind], unit=2), draw(dynamics, PARTS[kind], specimen=2)
+    changed = {"gearbox": gearbox, "specimen": specimen}
+    level = KINDS[kind].level
+    assert not np.array_equal(changed.pop(level).force, one.force)
+    assert np.array_equal(changed.popitem()[1].force, one.force)
+
+
+def test_a_part_more_at_the_end_changes_no_other(dynamics):
+    parts = list(PARTS.values())
+    few, more = draw(dynamics, *parts[:-1]), draw(dynamics, *parts)
+    assert len(more) == len(few) + 1
+    for one, other in zip(few, more, strict=False):
+        assert np.array_equal(one.force, other.force)
+        assert np.array_equal(one.base, other.base)
+
+
+def test_ranges_are_filled_and_kept(dynamics):
+    part = {**PARTS["unbalance"], "used_share": [0.2, 0.8]}
+    found = [abs(draw(dynamics, part, specimen=k)[0].force[0, 0]) / 0.5655 for k in range(200)]
+    assert 0.2 <= min(found) < 0.23
+    assert 0.77 < max(found) <= 0.8001
+    part = {**PARTS["bearing"], "slip": [0.0, 0.02]}
+    cages = [draw(dynamics, part, record=k)[0].base[1] for k in range(100)]
+    free = bearing_orders(9, 7.94e-3, 39.04e-3, 0.0).cage
+    assert free * 0.98 <= min(cages) < max(cages) <= free
+
+
+@pytest.mark.parametrize(
+    ("kind", "change", "told"),
+    [
+        ("unbalance", {"gear": "ring"}, "sensing.nuisances[0].gear = 'ring'; allowed: pinion, wheel"),
+        ("unbalance", {"iso21940_grade": 0}, "iso21940_grade = 0 must lie in 0.1..4000"),
+        ("unbalance", {"used_share": [0.5, 0.1]}, "used_share = [0.5, 0.1] must be two ordered numbers, [low, high]"),
+        ("unbalance", {"used_share": 0.5}, "used_share = 0.5 is not a list of numbers"),
+        ("unbalance", {"rated_speed_rpm": -1}, "rated_speed_rpm = -1 must lie in 1..1e+06"),
+        ("unbalance", {"rotor_mass_kg": 0}, "rotor_mass_kg = 0 must lie in 0.001..100000"),
+        ("coupling_misalignment", {"force_share": [0.0, 0.1]}, "force_share = [0.0, 0.1] must be two ordered"),
+        ("coupling_misalignment", {"order_shares": []}, "number of order_shares = 0 must lie in 1..50"),
+        ("coupling_misalignment", {"order_shares": [-1.0]}, "order_shares = -1 must lie in 0..100"),
+        ("looseness", {"n_orders": 0}, "n_orders = 0 must lie in 1..50"),
+        ("looseness", {"harmonic_exponent": -1}, "harmonic_exponent = -1 must lie in 0..10"),
+        ("bearing", {"n_balls": 2}, "n_balls = 2 must lie in 3..200"),
+        ("bearing", {"ball_diameter_mm": 20}, "9 balls of ball_diameter_mm = 20 do not fit on pitch_diameter_mm"),
+        ("bearing", {"contact_angle_deg": 70}, "contact_angle_deg = 70 must lie in 0..60"),
+        ("bearing", {"waviness_um": [0, 1]}, "waviness_um = [0.0, 1.0] must be two ordered numbers"),
+        ("bearing", {"slip": [0.0, 0.5]}, "slip = [0.0, 0.5] must be two ordered numbers, [low, high], in 0..0.2"),
+        ("bearing", {"waviness_mm": [0.1, 0.1]}, "'waviness_mm' has the wrong unit; write it as 'waviness_um'"),
+        ("neighbour_mesh", {"n_teeth": 2.5}, "n_teeth = 2.5 is not a whole number"),
+        ("neighbour_mesh", {"n_teeth_mate": 1}, "n_teeth_mate = 1 must lie in 5..1000"),
+        ("neighbour_mesh", {"sideband_share": [0.0, 2.0]}, "sideband_share = [0.0, 2.0] must be two ordered"),
+        ("neighbour_mesh", {"kind": "neighbor"}, "sensing.nuisances[0]: kind = 'neighbor'; allowed: unbalance"),
+    ],
+)  # fmt: skip
+def test_bad_input_is_told_in_one_line(kind, change, told):
+    with pytest.raises(ConfigError, match=re.escape(told)) as caught:
+        read_nuisances([{**PARTS[kind], **change}])
+    assert str(caught.value).startswith("sensing.nuisances[0]")
+    assert "\n" not in str(caught.value)
+
+
+@pytest.mark.parametrize("values", [None, "bearing", {"kind": "bearing"}, 3])
+def test_only_a_list_is_a_list(values):
+    with pytest.raises(ConfigError, match="must be a list of parts"):
+        read_nuisances(values)
+
+
+def test_a_missing_key_is_named():
+    part = {key: value for key, value in PARTS["looseness"].items() if key != "half_share"}
+    with pytest.raises(ConfigError, match=re.escape("sensing.nuisances[1]: missing half_share")):
+        read_nuisances([PARTS["unbalance"], part])
