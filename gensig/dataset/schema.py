@@ -122,6 +122,13 @@ COLUMNS: dict[str, Column] = _table(
         "share of the samples of all channels outside the converter's range; 0 without one, NaN in a failed record",
     ),
     ("clipped", "int8", "1", "result", "1 where that is above sensing.sensor.max_clipped_fraction"),
+    (
+        "dropped_fraction",
+        "float64",
+        "1",
+        "noise",
+        "share of the samples that were lost and filled in all channels; 0 where none can be, NaN in a failed record",
+    ),
 )
 
 SIGNALS: dict[str, Column] = {
@@ -138,7 +145,9 @@ SIGNALS: dict[str, Column] = {
         Column(name="acceleration_clean_scale", dtype="float64", unit="m/s^2", role="result", axes=("channel",),
                description="the same for acceleration_clean"),
         Column(name="tacho", dtype="float32", unit="1", role="result", axes=("sample",),
-               description="once-per-revolution pulse of the driving shaft (optional)"),
+               description="tachometer: 1 in a pulse, 0 between, at an edge the share of the sample (optional)"),
+        Column(name="encoder_angle", dtype="float64", unit="rad", role="result", axes=("sample",),
+               description="angle that the encoder reads, from its index mark on, errors included (optional)"),
         Column(name="shaft_angle", dtype="float64", unit="rad", role="result", axes=("sample",),
                description="angle of the driving shaft (optional)"),
         Column(name="mesh_pinion_tooth", dtype="int16", unit="1", role="fault", axes=("pair", "sample"),
@@ -184,6 +193,7 @@ DEFAULTS: dict[str, str | float] = {
     "detectability": float("nan"),
     "clipped_fraction": float("nan"),
     "clipped": 0,
+    "dropped_fraction": float("nan"),
 }
 
 PARAMS = "params"
