@@ -1,6 +1,8 @@
 """The columns of a data set, version 1: names, types, units, meaning. `docs/format.md` is written from these tables."""
 
+from collections.abc import Mapping
 from dataclasses import dataclass
+from typing import Any
 
 import numpy as np
 
@@ -197,6 +199,7 @@ DEFAULTS: dict[str, str | float] = {
 }
 
 PARAMS = "params"
+ACCELERATION = "m/s^2"
 
 
 def kind_of(name: str) -> str | None:
@@ -209,6 +212,16 @@ def kind_of(name: str) -> str | None:
     if column.is_text:
         return "str"
     return "int" if np.dtype(column.dtype).kind == "i" else "float"
+
+
+def unit_in_file(column: Column, attributes: Mapping[str, Any]) -> str:
+    """Unit of a column in a data set with these root attributes: rotations among the channels are in rad/s^2."""
+    units = (
+        set(attributes.get("channel_units") or [ACCELERATION]) if {"channel", "source"} & set(column.axes) else set()
+    )
+    if ACCELERATION not in column.unit or units <= {ACCELERATION}:
+        return column.unit
+    return column.unit.replace(ACCELERATION, units.pop()) if len(units) == 1 else "by channel_units"
 
 
 def column_table() -> str:

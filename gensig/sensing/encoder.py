@@ -69,10 +69,7 @@ class Disc:
     places: Array
 
     def read(self, angle: Array, *, quantised: bool) -> Array:
-        """What the encoder says, (sample,) rad from its index on, at an angle of the gear, (sample,) rad.
-
-        Counted on over the turns. It starts in the turn, as seen by the encoder, in which the gear is.
-        """
+        """What the encoder says, (sample,) rad from its index on, at an angle of the gear, (sample,) rad."""
         n_lines = len(self.places)
         places = np.concatenate([self.places + turn * 2.0 * math.pi for turn in (-1.0, 0.0, 1.0)])
         turns = np.floor((angle - self.index) / (2.0 * math.pi))

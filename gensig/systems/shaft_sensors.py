@@ -59,9 +59,9 @@ def shaft_signals(
         found["tacho"] = pulse_train(sensing.tacho, mark, angle, sensing.sampling_rate, record_rng)
     if "encoder_angle" in asked:
         angle = gear_angle(system, sensing.encoder.shaft, start, record.shaft_angle)
-        found["encoder_angle"] = draw_disc(gearbox_rng, sensing.encoder).read(
-            angle, quantised=sensing.encoder.quantised
-        )
+        disc = draw_disc(gearbox_rng, sensing.encoder)
+        before = 2.0 * math.pi * math.floor((angle[0] - disc.index) / (2.0 * math.pi))  # turns that nobody counted
+        found["encoder_angle"] = disc.read(angle - before, quantised=sensing.encoder.quantised)
     return {name: found[name].astype(_type(name)) for name in asked}
 
 
