@@ -20,8 +20,7 @@ SWITCHES = {"store_tacho": "tacho", "store_encoder": "encoder_angle", "store_sha
 def gear_angle(system: SpurPair, shaft: str, start: Start, shaft_angle: Array) -> Array:
     """Angle of a gear in its own sense of rotation, 0 where its tooth 0 enters contact, (sample,) rad.
 
-    The wheel's is that of the pinion over the ratio. Its own transmission error and torsional vibration, below 0.01
-    degrees in a machine that does not bounce, are left out.
+    The wheel's is that of the pinion over the ratio: its lag under load and its own vibration are left out.
 
     Parameters
     ----------
