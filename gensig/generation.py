@@ -248,6 +248,16 @@ def open_shard(path: Path, config: Mapping[str, Any], n_records: int, params: Se
     )
 
 
+def _shaft_sensors(config: Mapping[str, Any], system: SpurPair) -> dict[str, Any]:
+    """What a reader of the stored shaft signals has to know."""
+    tacho, encoder = system.sensing.tacho, system.sensing.encoder
+    of_tacho = {"tacho_shaft": tacho.shaft, "tacho_pulses_per_turn": tacho.pulses_per_turn}
+    of_encoder = {"encoder_shaft": encoder.shaft, "encoder_lines_per_turn": encoder.lines_per_turn}
+    return (of_tacho if config["dataset"]["store_tacho"] else {}) | (
+        of_encoder if config["dataset"]["store_encoder"] else {}
+    )
+
+
 def root_attributes(config: Mapping[str, Any], system: SpurPair) -> dict[str, Any]:
     """What is the same for every record of a data set."""
     pair = system.pair
@@ -259,6 +269,7 @@ def root_attributes(config: Mapping[str, Any], system: SpurPair) -> dict[str, An
         "channel_names": list(system.sensing.channel_names),
         "source_names": list(system.sensing.channels),
         "channel_units": ["rad/s^2" if turns else "m/s^2" for turns in rotation],
+        **_shaft_sensors(config, system),
         "class_names": list(config["plan"]["classes"]),
         "n_teeth_pinion": pair.pinion.n_teeth,
         "n_teeth_wheel": pair.wheel.n_teeth,

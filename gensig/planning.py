@@ -31,6 +31,7 @@ from gensig.records import (
     whole_number,
 )
 from gensig.systems.registry import read_system
+from gensig.systems.shaft_sensors import SWITCHES
 from gensig.systems.spur_pair import SpurPair, severity
 from gensig.units import from_si
 
@@ -270,8 +271,8 @@ def record_bytes(config: Mapping[str, Any], *, as_stored: bool = False) -> int:
 
 def check_switches(config: Mapping[str, Any]) -> None:
     """Raise ConfigError for a switch of ``dataset`` that is neither true nor false."""
-    switches = ("clean", "source", "shaft_angle", "operating", "mesh_state", "detectability")
-    for key in [f"store_{switch}" for switch in switches]:
+    switches = ("clean", "source", "operating", "mesh_state", "detectability")
+    for key in (*(f"store_{switch}" for switch in switches), *SWITCHES):
         if not isinstance(config["dataset"][key], bool):
             raise ConfigError(f"dataset.{key} = {config['dataset'][key]!r} must be true or false")
 

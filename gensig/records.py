@@ -13,18 +13,18 @@ import numpy as np
 from numpy.typing import NDArray
 
 from gensig.dataset.manifest import identity_hash
-from gensig.dynamics.mesh_state import NO_TOOTH, MeshState
 from gensig.errors import ConfigError, SimulationError
 from gensig.faults.base import Fault
 from gensig.faults.registry import read_faults
-from gensig.mesh.pair_table import N_PAIRS
 from gensig.sensing.chain import detectability
 from gensig.sensing.instrument import Instrument, draw_instrument
 from gensig.sensing.manufacturing import Gearbox, Specimen, draw_gearbox, draw_specimen, with_damping_ratio
 from gensig.systems.lead_in import simulate_with_lead_in
+from gensig.systems.mesh_signals import mesh_signals
 from gensig.systems.nuisances import with_nuisances
 from gensig.systems.operation import operating_signals
 from gensig.systems.registry import read_system
+from gensig.systems.shaft_sensors import SWITCHES, shaft_signals
 from gensig.systems.spur_pair import CleanRecord, Run, SpurPair, Start
 from gensig.units import from_si
 from gensig.version import __version__
@@ -38,6 +38,8 @@ FIXED_KEYS = (
     "system.",
     "sensing.sampling_rate_hz",
     "sensing.path.",
+    "sensing.tacho.",
+    "sensing.encoder.",
     "operating.duration_s",
     "operating.turns",
     "plan.",
@@ -62,7 +64,11 @@ class Stream(IntEnum):
     SENSOR = 9
     NUISANCE = 10
     NUISANCE_RECORD = 11
+    DRIFT = 12
+    ENCODER = 13
     SUPPORT = 14
+    DROPPED = 15
+    TACHO = 16
 
 
 def stream(seed: int, cause: Stream, index: int = 0) -> np.random.Generator:
@@ -153,10 +159,9 @@ def _finish(
     sound: CleanRecord | SimulationError | None,
 ) -> Record:
     """Path, sensor, noise, labels and result columns of one row; ``sound`` is the same record without its faults."""
-    seed, index = read_seed(config), int(str(row["record_id"]).lstrip("r"))
     sensing, instrument = system.sensing, row_instrument(config, system, row)
     n_sensors, n_samples = len(sensing.channel_names), round(system.operating.duration * sensing.sampling_rate)
-    measured = None if isinstance(result, SimulationError) else instrument.measure(result.acceleration)
+    measured = None if isinstance(result, SimulationError) else row_clean(config, row, instrument, result.acceleration)
     noise_power: Array | SimulationError = np.zeros(n_sensors)
     if sensing.snr is not None and measured is not None:
         reference = _TWINS[twin] if sensing.snr_reference == "healthy_twin" else instrument.power(measured)
@@ -174,17 +179,19 @@ def _finish(
             measured,
             from_si("speed_rpm", result.mean_speed),
         )
-        noisy, clipped = instrument.record(clean, noise_power, stream(seed, Stream.NOISE, index))
+        noisy, recorded = row_noisy(config, row, instrument, clean, noise_power)
         told = {
             "speed_rpm": speed_rpm,
             "mesh_frequency_hz": speed_rpm / 60.0 * system.pair.pinion.n_teeth,
             "contact_loss_fraction": result.contact_loss_fraction,
             "integration_error": result.integration_error,
             "integration_check": result.integration_check,
-            **clipping(system, clipped),
+            **recorded,
         }
         if isinstance(sound, CleanRecord) and sensing.has_white_noise:
-            told["detectability"] = detectability(clean - instrument.measure(sound.acceleration), noise_power)
+            told["detectability"] = detectability(
+                clean - row_clean(config, row, instrument, sound.acceleration), noise_power
+            )
     signals: dict[str, NDArray[Any]] = {
         "acceleration": noisy.astype(np.float32),
         "fault_multihot": _multihot(config, row),
@@ -195,44 +202,44 @@ def _finish(
         signals["acceleration_clean"] = clean.astype(np.float32)
     if config["dataset"]["store_source"]:
         signals["acceleration_source"] = source.astype(np.float32)
-    if config["dataset"]["store_shaft_angle"]:
-        failed = np.full(n_samples, MISSING)
-        signals["shaft_angle"] = failed if isinstance(result, SimulationError) else result.shaft_angle
     if config["dataset"]["store_operating"]:
         angle = np.full(n_samples, MISSING) if isinstance(result, SimulationError) else result.shaft_angle
         signals |= operating_signals(system.operating, sensing.sampling_rate, angle)
+    signals |= _shaft_signals(config, system, row, result if isinstance(result, CleanRecord) else None)
     if config["dataset"]["store_mesh_state"]:
-        signals |= _mesh_signals(result.mesh if isinstance(result, CleanRecord) else None, n_samples)
+        signals |= mesh_signals(result.mesh if isinstance(result, CleanRecord) else None, n_samples)
     columns = {key: value for key, value in row.items() if key not in ("shard", "row")}
     return Record(signals=signals, values={**columns, **told})
 
 
-def clipping(system: SpurPair, clipped: float) -> dict[str, Any]:
-    """Columns on a record of which a share lies outside the converter's range."""
-    sensor = system.sensing.sensor
-    return {"clipped_fraction": clipped, "clipped": int(sensor is not None and clipped > sensor.max_clipped_fraction)}
+def row_clean(config: Mapping[str, Any], row: Mapping[str, Any], instrument: Instrument, acceleration: Array) -> Array:
+    """What the sensors of a row put out before noise, their drift included, (sensor, sample) m/s2."""
+    measured = instrument.measure(acceleration)
+    return measured * instrument.drift(measured.shape[1], _row_stream(config, row, Stream.DRIFT))
 
 
-def _mesh_signals(mesh: MeshState | None, n_samples: int) -> dict[str, NDArray[Any]]:
-    """The mesh state as a shard takes it; of a failed record nothing is known."""
-    if mesh is None:
-        nobody = np.full((N_PAIRS, n_samples), NO_TOOTH, dtype=np.int16)
-        return {
-            "mesh_pinion_tooth": nobody,
-            "mesh_wheel_tooth": nobody,
-            "mesh_load_share": np.full((N_PAIRS, n_samples), MISSING, dtype=np.float32),
-            "mesh_force": np.full(n_samples, MISSING, dtype=np.float32),
-            "contact_lost": np.zeros(n_samples, dtype=np.int8),
-            "fault_engaged": np.zeros(n_samples, dtype=np.int8),
-        }
-    return {
-        "mesh_pinion_tooth": mesh.pinion_tooth,
-        "mesh_wheel_tooth": mesh.wheel_tooth,
-        "mesh_load_share": mesh.load_share.astype(np.float32),
-        "mesh_force": mesh.force.astype(np.float32),
-        "contact_lost": mesh.contact_lost.astype(np.int8),
-        "fault_engaged": mesh.fault_engaged.astype(np.int8),
-    }
+def row_noisy(
+    config: Mapping[str, Any], row: Mapping[str, Any], instrument: Instrument, clean: Array, noise_power: Array
+) -> tuple[Array, dict[str, Any]]:
+    """Noise, offset, converter and lost samples of a row, and the columns on what clips and what is lost."""
+    noisy, clipped = instrument.record(clean, noise_power, _row_stream(config, row, Stream.NOISE))
+    sent, dropped = instrument.sent(noisy, _row_stream(config, row, Stream.DROPPED))
+    sensor = instrument.sensing.sensor
+    too_many = int(sensor is not None and clipped > sensor.max_clipped_fraction)
+    return sent, {"clipped_fraction": clipped, "clipped": too_many, "dropped_fraction": dropped}
+
+
+def _row_stream(config: Mapping[str, Any], row: Mapping[str, Any], cause: Stream) -> np.random.Generator:
+    return stream(read_seed(config), cause, int(str(row["record_id"]).lstrip("r")))
+
+
+def _shaft_signals(
+    config: Mapping[str, Any], system: SpurPair, row: Mapping[str, Any], record: CleanRecord | None
+) -> dict[str, NDArray[Any]]:
+    """What the sensors on the shafts of a row tell."""
+    gearbox = int(str(row["gearbox_id"]).rpartition("-")[2])
+    causes = (stream(read_seed(config), Stream.ENCODER, gearbox), _row_stream(config, row, Stream.TACHO))
+    return shaft_signals(config["dataset"], system, _row_start(row), record, *causes)
 
 
 def signal_shapes(config: Mapping[str, Any], system: SpurPair) -> dict[str, tuple[int, ...]]:
@@ -249,12 +256,11 @@ def signal_shapes(config: Mapping[str, Any], system: SpurPair) -> dict[str, tupl
         shapes["acceleration_clean"] = (n_channels, n_samples)
     if dataset["store_source"]:
         shapes["acceleration_source"] = (len(system.sensing.channels), n_samples)
-    if dataset["store_shaft_angle"]:
-        shapes["shaft_angle"] = (n_samples,)
     if dataset["store_operating"]:
         shapes |= {"shaft_speed": (n_samples,), "torque_set": (n_samples,)}
+    shapes |= {name: (n_samples,) for key, name in SWITCHES.items() if dataset[key]}
     if dataset["store_mesh_state"]:
-        shapes |= {name: values.shape for name, values in _mesh_signals(None, n_samples).items()}
+        shapes |= {name: values.shape for name, values in mesh_signals(None, n_samples).items()}
     return shapes
 
 
@@ -286,19 +292,22 @@ def row_faults(row: Mapping[str, Any]) -> list[Fault]:
 def row_run(config: Mapping[str, Any], system: SpurPair, row: Mapping[str, Any]) -> Run:
     """What one row of a plan asks to simulate."""
     specimen, gearbox = _unit(config, system, row)
-    start = Start(
-        tooth_pinion=int(row["start_tooth_pinion"]),
-        tooth_wheel=int(row["start_tooth_wheel"]),
-        phase=float(row["start_phase"]),
-    )
     faults = () if config["plan"]["sham"] else tuple(row_faults(row))
     return Run(
         system=system,
         faults=faults,
-        start=start,
+        start=_row_start(row),
         specimen=specimen,
         gearbox=gearbox,
         tell_mesh=config["dataset"]["store_mesh_state"],
+    )
+
+
+def _row_start(row: Mapping[str, Any]) -> Start:
+    return Start(
+        tooth_pinion=int(row["start_tooth_pinion"]),
+        tooth_wheel=int(row["start_tooth_wheel"]),
+        phase=float(row["start_phase"]),
     )
 
 

@@ -21,17 +21,15 @@ from gensig.dataset.schema import SCALES
 from gensig.errors import ConfigError, DatasetError, SimulationError
 from gensig.records import (
     Record,
-    Stream,
-    clipping,
-    read_seed,
     record_system,
+    row_clean,
     row_instrument,
+    row_noisy,
     row_run,
     row_values,
     shaken,
     simulate_record,
     simulate_records,
-    stream,
 )
 from gensig.systems.lead_in import simulate_with_lead_in
 
@@ -133,11 +131,11 @@ def simulate_twin(config: Mapping[str, Any], row: Mapping[str, Any]) -> Record:
         healthy = shaken(config, row, run, simulate_with_lead_in([run])[0])
         if isinstance(healthy, SimulationError):
             raise healthy
-        rng = stream(read_seed(config), Stream.NOISE, int(str(row["record_id"]).lstrip("r")))
         signals["noise_power"] = original.signals["noise_power"]
-        noisy, clipped = instrument.record(instrument.measure(healthy.acceleration), signals["noise_power"], rng)
+        clean = row_clean(config, row, instrument, healthy.acceleration)
+        noisy, recorded = row_noisy(config, row, instrument, clean, signals["noise_power"])
         signals["acceleration"] = noisy.astype(np.float32)
-        sound |= clipping(system, clipped)
+        sound |= recorded
     return Record(signals=signals, values={**twin.values, **sound})
 
 

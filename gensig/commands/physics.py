@@ -181,9 +181,10 @@ def _print_record(system: SpurPair, acceleration: NDArray[np.float32], values: d
 
     print(f"class {values['label_name']}, severity {values['severity']:.3f}")
     print(f"speed {values['speed_rpm']:.3f} r/min, mesh frequency {values['mesh_frequency_hz']:.2f} Hz")
-    print(f"{'channel':<16}{'RMS m/s2':>12}{'kurtosis':>12}{'crest':>12}")
+    print(f"{'channel':<16}{'RMS':>12} {'':<8}{'kurtosis':>12}{'crest':>12}")
     table = zip(
         system.sensing.channel_names, rms(acceleration), kurtosis(acceleration), crest_factor(acceleration), strict=True
     )
     for name, level, fourth, crest in table:
-        print(f"{name:<16}{level:>12.4g}{fourth:>12.3f}{crest:>12.3f}")
+        unit = "rad/s2" if name.endswith("rotation") else "m/s2"
+        print(f"{name:<16}{level:>12.4g} {unit:<8}{fourth:>12.3f}{crest:>12.3f}")

@@ -139,7 +139,7 @@ def _write_hdf5(data: Dataset, path: Path) -> None:
                 plain = all(text.isascii() for text in np.unique(data.column(name)).tolist())
                 dtype = h5py.string_dtype("ascii" if plain else "utf-8", column.n_bytes if column else TEXT_BYTES)
             item = file.create_dataset(name, (data.n_records, *sample.shape[1:]), dtype)
-            set_attribute(item, "unit", unit_of(name))
+            set_attribute(item, "unit", unit_of(data, name))
             for shard, entry in enumerate(data.manifest.shards):
                 values = data.shard_column(shard, name)
                 start = data.first_record(shard)
@@ -149,7 +149,7 @@ def _write_hdf5(data: Dataset, path: Path) -> None:
         for name in data.signal_names:
             shape, dtype = signal_layout(data, name)
             item = file.create_dataset(name, (data.n_records, *shape), dtype, chunks=(1, *shape))
-            set_attribute(item, "unit", unit_of(name))
+            set_attribute(item, "unit", unit_of(data, name))
             for index in range(data.n_records):
                 item[index] = signal_row(data, index, name)
 

@@ -9,7 +9,7 @@ from typing import Any
 import numpy as np
 
 from gensig.dataset.reader import Dataset
-from gensig.dataset.schema import COLUMNS, SCALES, SIGNALS
+from gensig.dataset.schema import COLUMNS, SCALES, SIGNALS, unit_in_file
 from gensig.errors import DatasetError
 
 ROW_GROUP_BYTES = 16 * 1024**2
@@ -21,10 +21,10 @@ def column_names(data: Dataset) -> list[str]:
     return [name for name in data.column_names if name not in SCALES.values()]
 
 
-def unit_of(name: str) -> str:
+def unit_of(data: Dataset, name: str) -> str:
     """Unit of a column or signal; '' where the schema does not know it."""
     column = SIGNALS.get(name) or COLUMNS.get(name)
-    return column.unit if column else ""
+    return unit_in_file(column, data.attributes) if column else ""
 
 
 def attributes_json(attributes: Mapping[str, Any]) -> str:
@@ -90,7 +90,7 @@ def write_parquet(data: Dataset, path: Path, *, samples: bool) -> None:
             rows = [signal_row(data, first + row, name) for row in range(start, stop)]
             arrays[name] = nested(np.stack(rows))
         fields = [
-            pyarrow.field(name, array.type, metadata={"unit": unit_of(name)} if unit_of(name) else None)
+            pyarrow.field(name, array.type, metadata={"unit": unit} if (unit := unit_of(data, name)) else None)
             for name, array in arrays.items()
         ]
         return pyarrow.RecordBatch.from_arrays(list(arrays.values()), schema=pyarrow.schema(fields))

@@ -190,10 +190,10 @@ class Dataset:
         return block if channels is None else block[[self._channel(channel) for channel in channels]]
 
     def trace(self, record_index: int, name: str, start: int = 0, stop: int | None = None) -> np.ndarray:
-        """Another signal of one record, where the data set holds it: 'shaft_angle' (sample,), and the mesh state.
+        """Another signal of one record, where the data set holds it: shaft sensors and the mesh state.
 
-        Of that 'mesh_force', 'contact_lost' and 'fault_engaged' are (sample,); 'mesh_pinion_tooth', 'mesh_wheel_tooth'
-        and 'mesh_load_share' (pair, sample).
+        'tacho', 'encoder_angle', 'shaft_angle', 'mesh_force', 'contact_lost' and 'fault_engaged' are (sample,),
+        'mesh_pinion_tooth', 'mesh_wheel_tooth' and 'mesh_load_share' (pair, sample).
         """
         stop = self.n_samples if stop is None else stop
         traces = [known for known in self.signal_names if known not in SCALES]

@@ -1,6 +1,8 @@
 """The columns of a data set, version 1: names, types, units, meaning. `docs/format.md` is written from these tables."""
 
+from collections.abc import Mapping
 from dataclasses import dataclass
+from typing import Any
 
 import numpy as np
 
@@ -122,6 +124,13 @@ COLUMNS: dict[str, Column] = _table(
         "share of the samples of all channels outside the converter's range; 0 without one, NaN in a failed record",
     ),
     ("clipped", "int8", "1", "result", "1 where that is above sensing.sensor.max_clipped_fraction"),
+    (
+        "dropped_fraction",
+        "float64",
+        "1",
+        "noise",
+        "share of the samples that were lost and filled in all channels; 0 where none can be, NaN in a failed record",
+    ),
 )
 
 SIGNALS: dict[str, Column] = {
@@ -138,7 +147,9 @@ SIGNALS: dict[str, Column] = {
         Column(name="acceleration_clean_scale", dtype="float64", unit="m/s^2", role="result", axes=("channel",),
                description="the same for acceleration_clean"),
         Column(name="tacho", dtype="float32", unit="1", role="result", axes=("sample",),
-               description="once-per-revolution pulse of the driving shaft (optional)"),
+               description="tachometer: 1 in a pulse, 0 between, at an edge the share of the sample (optional)"),
+        Column(name="encoder_angle", dtype="float64", unit="rad", role="result", axes=("sample",),
+               description="angle that the encoder reads, from its index mark on, errors included (optional)"),
         Column(name="shaft_angle", dtype="float64", unit="rad", role="result", axes=("sample",),
                description="angle of the driving shaft (optional)"),
         Column(name="shaft_speed", dtype="float32", unit="rad/s", role="result", axes=("sample",),
@@ -188,9 +199,11 @@ DEFAULTS: dict[str, str | float] = {
     "detectability": float("nan"),
     "clipped_fraction": float("nan"),
     "clipped": 0,
+    "dropped_fraction": float("nan"),
 }
 
 PARAMS = "params"
+ACCELERATION = "m/s^2"
 
 
 def kind_of(name: str) -> str | None:
@@ -203,6 +216,16 @@ def kind_of(name: str) -> str | None:
     if column.is_text:
         return "str"
     return "int" if np.dtype(column.dtype).kind == "i" else "float"
+
+
+def unit_in_file(column: Column, attributes: Mapping[str, Any]) -> str:
+    """Unit of a column in a data set with these root attributes: rotations among the channels are in rad/s^2."""
+    units = (
+        set(attributes.get("channel_units") or [ACCELERATION]) if {"channel", "source"} & set(column.axes) else set()
+    )
+    if ACCELERATION not in column.unit or units <= {ACCELERATION}:
+        return column.unit
+    return column.unit.replace(ACCELERATION, units.pop()) if len(units) == 1 else "by channel_units"
 
 
 def column_table() -> str:

@@ -25,6 +25,7 @@ from gensig.dataset.schema import (
     SCHEMA_VERSION,
     SIGNALS,
     Column,
+    unit_in_file,
 )
 from gensig.errors import DatasetError
 
@@ -191,7 +192,7 @@ class ShardWriter:
             dcpl=properties,
             **self._options,
         )
-        set_attribute(data, "unit", column.unit if scale is None else "1")
+        set_attribute(data, "unit", unit_in_file(column, self.attributes) if scale is None else "1")
         if scale is not None:
             set_attribute(data, "scale", scale)
 
@@ -214,7 +215,7 @@ class ShardWriter:
         for name, rows in self._rows.items():
             column = SIGNALS.get(name) or self.columns[name]
             data = self._file.create_dataset(name, data=rows, dtype=column.storage_dtype, track_times=False)
-            set_attribute(data, "unit", column.unit)
+            set_attribute(data, "unit", unit_in_file(column, self.attributes))
         self.n_failed = int(np.count_nonzero(self._rows["status"] == b"failed"))
         with fixed_settings():  # HDF5 compresses what is in its cache now
             self.sha256, self.n_bytes = publish_image(self._file, self.path)

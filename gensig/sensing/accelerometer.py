@@ -9,6 +9,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from gensig.errors import ConfigError
+from gensig.sensing.dropped import FILLS
 from gensig.sensing.transfer_path import SETTLED
 from gensig.units import unit
 
@@ -23,7 +24,8 @@ class Accelerometer:
 
     ``sensitivity_tolerance`` and ``transverse_sensitivity`` are the largest shares, ``dc_offset_m_per_s2`` the largest
     offset; each sensor of a gearbox has its own. A record whose share of samples at the ends of the converter's range
-    is above ``max_clipped_fraction`` is marked.
+    is above ``max_clipped_fraction`` is marked. Gains drift over a record by ``drift_scatter``, see ``drift``; samples
+    get lost in runs of ``dropped_run_samples``, see ``dropped``.
     """
 
     sensitivity_tolerance: float
@@ -35,6 +37,11 @@ class Accelerometer:
     adc_range_m_per_s2: float | None
     adc_bits: int | None
     max_clipped_fraction: float
+    drift_scatter: float
+    drift_time: float = unit("s")
+    dropped_fraction: float
+    dropped_run_samples: int
+    dropped_fill: str
 
     def __post_init__(self) -> None:
         for key in ("sensitivity_tolerance", "transverse_sensitivity"):
@@ -62,6 +69,19 @@ class Accelerometer:
             raise ConfigError(f"sensing.sensor.adc_bits = {self.adc_bits} must lie in 4..24")
         if not 0.0 <= self.max_clipped_fraction <= 1.0:
             raise ConfigError(f"sensing.sensor.max_clipped_fraction = {self.max_clipped_fraction:g} must lie in 0..1")
+        self._check_drift_and_loss()
+
+    def _check_drift_and_loss(self) -> None:
+        for key, value, low, high in (
+            ("drift_scatter", self.drift_scatter, 0.0, 0.5),
+            ("drift_time_s", self.drift_time, 0.1, 1e6),
+            ("dropped_fraction", self.dropped_fraction, 0.0, 0.5),
+            ("dropped_run_samples", self.dropped_run_samples, 1, 1_000_000),
+        ):
+            if not low <= value <= high:
+                raise ConfigError(f"sensing.sensor.{key} = {value:g} must lie in {low:g}..{high:g}")
+        if self.dropped_fill not in FILLS:
+            raise ConfigError(f"sensing.sensor.dropped_fill = {self.dropped_fill!r}; allowed: {', '.join(FILLS)}")
 
     @property
     def is_ideal(self) -> bool:

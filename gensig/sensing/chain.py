@@ -12,8 +12,10 @@ from numpy.typing import NDArray
 from gensig.dynamics.decimation import usable_band
 from gensig.errors import ConfigError
 from gensig.sensing.accelerometer import Accelerometer
+from gensig.sensing.encoder import Encoder
 from gensig.sensing.measured_path import ImpulseResponses, MeasuredPath, read_responses
 from gensig.sensing.noise import Background, Noise, Place, ThroughPath
+from gensig.sensing.tachometer import Tachometer
 from gensig.sensing.tones import Nuisance
 from gensig.sensing.transfer_path import ModalPath
 from gensig.units import unit
@@ -40,6 +42,8 @@ class Sensing:
     snr: float | None = unit("db")
     snr_reference: str
     gain_scatter: float
+    tacho: Tachometer
+    encoder: Encoder
     sensors: tuple[str, ...] | None = None
     path: ModalPath | MeasuredPath | None = None
     sensor: Accelerometer | None = None

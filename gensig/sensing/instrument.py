@@ -10,6 +10,8 @@ from numpy.typing import NDArray
 
 from gensig.sensing.accelerometer import SensorSet, draw_sensors
 from gensig.sensing.chain import LONGEST_LEAD, Sensing, add_noise, power, transverse_channel
+from gensig.sensing.drift import draw_drift
+from gensig.sensing.dropped import draw_dropped, filled
 from gensig.sensing.measured_path import ImpulseResponses, read_responses
 from gensig.sensing.noise import band_power
 from gensig.sensing.transfer_path import Housing, ModalPath, draw_housing
@@ -51,6 +53,14 @@ class Instrument:
             signal = sensor.filtered(self.sensors.gain[:, None] * signal, self.sensing.sampling_rate)
         return np.ascontiguousarray(signal[:, self.sensing.n_lead :])
 
+    def drift(self, n_samples: int, rng: np.random.Generator) -> Array:
+        """Factor of each sensor's gain over one record, (sensor, sample), or (1, 1) of 1 where none drifts."""
+        sensor, n_sensors = self.sensing.sensor, len(self.sensing.channel_names)
+        if sensor is None or not sensor.drift_scatter:
+            return np.ones((1, 1))
+        rate = self.sensing.sampling_rate
+        return draw_drift(rng, sensor.drift_scatter, sensor.drift_time, n_sensors, n_samples, rate)
+
     def power(self, signal: Array) -> Array:
         """Mean square without the mean in the band of the signal-to-noise ratio, (sensor,) (m/s2)^2."""
         noise = self.sensing.noise
@@ -73,6 +83,14 @@ class Instrument:
         if sensor.dc_offset_m_per_s2 and self.sensors is not None:
             noisy = noisy + self.sensors.offset[:, None]
         return sensor.digitised(noisy)
+
+    def sent(self, signal: Array, rng: np.random.Generator) -> tuple[Array, float]:
+        """What of a record, (sensor, sample), reaches the file, losses filled; and the share of samples that do not."""
+        sensor = self.sensing.sensor
+        if sensor is None or not sensor.dropped_fraction:
+            return signal, 0.0
+        dropped = draw_dropped(rng, sensor.dropped_fraction, sensor.dropped_run_samples, signal.shape[1])
+        return filled(signal, dropped, sensor.dropped_fill), float(np.mean(dropped))
 
     def _at_sensors(self, source: Array) -> Array:
         """Motion along the sensors' own axes, then, where it is known, across them, (line, sample)."""

@@ -8,15 +8,17 @@ from typing import Any
 from gensig.errors import ConfigError
 from gensig.sensing.accelerometer import Accelerometer
 from gensig.sensing.chain import Sensing
+from gensig.sensing.encoder import Encoder
 from gensig.sensing.measured_path import MeasuredPath
 from gensig.sensing.noise import read_noise
 from gensig.sensing.nuisance import read_nuisances
+from gensig.sensing.tachometer import Tachometer
 from gensig.sensing.transfer_path import ModalPath
 from gensig.units import read
 
 IDENTITY = "identity"
 PATHS: dict[str, type[ModalPath] | type[MeasuredPath]] = {"modal": ModalPath, "measured": MeasuredPath}
-NESTED = ("path", "sensor", "noise", "nuisances")
+NESTED = ("path", "sensor", "noise", "nuisances", "tacho", "encoder")
 
 
 def read_sensing(values: Mapping[str, Any]) -> Sensing:
@@ -37,6 +39,8 @@ def read_sensing(values: Mapping[str, Any]) -> Sensing:
         sensor=read(Accelerometer, values["sensor"], "sensing.sensor"),
         noise=read_noise(values["noise"]),
         nuisances=read_nuisances(values["nuisances"]),
+        tacho=read(Tachometer, values["tacho"], "sensing.tacho"),
+        encoder=read(Encoder, values["encoder"], "sensing.encoder"),
     )
 
 

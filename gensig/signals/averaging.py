@@ -55,8 +55,6 @@ def resample_to_angle(
     Signal Processing Magazine 16 (6), 22-38. Largest error for a sine: 0.1 % of its amplitude at an eighth of the
     sampling rate, 0.4 % at a sixth, 2.5 % at a quarter.
     """
-    from scipy.ndimage import spline_filter1d
-
     x = np.asarray(signal, dtype=float)
     n_samples = x.shape[-1]
     samples_in_a_turn = sampling_rate / rotation_frequency
@@ -65,7 +63,23 @@ def resample_to_angle(
         raise ValueError(f"{n_samples} samples hold no whole turn of {samples_in_a_turn:.1f} samples")
     per_turn = samples_per_turn or samples_per_turn_for(sampling_rate, rotation_frequency)
     position = np.arange(n_turns * per_turn) * (samples_in_a_turn / per_turn)
-    index = np.minimum(position.astype(np.intp), n_samples - 1)
+    return interpolate(x, position).reshape(*x.shape[:-1], n_turns, per_turn)
+
+
+def interpolate(x: FloatArray, position: FloatArray) -> FloatArray:
+    """Values of a signal, (..., sample), between its samples, by the cubic B-spline of `resample_to_angle`.
+
+    Parameters
+    ----------
+    position : (point,)    in samples from the first; at most the last sample or just behind it
+
+    Returns
+    -------
+    (..., point)
+    """
+    from scipy.ndimage import spline_filter1d
+
+    index = np.minimum(position.astype(np.intp), x.shape[-1] - 1)
     u = position - index
     coefficients = spline_filter1d(x, order=3, axis=-1, mode="mirror")
     padded = np.concatenate(
@@ -83,7 +97,7 @@ def resample_to_angle(
     angle_signal = weights[0] * padded.take(index, axis=-1)
     for offset in (1, 2, 3):
         angle_signal += weights[offset] * padded.take(index + offset, axis=-1)
-    return angle_signal.reshape(*x.shape[:-1], n_turns, per_turn)
+    return angle_signal
 
 
 def time_synchronous_average(

@@ -11,7 +11,7 @@ from gensig.config import read_request
 from gensig.errors import ConfigError
 from gensig.sensing.chain import power
 from gensig.sensing.instrument import draw_instrument
-from gensig.sensing.reading import read_sensing
+from gensig.sensing.reading import NESTED, read_sensing
 
 HOUSING = read_request(["sensing=housing"]).config["sensing"]
 BEARING = read_request([]).config["sensing"]
@@ -153,5 +153,5 @@ def test_a_measured_path_tells_no_transverse_motion():
 
 
 def test_a_group_without_the_new_keys_is_named():
-    with pytest.raises(ConfigError, match=re.escape("sensing: missing path, sensor, noise")):
-        read_sensing({key: value for key, value in BEARING.items() if key not in ("path", "sensor", "noise")})
+    with pytest.raises(ConfigError, match=re.escape("sensing: missing path, sensor, noise, tacho, encoder")):
+        read_sensing({key: value for key, value in BEARING.items() if key not in NESTED})

@@ -1,0 +1,34 @@
+"""Samples that get lost on their way from the converter to the file."""
+
+from __future__ import annotations
+
+import numpy as np
+from numpy.typing import NDArray
+
+Array = NDArray[np.float64]
+
+FILLS = ("hold", "zero")
+
+
+def draw_dropped(rng: np.random.Generator, share: float, n_run: int, n_samples: int) -> NDArray[np.bool_]:
+    """Which samples are lost, (sample,).
+
+    Samples travel in packets of ``n_run``; each is lost with probability ``share``, whatever befalls the others. The
+    first packet began anywhere before the record.
+    """
+    begun = int(rng.integers(n_run))
+    lost = rng.random((begun + n_samples - 1) // n_run + 1) < share
+    return np.repeat(lost, n_run)[begun : begun + n_samples]
+
+
+def filled(signal: Array, dropped: NDArray[np.bool_], fill: str) -> Array:
+    """The signal, (sensor, sample), with something else where it was lost.
+
+    ``hold`` repeats the last sample that came, before the first one that which comes first; ``zero`` is 0. So is what
+    is held where nothing came at all.
+    """
+    if fill == "zero" or dropped.all():
+        return np.where(dropped, 0.0, signal)
+    came = np.flatnonzero(~dropped)
+    last = np.searchsorted(came, np.arange(len(dropped)), side="right") - 1
+    return signal[:, came[np.maximum(last, 0)]]

@@ -1,0 +1,95 @@
+"""An incremental encoder with an index mark, read as an angle."""
+
+from __future__ import annotations
+
+import math
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+
+from gensig.errors import ConfigError
+from gensig.sensing.tachometer import check_shaft
+from gensig.units import from_si, unit
+
+Array = NDArray[np.float64]
+
+MOST_LINES = 100_000
+MOST_ECCENTRICITY = math.radians(5.0)
+MOST_LINE_SHARE = 0.1  # standard deviation of a line's place over the spacing; with WIDEST no line passes another
+WIDEST = 4.0  # standard deviations
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class Encoder:
+    """A disc with lines on a gear's shaft.
+
+    ``eccentricity_error`` is the largest amplitude of the once-per-turn error and ``line_error`` the standard deviation
+    of the place of each line, both in rad. ``quantised`` reads the last line that passed, otherwise between lines too.
+    """
+
+    shaft: str
+    lines_per_turn: int
+    eccentricity_error: float = unit("deg")
+    line_error: float = unit("deg")
+    quantised: bool
+
+    def __post_init__(self) -> None:
+        check_shaft("encoder", self.shaft)
+        if not 4 <= self.lines_per_turn <= MOST_LINES:
+            raise ConfigError(f"sensing.encoder.lines_per_turn = {self.lines_per_turn} must lie in 4..{MOST_LINES}")
+        for key, value, most, why in (
+            ("eccentricity_error_deg", self.eccentricity_error, MOST_ECCENTRICITY, ""),
+            (
+                "line_error_deg",
+                self.line_error,
+                MOST_LINE_SHARE * self.spacing,
+                ", a tenth of the spacing of the lines",
+            ),
+        ):
+            if not 0.0 <= value <= most * (1.0 + 1e-9):
+                given, allowed = (from_si(key, one) for one in (value, most))
+                raise ConfigError(f"sensing.encoder.{key} = {given:g} must lie in 0..{allowed:g}{why}")
+
+    @property
+    def spacing(self) -> float:
+        """Angle between lines, rad."""
+        return 2.0 * math.pi / self.lines_per_turn
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class Disc:
+    """The disc of one gearbox.
+
+    ``index`` rad is the angle of the gear at which the encoder reads 0; ``places`` (line,) rad after it are those at
+    which its lines pass: nominally 0, 1, 2, ... times their spacing, with errors also beyond either end of a turn.
+    """
+
+    index: float
+    places: Array
+
+    def read(self, angle: Array, *, quantised: bool) -> Array:
+        """What the encoder says, (sample,) rad from its index on, at an angle of the gear, (sample,) rad."""
+        n_lines = len(self.places)
+        places = np.concatenate([self.places + turn * 2.0 * math.pi for turn in (-1.0, 0.0, 1.0)])
+        turns = np.floor((angle - self.index) / (2.0 * math.pi))
+        within = angle - self.index - 2.0 * math.pi * turns
+        number = np.searchsorted(places, within, side="right") - 1.0
+        if not quantised:
+            number = np.interp(within, places, np.arange(3.0 * n_lines))
+        return 2.0 * math.pi * (turns + (number - n_lines) / n_lines)
+
+
+def draw_disc(rng: np.random.Generator, encoder: Encoder) -> Disc:
+    """A disc with its errors: index and eccentricity in any direction, the latter of any size up to the largest.
+
+    A disc whose center is off the shaft's by e is misread by e / R sin(angle + direction) at a reading radius R.
+    """
+    index, direction = rng.uniform(0.0, 2.0 * math.pi, 2)
+    amplitude = encoder.eccentricity_error * float(rng.random())
+    nominal = encoder.spacing * np.arange(encoder.lines_per_turn)
+    own = np.clip(rng.standard_normal(encoder.lines_per_turn), -WIDEST, WIDEST)
+    return Disc(
+        index=float(index),
+        places=nominal + amplitude * np.sin(nominal + direction) + encoder.line_error * own,
+    )

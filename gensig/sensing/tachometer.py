@@ -1,0 +1,89 @@
+"""A tachometer: a sensor that gives a pulse for every mark of a shaft that passes it."""
+
+from __future__ import annotations
+
+import math
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+
+from gensig.errors import ConfigError
+from gensig.units import from_si, unit
+
+Array = NDArray[np.float64]
+
+SHAFTS = ("pinion", "wheel")
+MOST_PULSES = 1000  # a turn
+JITTERS_IN_A_WIDTH = 8.0  # standard deviations that fit into a pulse or a gap, so that no edge overtakes another
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class Tachometer:
+    """Evenly spaced marks on a gear's shaft, each ``pulse_width_share`` of their spacing wide.
+
+    ``jitter`` in rad is the standard deviation of the place at which a pulse begins, drawn anew for every pulse, which
+    ends a width later.
+    """
+
+    shaft: str
+    pulses_per_turn: int
+    pulse_width_share: float
+    jitter: float = unit("deg")
+
+    def __post_init__(self) -> None:
+        check_shaft("tacho", self.shaft)
+        if not 1 <= self.pulses_per_turn <= MOST_PULSES:
+            raise ConfigError(
+                f"sensing.tacho.pulses_per_turn = {self.pulses_per_turn} must lie in 1..{MOST_PULSES}; "
+                "sensing.encoder has more lines"
+            )
+        if not 1e-3 <= self.pulse_width_share <= 0.999:
+            raise ConfigError(f"sensing.tacho.pulse_width_share = {self.pulse_width_share:g} must lie in 0.001..0.999")
+        most = self.spacing * min(self.pulse_width_share, 1.0 - self.pulse_width_share) / JITTERS_IN_A_WIDTH
+        if not 0.0 <= self.jitter <= most:
+            given, allowed = (from_si("jitter_deg", value) for value in (self.jitter, most))
+            raise ConfigError(
+                f"sensing.tacho.jitter_deg = {given:g} must lie in 0..{allowed:g}, an eighth of the narrower of pulse "
+                "and gap; change that with pulse_width_share"
+            )
+
+    @property
+    def spacing(self) -> float:
+        """Angle from the beginning of a pulse to that of the next, rad."""
+        return 2.0 * math.pi / self.pulses_per_turn
+
+
+def check_shaft(place: str, shaft: str) -> None:
+    """Raise ConfigError for a shaft on which no sensor can sit."""
+    if shaft not in SHAFTS:
+        raise ConfigError(f"sensing.{place}.shaft = {shaft!r}; allowed: {', '.join(SHAFTS)}")
+
+
+def draw_mark(rng: np.random.Generator) -> float:
+    """Angle of the gear at which a pulse begins, rad: the mark may be anywhere on the shaft."""
+    return float(rng.uniform(0.0, 2.0 * math.pi))
+
+
+def pulse_train(tacho: Tachometer, mark: float, angle: Array, sampling_rate: float, rng: np.random.Generator) -> Array:
+    """What the tachometer puts out, (sample,): 1 in a pulse, 0 between, at an edge the share that is high.
+
+    A sample is the mean over one sampling interval around its instant, as a converter integrates. So an edge has its
+    exact instant in the two samples around it (``gensig.signals.tacho.pulse_times``).
+
+    Parameters
+    ----------
+    mark : rad                     angle at which a pulse begins
+    angle : (sample,) rad          of the gear, rising
+    """
+    n_samples = len(angle)
+    ahead, behind = 2.0 * angle[0] - angle[1], 2.0 * angle[-1] - angle[-2]
+    turned = np.concatenate([[ahead], angle, [behind]])
+    first = math.floor((turned[0] - mark) / tacho.spacing) - 1
+    last = math.ceil((turned[-1] - mark) / tacho.spacing) + 1
+    number = np.arange(first, last + 1)
+    begins = mark + tacho.spacing * number + tacho.jitter * rng.standard_normal(len(number))
+    edges = np.column_stack([begins, begins + tacho.pulse_width_share * tacho.spacing]).ravel()
+    at = np.interp(edges, np.maximum.accumulate(turned), np.arange(-1.0, n_samples + 1.0))  # in samples
+    high = np.concatenate([[0.0], np.cumsum(np.diff(at) * (np.arange(len(at) - 1) % 2 == 0))])
+    return np.diff(np.interp(np.arange(n_samples + 1) - 0.5, at, high))

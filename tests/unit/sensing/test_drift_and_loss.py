@@ -1,0 +1,115 @@
+"""Gains that drift over a record, and samples that get lost."""
+
+import re
+
+import numpy as np
+import pytest
+from numpy.testing import assert_allclose
+from test_instrument import BEARING, HOUSING, changed, instrument, source
+
+from gensig.errors import ConfigError
+from gensig.sensing.drift import draw_drift
+from gensig.sensing.dropped import draw_dropped, filled
+from gensig.sensing.reading import read_sensing
+
+N = 10_000
+
+
+def logarithms(seeds, *, scatter=0.1, time=0.5, n_samples=501, rate=500.0):
+    """(record and sensor, sample)"""
+    drawn = [draw_drift(np.random.default_rng(seed), scatter, time, 2, n_samples, rate) for seed in seeds]
+    return np.log(np.concatenate(drawn))
+
+
+def test_drift_is_stationary_and_forgets_itself():
+    walk = logarithms(range(2000))  # 4000 of 1 s
+    points = walk[:, ::25]  # every 50 ms is a point of the walk at 25 ms
+    assert_allclose(points.std(axis=0), 0.1, rtol=0.06, atol=0)
+    assert_allclose(points.mean(axis=0), 0.0, rtol=0, atol=0.006)
+    for lag in (0, 125, 250, 500):  # samples
+        found = np.mean(walk[:, 0] * walk[:, lag]) / 0.1**2
+        assert_allclose(found, np.exp(-lag / 500.0 / 0.5), rtol=0, atol=0.06)
+
+
+def test_drift_is_slow_and_each_sensors_own():
+    walk = logarithms(range(300), time=10.0)
+    assert np.abs(np.diff(walk, axis=1)).max() < 0.01 * 0.1 * 4
+    assert abs(np.corrcoef(walk[::2, 0], walk[1::2, 0])[0, 1]) < 0.2
+    assert walk[:, 0].std() > 5 * (walk[:, -1] - walk[:, 0]).std() / 3
+
+
+def test_a_longer_record_begins_as_a_shorter_one():
+    short, long = (draw_drift(np.random.default_rng(1), 0.1, 0.3, 2, n, 1000.0) for n in (200, 900))
+    assert_allclose(long[:, :200], short, rtol=1e-12, atol=0)
+
+
+@pytest.mark.parametrize("run", [1, 64])
+def test_the_asked_share_is_lost_in_whole_packets(run):
+    lost = [draw_dropped(np.random.default_rng(seed), 0.1, run, N) for seed in range(200)]
+    assert all(one.shape == (N,) for one in lost)
+    share = np.mean(lost)
+    assert_allclose(share, 0.1, rtol=0, atol=4.0 * np.sqrt(0.09 * run / (200 * N)))
+    for one in lost:
+        edges = np.flatnonzero(np.diff(one.astype(int)))
+        assert len(edges) > 5
+        assert np.all(np.diff(edges) % run == 0)
+
+
+def test_the_first_packet_begins_anywhere():
+    ends = set()
+    for seed in range(300):
+        lost = draw_dropped(np.random.default_rng(seed), 0.5, 8, 100)
+        ends |= set((np.flatnonzero(np.diff(lost.astype(int))) % 8).tolist())
+    assert ends == set(range(8))
+
+
+def test_filling():
+    signal = np.arange(1.0, 9.0)[None] * [[1.0], [10.0]]
+    dropped = np.array([1, 0, 0, 1, 1, 0, 1, 0], dtype=bool)
+    assert_allclose(filled(signal, dropped, "zero")[0], [0, 2, 3, 0, 0, 6, 0, 8], rtol=0, atol=0)
+    assert_allclose(filled(signal, dropped, "hold")[0], [2, 2, 3, 3, 3, 6, 6, 8], rtol=0, atol=0)
+    assert_allclose(filled(signal, dropped, "hold")[1], 10.0 * filled(signal, dropped, "hold")[0], rtol=0, atol=0)
+    for fill in ("hold", "zero"):
+        assert not filled(signal, np.ones(8, dtype=bool), fill).any()
+
+
+def test_none_changes_no_bit():
+    for values in (BEARING, HOUSING):
+        one = instrument(values)
+        signal = one.measure(source(one.sensing, 300))
+        assert np.array_equal(signal * one.drift(300, np.random.default_rng(0)), signal)
+        same, share = one.sent(signal, np.random.default_rng(0))
+        assert same is signal
+        assert share == 0.0
+
+
+def test_an_instrument_that_has_them():
+    one = instrument(changed(HOUSING, sensor__drift_scatter=0.05, sensor__dropped_fraction=0.2))
+    drift = one.drift(4000, np.random.default_rng(0))
+    assert drift.shape == (3, 4000)
+    assert np.abs(np.log(drift)).max() < 0.25
+    signal = source(one.sensing, 4000)[:3, :4000]
+    sent, share = one.sent(signal, np.random.default_rng(1))
+    changed_samples = np.any(sent != signal, axis=0)
+    assert share == np.mean(changed_samples) > 0.0
+
+
+@pytest.mark.parametrize(
+    ("changes", "text"),
+    [
+        ({"sensor__drift_scatter": 0.6}, "sensing.sensor.drift_scatter = 0.6 must lie in 0..0.5"),
+        ({"sensor__drift_time_s": 0.01}, "sensing.sensor.drift_time_s = 0.01 must lie in 0.1..1e+06"),
+        ({"sensor__dropped_fraction": -0.1}, "sensing.sensor.dropped_fraction = -0.1 must lie in 0..0.5"),
+        ({"sensor__dropped_run_samples": 0}, "sensing.sensor.dropped_run_samples = 0 must lie in 1..1e+06"),
+        ({"sensor__dropped_run_samples": 2.5}, "sensing.sensor.dropped_run_samples = 2.5 is not a whole number"),
+        ({"sensor__dropped_fill": "nan"}, "sensing.sensor.dropped_fill = 'nan'; allowed: hold, zero"),
+        ({"tacho": None}, "sensing.tacho = None must be a group of keys"),
+        ({"tacho": {"shaft": "pinion"}}, "sensing.tacho: missing pulses_per_turn, pulse_width_share, jitter_deg"),
+        ({"encoder__shaft": "x"}, "sensing.encoder.shaft = 'x'; allowed: pinion, wheel"),
+        ({"encoder": {"lines": 3}}, "sensing.encoder: unknown key 'lines'"),
+    ],
+)
+def test_mistakes(changes, text):
+    with pytest.raises(ConfigError, match=re.escape(text)) as caught:
+        read_sensing(changed(BEARING, **changes))
+    assert "\n" not in str(caught.value)

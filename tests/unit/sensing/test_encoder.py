@@ -1,0 +1,102 @@
+"""An encoder: steps of one line, an error once a turn, a pattern of its own."""
+
+import re
+from dataclasses import replace
+
+import numpy as np
+import pytest
+from numpy.testing import assert_allclose
+
+from gensig.errors import ConfigError
+from gensig.sensing.encoder import Disc, Encoder, draw_disc
+
+PERFECT = Encoder(shaft="pinion", lines_per_turn=1000, eccentricity_error=0.0, line_error=0.0, quantised=True)
+ANGLE = np.linspace(-1.0, 40.0, 200_001)
+
+
+def disc_of(encoder, seed=0):
+    return draw_disc(np.random.default_rng(seed), encoder)
+
+
+def error(encoder, seed=0, angle=ANGLE):
+    """What the encoder reads too much, counted from its index."""
+    disc = disc_of(encoder, seed)
+    return disc.read(angle, quantised=encoder.quantised) - (angle - disc.index)
+
+
+def test_a_perfect_one_is_behind_by_at_most_a_line():
+    disc = disc_of(PERFECT)
+    read = disc.read(ANGLE, quantised=True)
+    off = error(PERFECT)
+    assert off.max() <= 1e-9
+    assert off.min() > -PERFECT.spacing * (1.0 + 1e-9)
+    assert_allclose(read / PERFECT.spacing, np.rint(read / PERFECT.spacing), rtol=0, atol=1e-8)
+    assert np.all(np.diff(read) >= -1e-12)
+    assert_allclose(off.std(), PERFECT.spacing / np.sqrt(12.0), rtol=0.02, atol=0)
+
+
+def test_without_quantisation_a_perfect_one_is_exact():
+    assert_allclose(error(replace(PERFECT, quantised=False)), 0.0, rtol=0, atol=1e-9)
+
+
+@pytest.mark.parametrize("quantised", [True, False])
+def test_errors_are_bounded_by_line_and_errors(quantised):
+    encoder = replace(PERFECT, eccentricity_error=np.radians(1.0), line_error=np.radians(0.03), quantised=quantised)
+    for seed in range(20):
+        off = error(encoder, seed)
+        most = np.radians(1.0) + 4.0 * np.radians(0.03)
+        assert off.max() <= most * (1 + 1e-9)
+        assert off.min() >= -most - (encoder.spacing if quantised else 0.0) - 1e-9
+        assert np.all(np.diff(off + ANGLE) >= -1e-12)  # never backwards
+
+
+def test_eccentricity_errs_once_a_turn():
+    encoder = replace(PERFECT, eccentricity_error=np.radians(1.0), quantised=False)
+    turn = np.linspace(0.0, 6.0 * np.pi, 6000, endpoint=False)  # three turns
+    largest = []
+    for seed in range(60):
+        spectrum = 2.0 * np.abs(np.fft.rfft(error(encoder, seed, turn))) / len(turn)
+        order = np.argmax(spectrum)
+        assert order == 3
+        assert np.delete(spectrum, [3]).max() < 0.02 * spectrum[3]  # (e/R)^2: reading and place are not the same
+        largest.append(spectrum[3])
+    assert np.max(largest) <= np.radians(1.0) * 1.001
+    assert np.max(largest) > 0.9 * np.radians(1.0)
+    assert np.min(largest) < 0.1 * np.radians(1.0)
+
+
+def test_the_pattern_repeats_every_turn_and_is_each_discs_own():
+    encoder = replace(PERFECT, line_error=np.radians(0.02), quantised=False)
+    turn = np.linspace(0.0, 2.0 * np.pi, 5000, endpoint=False)
+    first, second = error(encoder, 3, turn), error(encoder, 3, turn + 6.0 * np.pi)
+    assert_allclose(first, second, rtol=0, atol=1e-9)
+    assert abs(np.corrcoef(first, error(encoder, 4, turn))[0, 1]) < 0.1
+    assert_allclose(np.std(disc_of(encoder).places - encoder.spacing * np.arange(1000)), np.radians(0.02), rtol=0.1)
+
+
+def test_lines_pass_in_order_at_the_largest_errors():
+    encoder = replace(PERFECT, eccentricity_error=np.radians(5.0), line_error=0.1 * PERFECT.spacing)
+    for seed in range(50):
+        places = disc_of(encoder, seed).places
+        assert np.all(np.diff([*places, places[0] + 2.0 * np.pi]) > 0.0)
+
+
+def test_a_line_is_read_where_it_passes():
+    disc = Disc(index=0.5, places=np.array([0.1, np.pi / 2, np.pi, 3 * np.pi / 2]))
+    angle = 0.5 + np.array([0.0, 0.05, 0.11, np.pi - 0.01, np.pi + 0.01, 2 * np.pi + 0.05, 2 * np.pi + 0.11])
+    expected = np.pi / 2 * np.array([-1, -1, 0, 1, 2, 3, 4])
+    assert_allclose(disc.read(angle, quantised=True), expected, rtol=0, atol=1e-12)
+
+
+@pytest.mark.parametrize(
+    ("changes", "text"),
+    [
+        ({"shaft": "load"}, "sensing.encoder.shaft = 'load'; allowed: pinion, wheel"),
+        ({"lines_per_turn": 3}, "sensing.encoder.lines_per_turn = 3 must lie in 4..100000"),
+        ({"eccentricity_error": 0.1}, "sensing.encoder.eccentricity_error_deg = 5.7"),
+        ({"line_error": 0.01}, "must lie in 0..0.036, a tenth of the spacing of the lines"),
+    ],
+)
+def test_values_out_of_range(changes, text):
+    with pytest.raises(ConfigError, match=re.escape(text)):
+        replace(PERFECT, **changes)

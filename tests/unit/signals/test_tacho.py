@@ -1,0 +1,75 @@
+"""From pulses to speed, and to the angle domain at a speed that changes."""
+
+import numpy as np
+import pytest
+from numpy.testing import assert_allclose
+
+from gensig.signals.averaging import resample_to_angle
+from gensig.signals.tacho import pulse_times, resample_by_pulses, speed_of_pulses
+
+RATE = 20_000.0
+
+
+def ramp(n_samples=20_000, start=18.0, slope=12.0):
+    """Time, shaft angle in turns, and the instants of whole turns of a shaft that speeds up steadily."""
+    time = np.arange(n_samples) / RATE
+    turns = start * time + 0.5 * slope * time**2
+    whole = np.arange(1, int(turns[-1]) + 1)
+    return time, turns, (-start + np.sqrt(start**2 + 2.0 * slope * whole)) / slope
+
+
+def test_a_train_of_zeros_and_ones_is_right_within_half_a_sample():
+    _, turns, instants = ramp()
+    found = pulse_times((turns % 1.0 < 0.1) * 5.0 - 2.0, RATE)
+    assert len(found) == len(instants)
+    assert np.abs(found - instants).max() <= 0.5 / RATE * (1 + 1e-9)
+
+
+def test_no_pulse_no_time():
+    assert pulse_times(np.zeros(100), RATE).shape == (0,)
+
+
+def test_speed_between_pulses():
+    _, _, instants = ramp()
+    time, speed = speed_of_pulses(instants)
+    assert_allclose(speed, 18.0 + 12.0 * time, rtol=1e-9, atol=0)  # under steady acceleration the mean is that midway
+    _, twice = speed_of_pulses(instants, 2)
+    assert_allclose(twice, speed / 2.0, rtol=1e-12, atol=0)
+
+
+def test_orders_stay_sharp_where_the_speed_changes():
+    """A tone of order 7: in the angle domain one line, at the mean speed's constant rate a smear."""
+    time, turns, instants = ramp()
+    signal = np.cos(2.0 * np.pi * 7.0 * turns)
+    tracked = resample_by_pulses(signal, RATE, instants)
+    assert tracked.shape[0] == len(instants) - 1
+    spectrum = 2.0 * np.abs(np.fft.rfft(tracked.ravel())) / tracked.size
+    line = 7 * tracked.shape[0]
+    assert_allclose(spectrum[line], 1.0, rtol=1e-3, atol=0)
+    assert np.delete(spectrum, line).max() < 1e-3
+    plain = resample_to_angle(signal, RATE, turns[-1] / time[-1])
+    smeared = 2.0 * np.abs(np.fft.rfft(plain.ravel())) / plain.size
+    assert smeared[7 * plain.shape[0]] < 0.5
+
+
+def test_several_pulses_a_turn_and_several_channels():
+    _, turns, _ = ramp()
+    marks = np.interp(np.arange(1, int(4 * turns[-1])) / 4.0, turns, np.arange(len(turns)) / RATE)
+    signals = np.stack([np.cos(2.0 * np.pi * 3.0 * turns), np.sin(2.0 * np.pi * 3.0 * turns)])
+    found = resample_by_pulses(signals, RATE, marks, pulses_per_turn=4, samples_per_turn=64)
+    assert found.shape == (2, (len(marks) - 1) // 4, 64)
+    angle = 2.0 * np.pi * 3.0 * (0.25 + np.arange(64) / 64.0)  # the first pulse is a quarter turn after the start
+    expected = np.broadcast_to([[np.cos(angle)], [np.sin(angle)]], found.shape)
+    assert_allclose(found, expected, rtol=0, atol=2e-3)
+
+
+def test_at_constant_speed_it_is_that_of_a_constant_speed():
+    signal = np.random.default_rng(0).standard_normal(5000)
+    by_speed = resample_to_angle(signal, RATE, 20.0)
+    by_pulses = resample_by_pulses(signal, RATE, np.arange(5) / 20.0, samples_per_turn=1000)
+    assert_allclose(by_pulses, by_speed[:4], rtol=0, atol=1e-9)
+
+
+def test_too_few_pulses():
+    with pytest.raises(ValueError, match="3 pulses at 4 a turn span no whole turn"):
+        resample_by_pulses(np.zeros(100), RATE, [0.0, 0.001, 0.002], pulses_per_turn=4)
