@@ -15,6 +15,7 @@ from numpy.typing import ArrayLike, NDArray
 FloatArray = NDArray[np.floating]
 
 PADDING = 8  # bins of the searched spectrum for one of the record's
+FADED = 0.2  # of the median amplitude; band-limited noise is below it for 3 % of the time
 
 
 def resample_by_angle(signal: ArrayLike, angle: ArrayLike, samples_per_turn: int) -> FloatArray:
@@ -60,9 +61,9 @@ def find_mesh_frequency(
     rotation_frequency: float,
     *,
     share: float = 0.02,
-    n_harmonics: int = 3,
+    n_harmonics: int = 6,
 ) -> float:
-    """Mesh frequency near the expected one: where the summed amplitudes of its harmonics are largest.
+    """Mesh frequency near the expected one: where its harmonics together stand out most.
 
     Parameters
     ----------
@@ -71,7 +72,7 @@ def find_mesh_frequency(
     n_teeth : teeth of the gear
     rotation_frequency : Hz         expected turns of that gear per second
     share : of the expected frequency, searched on either side
-    n_harmonics : mesh harmonics summed, those below half the sampling rate
+    n_harmonics : mesh harmonics looked at, those below half the sampling rate
 
     Returns
     -------
@@ -83,8 +84,10 @@ def find_mesh_frequency(
 
     Notes
     -----
-    Assumes a constant speed: a speed that drifts by more than a bin over the record blunts the peak. A tone that is
-    stronger than the mesh within the searched band is taken for it.
+    First the largest sum over the harmonics of the logarithm of amplitude over its median in the searched band, so that
+    a foreign tone near one harmonic does not outweigh the mesh in the others; then, within a bin of the record, of the
+    squares, so that the strongest lines tell the place. Assumes a constant speed: one that drifts by more than a bin
+    over the record blunts the peak.
     """
     x = np.asarray(signal, dtype=float)
     x = (x - x.mean(axis=-1, keepdims=True)).reshape(-1, x.shape[-1])
@@ -98,11 +101,15 @@ def find_mesh_frequency(
     amplitude = np.sqrt(np.mean(np.square(spectrum), axis=0))
     spacing = sampling_rate / n_bins
     searched = np.arange((1.0 - share) * expected, (1.0 + share) * expected, spacing / n_harmonics)
-    score = np.zeros(searched.size)
-    for harmonic in range(1, n_harmonics + 1):
-        if harmonic * searched[-1] < 0.5 * sampling_rate:
-            score += np.interp(harmonic * searched / spacing, np.arange(amplitude.size), amplitude)
-    return float(searched[np.argmax(score)])
+    lines = [
+        np.interp(harmonic * searched / spacing, np.arange(amplitude.size), amplitude)
+        for harmonic in range(1, n_harmonics + 1)
+        if harmonic * searched[-1] < 0.5 * sampling_rate
+    ]
+    over = np.array([line / floor for line in lines if (floor := np.median(line)) > 0.0]).reshape(-1, searched.size)
+    coarse = searched[np.argmax(np.sum(np.log(np.maximum(over, 1.0)), axis=0))]
+    near = np.abs(searched - coarse) <= PADDING * spacing
+    return float(searched[near][np.argmax(np.sum(np.square(over), axis=0)[near])])
 
 
 def mesh_phase_angle(
@@ -124,24 +131,25 @@ def mesh_phase_angle(
 
     Raises
     ------
-    ValueError    if the phase runs backwards anywhere: the harmonic is no line that stands out
+    ValueError    where the line fades below a fifth of its median amplitude, or its phase runs backwards: noise does
+                  so, and teeth would be miscounted
 
     Notes
     -----
-    The band is half a shaft order on either side of the harmonic. So it follows what changes slower than once in two
-    turns, keeps the sidebands of the shaft out, and cannot see a speed that varies within a turn. A speed that drifts
-    by more than half a turn's share, 1 / (2 n_teeth harmonic), leaves the band. About two turns at either end bend to
-    each other, because the filter is periodic. Where a turn begins is arbitrary.
+    The harmonic, shifted to frequency 0, is averaged over two turns with a Hann window, which is zero at the sidebands
+    of whole orders of the shaft. So it follows what changes slower than once in four turns, and cannot see a speed that
+    varies within a turn. A speed that drifts by more than the share 1 / (2 n_teeth harmonic) loses the line. At either
+    end one turn is averaged over fewer samples. Where a turn begins is arbitrary.
     """
+    from scipy.signal import get_window, oaconvolve
+
     x = np.asarray(signal, dtype=float)
-    rotation_frequency = mesh_frequency / n_teeth
-    frequency = np.fft.fftfreq(x.size, 1.0 / sampling_rate)
-    distance = np.abs(frequency - harmonic * mesh_frequency) / (0.5 * rotation_frequency)
-    weight = np.where(distance < 1.0, 0.5 + 0.5 * np.cos(math.pi * np.minimum(distance, 1.0)), 0.0)
-    band = np.fft.ifft(np.fft.fft(x - x.mean()) * weight)
-    phase = np.unwrap(np.angle(band))
-    if not np.all(np.diff(phase) > 0.0):
+    window = get_window("hann", round(2.0 * sampling_rate * n_teeth / mesh_frequency))
+    steady = 2.0 * math.pi * harmonic * mesh_frequency / sampling_rate * np.arange(x.size)
+    band = oaconvolve((x - x.mean()) * np.exp(-1j * steady), window, mode="same")
+    phase, magnitude = steady + np.unwrap(np.angle(band)), np.abs(band)
+    if magnitude.min() <= FADED * np.median(magnitude) or not np.all(np.diff(phase) > 0.0):
         raise ValueError(
-            f"the phase at {harmonic * mesh_frequency:.5g} Hz runs backwards: no mesh line stands out there"
+            f"no steady line stands out at {harmonic * mesh_frequency:.5g} Hz; try another harmonic or channel"
         )
     return (phase - phase[0]) / (harmonic * n_teeth)
