@@ -5,6 +5,7 @@ from __future__ import annotations
 from collections import Counter
 from collections.abc import Sequence
 
+from gensig.validation.realism import realism_lines
 from gensig.validation.rows import DIFFERS, FAILS, VERDICTS, Result
 
 SOURCE_TITLES = {
@@ -106,7 +107,7 @@ def markdown(results: Sequence[Result]) -> str:
         for head in dict.fromkeys(_head(result) for result in mine):
             parts.append(f"\n### {TITLES.get(head, head)}\n")
             parts.append(_table([result for result in mine if _head(result) == head], head=head))
-    return "\n".join(parts) + "\n"
+    return "\n".join([*parts, *realism_lines()]) + "\n"
 
 
 def summary(results: Sequence[Result]) -> str:

@@ -1,0 +1,207 @@
+"""``python -m benchmarks.realism``: its laws on made-up signals and tables, and a tiny run from nothing to figures."""
+
+import json
+
+import numpy as np
+import pytest
+from numpy.testing import assert_allclose
+
+from benchmarks import _realism_recording as recording
+from benchmarks import _realism_sets as sets
+from benchmarks import _realism_values as values
+from benchmarks import realism
+from gensig.config import read_request
+from gensig.errors import ConfigError, DatasetError
+from gensig.planning import read_counts
+from gensig.validation.realism import read_ranges
+
+BASE = ["experiment=quickstart", "executor.n_workers=1"]
+TINY = sets.Size(n_units=2, n_gearboxes=1, speeds=(0.5, 1.0), torques=(1.0,), n_turns=3.2, recording_duration=0.16)
+RATE, TEETH, SPEED = 25600.0, 23, 2000.0 / 60.0
+TIME = np.arange(32768) / RATE
+
+
+def healthy(seed=0, *, teeth=TEETH, depth=0.3, noise=0.3):
+    """Two channels of a modulated mesh under noise."""
+    turn = 2 * np.pi * 1.003 * SPEED * TIME
+    mesh = sum(a * np.cos(k * teeth * turn) for k, a in ((1, 1.0), (2, 0.5), (3, 0.25)))
+    x = (1 + depth * np.cos(turn)) * mesh
+    return np.stack([x, 3.0 * x]) + noise * np.random.default_rng(seed).standard_normal((2, TIME.size))
+
+
+class TestValues:
+    def test_resampling_keeps_what_fits_and_nothing_else(self):
+        time = np.arange(51200) / 51200.0
+        for frequency, amplitude in ((1000.0, 1.0), (3000.0, 0.0), (6000.0, 0.0), (20000.0, 0.0)):
+            x = values.to_rate(5.0 + np.sin(2 * np.pi * frequency * time), 51200.0, 5000.0)
+            assert x.shape == (5000,)
+            assert_allclose(np.sqrt(2) * np.std(x[500:-500]), amplitude, atol=5e-3)
+
+    def test_a_record_whose_speed_varies(self):
+        turned = 30.0 * TIME + 0.2 / (2 * np.pi * 2.0) * np.sin(2 * np.pi * 2.0 * TIME)
+        x = np.stack([2.0 * np.cos(2 * np.pi * TEETH * turned), np.random.default_rng(0).standard_normal(TIME.size)])
+        found = values.record_values(x, 2 * np.pi * turned, RATE, 30.0, TEETH)
+        assert_allclose(found["mesh"][0], [2.0, 0.0, 0.0], atol=0.02)
+        assert_allclose(found["nonsynchronous_share"], [0.0, 1.0], atol=0.02)
+        assert_allclose(found["rms"], [np.sqrt(2), np.sqrt(5000 / RATE)], rtol=0.05)
+        assert_allclose(found["rms_full_band"], [np.sqrt(2), 1.0], rtol=0.01)
+        assert found["n_turns"][0] == np.floor(turned[-1])
+
+    def test_harmonic_decades(self):
+        mesh = np.array([[[1.0, 0.1, 1.0], [1.0, 10.0, 1.0]], [[2.0, 2.0, np.nan], [5.0, 5.0, 5.0]]])
+        assert values.harmonic_decades(mesh) == pytest.approx(2.0)
+
+    @staticmethod
+    def table():
+        """Two gearboxes with two specimens each, one set-point and a slower one, healthy and with a missing tooth."""
+        rows = [(label, gearbox, specimen, speed) for label in ("healthy", "missing_tooth") for gearbox in "ab"
+                for specimen in "xy" for speed in (600.0, 1800.0)]  # fmt: skip
+        labels, gearboxes, specimens, speeds = (np.array(column) for column in zip(*rows, strict=True))
+        size = np.where(labels == "healthy", 1.0, 3.0) * np.where(specimens == "x", 1.0, 10.0) * speeds
+        size *= np.where(gearboxes == "a", 1.0, 1e6)  # which other gearboxes or speeds would tell at once
+        plain = ("rms", "kurtosis", "rms_full_band", "kurtosis_full_band", "fm4", "nonsynchronous_share",
+                 "impacts_per_turn", "peak_over_residual", "impact_decay")  # fmt: skip
+        indicators = {name: np.stack([size, 2 * size], axis=1) for name in plain}
+        indicators["mesh"] = np.stack([size[:, None] * [1.0, 2.0]] * 3, axis=-1)
+        columns = {"label_name": labels, "gearbox_id": gearboxes, "specimen_id": specimens, "speed_set_rpm": speeds,
+                   "torque_nm": np.full(len(rows), 2.0), "unit_id": np.char.add(gearboxes, specimens)}  # fmt: skip
+        return values.Table(columns=columns, indicators=indicators, n_failed=0)
+
+    def test_pairs_are_of_one_gearbox_and_set_point_and_of_another_specimen(self):
+        found = values.quantities(self.table())
+        ratios = found["missing_tooth.rms_ratio", values.ALL]
+        assert_allclose(sorted(ratios), [0.3] * 8 + [30.0] * 8)  # 2 gearboxes x 2 speeds x 2 channels, each way
+        assert_allclose(found["missing_tooth.rms_ratio_same_unit", values.ALL], 3.0)
+        assert_allclose(sorted(set(found["healthy.mesh_amplitude_ratio", values.ALL])), [0.1, 10.0])
+
+    def test_the_slow_and_light_corner_stands_apart(self):
+        found = values.quantities(self.table())
+        slow, rest = (found["missing_tooth.kurtosis", where] for where in (values.SLOW, values.ELSEWHERE))
+        assert len(slow) == len(rest) == 8
+        assert_allclose(sorted(rest), 3.0 * np.sort(slow))
+        assert len(found["missing_tooth.kurtosis", values.ALL]) == 16
+
+    def test_every_range_has_its_quantity(self):
+        found = values.quantities(self.table())
+        fault = {place for place in read_ranges() if place[0].startswith(("missing_tooth", "healthy"))}
+        assert fault <= set(found)
+
+
+class TestSets:
+    def test_the_grid_runs_every_unit_at_every_set_point_with_every_class(self):
+        config = read_request(sets.yardstick_words(BASE, sets.Size())).config
+        counts = read_counts(config)
+        assert (counts.n_units, counts.n_conditions, counts.n_records) == (40, 240, 960)
+        vary = config["plan"]["vary"]
+        assert vary["operating.speed_rpm"]["values"] == [600, 1200, 1800]
+        assert vary["operating.torque_nm"]["values"] == [2, 20]
+        assert vary["sensing.snr_db"]["levels"] is None
+        assert config["operating"]["duration_s"] * 600 / 60 >= 10
+
+    def test_cracks_are_a_quarter_to_half_of_the_chord(self):
+        config = read_request(sets.yardstick_words(BASE, TINY)).config
+        spec = config["classes"]["crack"]["vary"]["crack_depth_mm"]
+        assert spec["high"] == pytest.approx(2 * spec["low"], rel=1e-3)
+        assert spec["low"] == pytest.approx(0.25 * 1e3 * sets.root_chord(BASE), rel=1e-3)
+
+    def test_the_machine_of_the_recording_and_what_is_wrong_on_purpose(self):
+        right, teeth, finer, rougher = (
+            read_request(sets.recording_words(BASE, TINY, control)).config for control in sets.CONTROLS
+        )
+        assert [right["gear"][side]["n_teeth"] for side in ("pinion", "wheel")] == [23, 46]
+        assert [teeth["gear"][side]["n_teeth"] for side in ("pinion", "wheel")] == [27, 42]
+        grades = [config["quality"]["iso1328_grade"] for config in (finer, right, rougher)]
+        assert_allclose(np.sqrt(2.0) ** np.diff(grades), 3.0, rtol=1e-3)
+        assert right["plan"]["classes"] == ["healthy"]
+        assert "operating.speed_rpm" not in right["plan"]["vary"]
+
+    def test_too_few_specimens_perfect_gears_and_a_choice_are_refused(self):
+        with pytest.raises(ConfigError, match="3 units in 2 gearboxes"):
+            sets.Size(n_units=3, n_gearboxes=2)
+        with pytest.raises(ConfigError, match="perfect gears"):
+            sets.recording_words([*BASE, "quality.iso1328_grade=null"], TINY, "right")
+        with pytest.raises(ConfigError, match="would be crossed"):
+            sets.yardstick_words([*BASE, "plan.vary={sensing.snr_db: {distribution: choice, values: [10, 20]}}"], TINY)
+
+
+class TestRecording:
+    def test_indicators_do_not_know_the_gain(self):
+        x = healthy()
+        for name, found in recording.indicators(x, RATE, TEETH, SPEED).items():
+            assert_allclose(recording.indicators(1e-3 * x, RATE, TEETH, SPEED)[name], found, rtol=1e-6, err_msg=name)
+
+    def test_indicators_of_a_modulated_mesh(self):
+        found = recording.indicators(healthy(noise=0.05), RATE, TEETH, SPEED)
+        assert_allclose(found["harmonic_2_over_1"], -6.02, atol=0.2)
+        assert_allclose(found["harmonic_3_over_1"], -12.04, atol=0.4)
+        assert_allclose(found["sideband_ratio"], 20 * np.log10(0.3), atol=0.6)
+        carrier = 0.5 * (1 + 0.25 + 0.0625)
+        assert_allclose(found["mesh_share"], 10 * np.log10(carrier / (carrier * (1 + 0.3**2 / 2))), atol=0.1)
+
+    def test_other_teeth_and_stronger_sidebands_are_told_apart_and_the_same_machine_is_not(self):
+        def simulated(**changes):
+            rows = [recording.indicators(healthy(seed, **changes), RATE, TEETH, SPEED) for seed in range(10, 22)]
+            return {name: np.array([row[name] for row in rows]) for name in recording.INDICATORS}
+
+        controls = dict(zip(sets.CONTROLS, (simulated(), simulated(teeth=27), simulated(depth=0.1), simulated()),
+                            strict=True))  # fmt: skip
+        found = recording.recording_comparisons(controls, recording.indicators(healthy(1), RATE, TEETH, SPEED))
+        verdicts = {one.place: one.verdict for one in found}
+        assert verdicts["recording.mesh_share", "wrong teeth"] == "told apart"
+        assert verdicts["recording.sideband_ratio", "errors / 3"] == "told apart"
+        assert verdicts["recording.sideband_ratio", "errors x 3"] == "not told apart"
+        at = [one.at for one in found if one.id == "recording.fm4"]
+        assert at == ["channels", "width", "wrong teeth", "errors / 3", "errors x 3"]
+        without = recording.recording_comparisons(controls, None)
+        assert next(one.at for one in without if one.id == "recording.fm4") == "simulated"
+
+    def test_nothing_is_looked_for_without_the_variable(self, monkeypatch, tmp_path):
+        monkeypatch.delenv(recording.VARIABLE, raising=False)
+        assert recording.find_recording() is None
+        monkeypatch.setenv(recording.VARIABLE, str(tmp_path))
+        assert recording.find_recording() is None
+        np.savez(tmp_path / "healthy_x.npz", other=np.zeros(3))
+        with pytest.raises(DatasetError, match="holds no array 'acceleration'"):
+            recording.find_recording()
+
+    def test_the_real_recording_shows_its_mesh(self):
+        x = recording.find_recording()
+        if x is None:
+            pytest.skip(f"${recording.VARIABLE} names no folder with the recording")
+        found = recording.recording_indicators(x)
+        assert all(np.isfinite(one).all() for one in found.values())
+        assert recording.find_mesh_frequency(x, RATE, TEETH, SPEED) == pytest.approx(TEETH * SPEED, rel=2e-3)
+
+
+def test_storing_needs_the_commit_and_all_units(capsys):
+    assert realism.main(["--stored"]) == 2
+    assert "--frozen COMMIT" in capsys.readouterr().err
+    assert realism.main(["--stored", "--quick", "--frozen", "0123abc"]) == 2
+    assert "too few units" in capsys.readouterr().err
+
+
+def test_from_nothing_to_table_and_figures(tmp_path, monkeypatch, capsys):
+    monkeypatch.delenv(recording.VARIABLE, raising=False)
+    monkeypatch.setattr(realism, "QUICK", TINY)
+    folders = {"--data": "data", "--json": "found.json", "--figures": "figures"}
+    places = [word for option, name in folders.items() for word in (option, str(tmp_path / name))]
+    words = ["--quick", "--base", " ".join(BASE), *places]
+    assert realism.main(words) == 0
+    said = capsys.readouterr().out
+    assert "real recording is left out" in said
+    assert "16 records, 0 failed, at least 3 turns" in said
+    assert "ranges frozen in commit (none named)" in said
+    rows = {(row["id"], row["at"]): row for row in json.loads((tmp_path / "found.json").read_text())["rows"]}
+    assert set(read_ranges()) < set(rows)
+    # 2 specimens each way x 2 set-points x 4 channels
+    assert rows["crack.rms_ratio", "all conditions"]["n"] == 16
+    assert rows["missing_tooth.kurtosis", "slow and light"]["n"] == 8
+    assert rows["recording.kurtosis", "simulated"]["n"] == 8
+    pictures = [tmp_path / "figures" / f"realism_{name}.png" for name in ("yardstick", "recording")]
+    assert all(path.stat().st_size > 10_000 for path in pictures)
+    plan = (tmp_path / "data" / "yardstick" / "plan.csv").stat().st_mtime_ns
+    assert realism.main(words) == 0  # what is there is read, not made again
+    assert (tmp_path / "data" / "yardstick" / "plan.csv").stat().st_mtime_ns == plan
+    capsys.readouterr()
+    assert realism.main([*words, "--base", " ".join([*BASE, "seed=1"])]) == 1
+    assert "holds a data set of other overrides" in capsys.readouterr().err

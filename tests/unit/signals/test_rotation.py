@@ -1,0 +1,91 @@
+"""The angle domain by a known angle, and an angle found in the mesh alone."""
+
+import numpy as np
+import pytest
+from numpy.testing import assert_allclose
+
+from gensig.signals.averaging import resample_to_angle
+from gensig.signals.rotation import find_mesh_frequency, mesh_phase_angle, resample_by_angle
+
+RATE, TEETH = 10_000.0, 23
+TIME = np.arange(40_000) / RATE
+TURNS = 20.0 * TIME + 0.16 / (2 * np.pi * 0.4) * np.sin(2 * np.pi * 0.4 * TIME)  # 20 Hz, 0.8 % up and down
+
+
+def mesh(turns, *harmonics):
+    return sum(a * np.cos(2 * np.pi * (k + 1) * TEETH * turns + k) for k, a in enumerate(harmonics))
+
+
+def test_a_steady_angle_gives_what_a_steady_speed_gives():
+    x = np.random.default_rng(0).standard_normal((2, TIME.size)).cumsum(axis=-1)
+    by_angle = resample_by_angle(x, 2 * np.pi * 17.3 * TIME, 578)
+    by_speed = resample_to_angle(x, RATE, 17.3, 578)
+    assert by_angle.shape == by_speed.shape
+    assert_allclose(by_angle[:, 1:-1], by_speed[:, 1:-1], atol=1e-6 * np.abs(x).max())
+
+
+def test_a_varying_speed_is_taken_out_by_the_angle_only():
+    x = mesh(TURNS, 1.0, 0.5)
+    turns = resample_by_angle(x, 2 * np.pi * TURNS, 500)
+    assert_allclose(turns[5], turns[50], atol=2e-3)
+    steady = resample_to_angle(x, RATE, 20.0, 500)
+    assert np.abs(steady[5] - steady[50]).max() > 0.5
+
+
+@pytest.mark.parametrize("angle", [np.zeros(100), -np.arange(100.0), np.arange(99.0), np.full(100, np.nan)])
+def test_an_angle_that_does_not_rise_is_refused(angle):
+    with pytest.raises(ValueError, match="must rise"):
+        resample_by_angle(np.ones(100), angle, 10)
+
+
+def test_less_than_a_turn_is_refused():
+    with pytest.raises(ValueError, match=r"0\.5 turns"):
+        resample_by_angle(np.ones(101), np.linspace(0, np.pi, 101), 10)
+
+
+@pytest.mark.parametrize("true", [19.71, 20.0, 20.33])
+def test_mesh_frequency_is_found_through_noise_and_sidebands(true):
+    turns = true * TIME
+    modulated = (1 + 0.8 * np.cos(2 * np.pi * turns)) * mesh(turns, 1.0, 0.3, 0.5)
+    x = modulated + np.random.default_rng(1).standard_normal(TIME.size)
+    assert find_mesh_frequency(x, RATE, TEETH, 20.0) == pytest.approx(TEETH * true, rel=2e-5)
+
+
+def test_a_foreign_tone_near_one_harmonic_is_not_taken_for_the_mesh():
+    x = mesh(20.1 * TIME, 0.2, 0.1, 0.2, 0.1) + 2.0 * np.cos(2 * np.pi * TEETH * 19.8 * TIME)
+    x += 0.5 * np.random.default_rng(4).standard_normal(TIME.size)
+    assert find_mesh_frequency(x, RATE, TEETH, 20.0) == pytest.approx(TEETH * 20.1, rel=1e-4)
+    assert find_mesh_frequency(x, RATE, TEETH, 20.0, n_harmonics=1) == pytest.approx(TEETH * 19.8, rel=1e-4)
+
+
+def test_channels_are_searched_together():
+    rng = np.random.default_rng(2)
+    x = rng.standard_normal((2, TIME.size))
+    x[1] += 0.3 * mesh(20.21 * TIME, 1.0)
+    assert find_mesh_frequency(x, RATE, TEETH, 20.0) == pytest.approx(TEETH * 20.21, rel=1e-4)
+
+
+def test_a_search_that_reaches_sidebands_or_folds_is_refused():
+    with pytest.raises(ValueError, match="reaches sidebands"):
+        find_mesh_frequency(TIME, RATE, 84, 5.0)
+    with pytest.raises(ValueError, match="above half"):
+        find_mesh_frequency(TIME, RATE, TEETH, 300.0)
+
+
+def test_angle_from_the_mesh_phase():
+    x = (1 + 0.5 * np.cos(2 * np.pi * TURNS)) * mesh(TURNS, 1.0, 0.4)
+    x += 0.3 * np.random.default_rng(3).standard_normal(TIME.size)
+    inner = slice(500, -500)  # a turn at either end is averaged over fewer samples
+    for harmonic in (1, 2):
+        angle = mesh_phase_angle(x, RATE, TEETH, TEETH * 20.0, harmonic=harmonic)
+        error = (angle - 2 * np.pi * TURNS)[inner]
+        assert np.ptp(error) < np.radians(1.0)  # noise in the band
+    steady = (2 * np.pi * 20.0 * TIME - 2 * np.pi * TURNS)[inner]
+    assert np.ptp(steady) > np.radians(40)
+
+
+def test_no_line_no_angle():
+    noise = np.random.default_rng(5).standard_normal(TIME.size)
+    with pytest.raises(ValueError, match="no steady line stands out at 460 Hz"):
+        mesh_phase_angle(noise, RATE, TEETH, TEETH * 20.0)
+    mesh_phase_angle(noise + mesh(20.0 * TIME, 0.5), RATE, TEETH, TEETH * 20.0)

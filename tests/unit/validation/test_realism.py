@@ -1,0 +1,97 @@
+"""Measured ranges and stored results: how they are judged, kept and shown. All numbers here are made up."""
+
+import csv
+import math
+
+import pytest
+
+from gensig.errors import ConfigError
+from gensig.validation import realism
+from gensig.validation.realism import Comparison, Range, compare, judge, read_ranges, read_results, write_results
+
+NAN = math.nan
+
+
+def measured(**changes) -> Range:
+    return Range(**{"id": "a.b", "at": "here", "unit": "ms", "low": 1.0, "high": 2.0, "source": "rig", **changes})
+
+
+@pytest.mark.parametrize(
+    ("low", "high", "p5", "p95", "verdict"),
+    [
+        (1, 2, 1.1, 1.9, "inside"),
+        (1, 2, 1, 2, "inside"),
+        (1, 2, 0.9, 1.9, "overlaps"),
+        (1, 2, 0.5, 3, "overlaps"),
+        (1, 2, 2, 3, "overlaps"),
+        (1, 2, 2.1, 3, "misses"),
+        (1, 2, 0.1, 0.9, "misses"),
+        (None, 2, -9, 1, "inside"),
+        (None, 2, 3, 4, "misses"),
+        (1, None, 3, 400, "inside"),
+        (None, None, 3, 4, "no range"),
+        (1, 2, NAN, NAN, "no value"),
+        (None, None, NAN, NAN, "no value"),
+    ],
+)
+def test_verdicts(low, high, p5, p95, verdict):
+    assert judge(low, high, p5, p95) == verdict
+
+
+def test_values_that_are_unknown_do_not_count():
+    found = compare(measured(), [NAN, 1.0, 1.5, 2.0, NAN])
+    assert (found.median, found.n, found.verdict) == (1.5, 3, "inside")
+    assert (found.p5, found.p95) == pytest.approx((1.05, 1.95))
+    assert compare(measured(), [NAN]).verdict == "no value"
+
+
+def test_every_published_range_is_read_once_and_makes_sense():
+    found = read_ranges()
+    with realism.RANGES.open(encoding="utf-8") as file:
+        assert len(found) == len(list(csv.DictReader(file))) > 20
+    bounded = [one for one in found.values() if one.low is not None or one.high is not None]
+    assert all(one.source for one in bounded)
+    assert found["missing_tooth.kurtosis", "slow and light"].low == 20.0
+    assert found["missing_tooth.rms_ratio", "all conditions"].low is None
+
+
+def test_a_range_upside_down_and_a_verdict_there_is_not_are_refused():
+    with pytest.raises(ConfigError, match="low = 3 lies above high = 2"):
+        measured(low=3.0)
+    with pytest.raises(ConfigError, match="verdict = 'fine'; allowed: inside"):
+        Comparison(**{name: getattr(measured(), name) for name in ("id", "at", "unit", "low", "high", "source")},
+                   median=1.0, p5=1.0, p95=1.0, n=1, verdict="fine")  # fmt: skip
+
+
+def test_results_come_back_and_reasons_stay(tmp_path):
+    path = tmp_path / "results.csv"
+    found = [compare(measured(), [1.5, 1.6]), compare(measured(id="recording.x", low=None), [NAN])]
+    write_results(path, "base, gensig 0,\nfrozen", found)
+    heading, back = read_results(path)
+    assert heading == "base, gensig 0, frozen"
+    assert back[0] == found[0]
+    assert (back[1].n, back[1].verdict, back[1].low) == (0, "no value", None)
+    path.write_text(path.read_text().replace("inside,", "inside,because"))
+    write_results(path, "again", [compare(measured(), [9.0])])
+    heading, (one,) = read_results(path)
+    assert (heading, one.verdict, one.reason) == ("again", "misses", "because")
+
+
+def test_a_file_without_its_heading_is_refused(tmp_path):
+    path = tmp_path / "results.csv"
+    path.write_text("id,at\n")
+    with pytest.raises(ConfigError, match="must begin with a line '# '"):
+        read_results(path)
+
+
+def test_section(tmp_path):
+    path = tmp_path / "results.csv"
+    assert realism.realism_lines(path) == []
+    write_results(path, "told so", [compare(measured(), [1.5, 1.6]), compare(measured(id="recording.x"), [9.0])])
+    lines = realism.realism_lines(path)
+    assert "Compared: told so" in lines
+    assert any(line.startswith("| a.b, ms | here | 1 to 2 | 1.55 | ") and " inside | rig |" in line for line in lines)
+    assert lines.index("### Yardstick") < lines.index("### A healthy recording")
+    assert {line.count("|") for line in lines if line.startswith("| ")} == {10}
+    write_results(path, "told so", [compare(measured(), [1.5])])
+    assert "### A healthy recording" not in realism.realism_lines(path)
