@@ -19,7 +19,7 @@ from gensig.dynamics.decimation import decimator, in_band_error
 from gensig.dynamics.lanes import pack
 from gensig.dynamics.pair import PairDynamics
 from gensig.planning import make_plan
-from gensig.records import record_system, row_run, row_values
+from gensig.rows import record_system, row_run, row_values
 
 Array = NDArray[np.float64]
 Work = tuple[Callable[[], Any], float]  # what to time, and the seconds that it simulates

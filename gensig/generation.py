@@ -30,7 +30,8 @@ from gensig.dynamics.decimation import usable_band
 from gensig.errors import ConfigError, DatasetError
 from gensig.execution.base import Executor, ShardFailure
 from gensig.planning import check_switches, make_plan
-from gensig.records import read_seed, signal_shapes, simulate_records
+from gensig.records import signal_shapes, simulate_records
+from gensig.rows import read_seed
 from gensig.systems.registry import read_system
 from gensig.systems.spur_pair import SpurPair
 from gensig.units import from_si

@@ -20,16 +20,8 @@ from gensig.errors import ConfigError
 from gensig.faults.base import faulty_teeth
 from gensig.faults.registry import COMPOUND, fault_parts, read_faults
 from gensig.mesh.pair_table import check_teeth
-from gensig.records import (
-    MISSING,
-    Stream,
-    read_seed,
-    record_system,
-    replace_key,
-    signal_shapes,
-    stream,
-    whole_number,
-)
+from gensig.records import signal_shapes
+from gensig.rows import MISSING, Stream, read_seed, record_system, replace_key, stream, whole_number
 from gensig.systems.registry import read_system
 from gensig.systems.shaft_sensors import SWITCHES
 from gensig.systems.spur_pair import SpurPair, severity

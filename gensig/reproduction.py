@@ -19,18 +19,8 @@ from gensig.dataset.plan import Plan, read_plan
 from gensig.dataset.quantization import quantized, read_signal
 from gensig.dataset.schema import SCALES
 from gensig.errors import ConfigError, DatasetError, SimulationError
-from gensig.records import (
-    Record,
-    record_system,
-    row_clean,
-    row_instrument,
-    row_noisy,
-    row_run,
-    row_values,
-    shaken,
-    simulate_record,
-    simulate_records,
-)
+from gensig.records import Record, simulate_record, simulate_records
+from gensig.rows import record_system, row_clean, row_instrument, row_noisy, row_run, row_values, shaken
 from gensig.systems.lead_in import simulate_with_lead_in
 
 ACCEPTED = 1e-6  # of a record's RMS, where the processor or a library is another

@@ -17,7 +17,8 @@ from gensig.dataset.splits import SUBSETS, make_splits
 from gensig.dynamics._vector import n_lanes
 from gensig.errors import ConfigError, DatasetError
 from gensig.planning import check_switches, make_plan
-from gensig.records import Record, read_seed, simulate_records, whole_number
+from gensig.records import Record, simulate_records
+from gensig.rows import read_seed, whole_number
 
 EPOCH_STREAM = 9100  # spawn key of the seeds of later epochs; the causes of a record and the splits have others
 

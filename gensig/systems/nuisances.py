@@ -13,6 +13,7 @@ from gensig.dynamics.pair import PairDynamics
 from gensig.dynamics.response import accelerations
 from gensig.sensing.nuisance import draw_tones
 from gensig.sensing.tones import SENSE, TURN, Tones, shaft
+from gensig.systems.shaft_sensors import gear_angle
 from gensig.systems.spur_pair import CleanRecord, Run, Start
 
 Array = NDArray[np.float64]
@@ -59,7 +60,9 @@ def nuisance_acceleration(run: Run, dynamics: PairDynamics, tones: Sequence[Tone
     n_lead, rate = sensing.n_lead, sensing.sampling_rate
     before = operating.nominal(np.arange(-n_lead, 0) / rate).angle + shaft_angle[0]
     turned = np.concatenate([before, shaft_angle])
-    first, ratio = _first_angles(run), {gear: shaft(dynamics, gear).speed_ratio for gear in SENSE}
+    begin_at = run.start or Start(tooth_pinion=0, tooth_wheel=0, phase=0.0)
+    first = {gear: float(gear_angle(run.system, gear, begin_at, np.zeros(1))[0]) for gear in SENSE}
+    ratio = {gear: shaft(dynamics, gear).speed_ratio for gear in SENSE}
     channels = [dynamics.dofs.index(name) for name in sensing.channels]
     edges = np.arange(0, len(turned) + BLOCK, BLOCK)
     nominal = operating.nominal((edges - n_lead) / rate)
@@ -85,15 +88,6 @@ def nuisance_acceleration(run: Run, dynamics: PairDynamics, tones: Sequence[Tone
             out[:, start : start + BLOCK] += share * np.einsum("ct,ts->cs", end - begin, waves)
             begin = end
     return out
-
-
-def _first_angles(run: Run) -> dict[str, float]:
-    """Angle of either gear from its tooth 0 on where the pinion stands at its nominal first place, rad."""
-    start, pair = run.start or Start(tooth_pinion=0, tooth_wheel=0, phase=0.0), run.system.pair
-    return {
-        "pinion": TURN * (start.tooth_pinion + start.phase) / pair.pinion.n_teeth,
-        "wheel": TURN * (start.tooth_wheel + start.phase) / pair.wheel.n_teeth,
-    }
 
 
 def _amplitudes(dynamics: PairDynamics, tones: Tones, speed: float, torque_factor: float, highest: float) -> Complex:

@@ -8,8 +8,9 @@ import pytest
 from gensig.config import read_request
 from gensig.errors import ConfigError
 from gensig.planning import make_plan
-from gensig.records import forget_twins, record_system, row_run, row_values, shaken, simulate_record, simulate_records
+from gensig.records import forget_twins, simulate_record, simulate_records
 from gensig.reproduction import simulate_twin
+from gensig.rows import record_system, row_run, row_values, shaken
 from gensig.systems.nuisances import with_nuisances
 from gensig.systems.spur_pair import CleanRecord
 

@@ -8,7 +8,8 @@ from gensig.cli import main
 from gensig.config import read_request
 from gensig.dataset.reader import open_dataset
 from gensig.planning import make_plan
-from gensig.records import forget_twins, record_system, row_instrument, row_values, simulate_records
+from gensig.records import forget_twins, simulate_records
+from gensig.rows import record_system, row_instrument, row_values
 from gensig.streaming import open_stream
 
 SET = ("sensing=housing", "sensing.channels=[pinion_x,pinion_y,wheel_x,wheel_y]", "operating.duration_s=0.05")

@@ -13,7 +13,8 @@ from gensig.config import read_request
 from gensig.dataset.reader import open_dataset
 from gensig.errors import ConfigError
 from gensig.planning import check_switches, make_plan
-from gensig.records import forget_twins, record_system, row_values, simulate_records
+from gensig.records import forget_twins, simulate_records
+from gensig.rows import record_system, row_values
 from gensig.signals.averaging import time_synchronous_average
 from gensig.signals.tacho import pulse_times, resample_by_pulses, speed_of_pulses
 

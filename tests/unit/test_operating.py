@@ -14,7 +14,7 @@ from scipy.integrate import quad
 from gensig.config import read_request
 from gensig.courses import MOST_POINTS, Profile
 from gensig.errors import ConfigError
-from gensig.records import record_system
+from gensig.rows import record_system
 from gensig.systems.operation import read_profile
 from gensig.systems.registry import read_system
 

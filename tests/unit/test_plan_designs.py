@@ -18,7 +18,8 @@ from gensig.dataset.schema import COLUMNS
 from gensig.dataset.splits import make_splits
 from gensig.errors import ConfigError
 from gensig.planning import MOST_IN_GRID, describe_design, make_plan
-from gensig.records import FIXED_KEYS, Stream, simulate_records, stream
+from gensig.records import simulate_records
+from gensig.rows import FIXED_KEYS, Stream, stream
 from gensig.units import split_unit
 
 CLASSES = ("healthy", "crack", "pitting", "missing_tooth")

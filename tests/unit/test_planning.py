@@ -14,7 +14,8 @@ from gensig.dataset.plan import plan_text
 from gensig.errors import ConfigError, ExtrapolationError, FaultError, GensigError, GeometryError
 from gensig.faults.registry import read_faults
 from gensig.planning import make_plan, record_bytes, records_per_shard
-from gensig.records import row_faults, simulate_record, stream
+from gensig.records import simulate_record
+from gensig.rows import row_faults, stream
 from gensig.systems.registry import read_system
 from gensig.systems.spur_pair import severity
 

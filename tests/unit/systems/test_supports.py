@@ -14,7 +14,8 @@ from gensig.dynamics.bearing import support_stiffness
 from gensig.dynamics.integrator import settling_time
 from gensig.errors import ConfigError
 from gensig.planning import make_plan
-from gensig.records import Stream, record_system, row_run, row_values, simulate_record, stream
+from gensig.records import simulate_record
+from gensig.rows import Stream, record_system, row_run, row_values, stream
 from gensig.sensing.manufacturing import draw_gearbox, nominal_gearbox, with_damping_ratio
 from gensig.systems.registry import read_system
 from gensig.systems.spur_pair import Run
