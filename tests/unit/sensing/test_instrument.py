@@ -153,5 +153,5 @@ def test_a_measured_path_tells_no_transverse_motion():
 
 
 def test_a_group_without_the_new_keys_is_named():
-    with pytest.raises(ConfigError, match=re.escape("sensing: missing path, sensor, noise, tacho, encoder")):
+    with pytest.raises(ConfigError, match=re.escape("sensing: missing path, sensor, noise, nuisances, tacho, encoder")):
         read_sensing({key: value for key, value in BEARING.items() if key not in NESTED})
