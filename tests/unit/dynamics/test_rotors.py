@@ -299,7 +299,7 @@ class TestConfiguration:
             ("motor", 5, "system.motor = 5 must be a group of keys"),
             ("load", {"inertia": 1}, "system.load: 'inertia' has the wrong unit; write it as 'inertia_kg_m2'"),
             ("motor", {"inertia_kg_m2": 1.0}, "system.motor: missing coupling_stiffness_nm_per_rad"),
-            ("motr", {}, "system: unknown key 'motr'; known: kind, motor, load"),
+            ("motr", {}, "system: unknown key 'motr'; known: kind, supports, motor, load"),
         ],
     )  # fmt: skip
     def test_shapes(self, config_with, key, value, text):
