@@ -45,18 +45,15 @@ def read_spur_pair(config: Mapping[str, Any]) -> SpurPair:
         if key not in SYSTEM_KEYS:
             raise ConfigError(f"system: unknown key '{key}'; known: {', '.join(SYSTEM_KEYS)}")
     gears = {name: _read_gear(name, gear) for name in SIDES}
-    pair = GearPair(**gears, backlash=_number("gear.backlash_um", gear["backlash_um"]))
-    quality = read(Quality, section(config, "quality"), "quality")
-    quality.check_backlash(pair.backlash)
     return SpurPair(
-        pair=pair,
+        pair=GearPair(**gears, backlash=_number("gear.backlash_um", gear["backlash_um"])),
         material=material,
         mesh=read_mesh_options(section(config, "mesh")),
         pinion=_read_body(gears["pinion"], sides["pinion"], material),
         wheel=_read_body(gears["wheel"], sides["wheel"], material),
         operating=_read_operating(section(config, "operating")),
         sensing=read_sensing(section(config, "sensing")),
-        quality=quality,
+        quality=read(Quality, section(config, "quality"), "quality"),
         solver=read(Solver, section(config, "solver"), "solver"),
         motor=_read_rotor("system.motor", machine.get("motor")),
         load=_read_rotor("system.load", machine.get("load")),
