@@ -27,6 +27,7 @@ from gensig.units import from_si, unit
 Array = NDArray[np.float64]
 
 FORM_WAVES = 3  # most waves of the form deviation from end to end; whole ones have no slope of their own
+SUPPORT_SCATTERS = ("support_stiffness_scatter", "support_damping_scatter")
 RUNOUT_STEPS = 20  # in which the eccentricity is made smaller until the index deviation fits its limit
 
 
@@ -37,9 +38,10 @@ class Quality:
     Every deviation of a gear uses the same share of its ISO 1328-1 limit, between ``used_share_low`` and
     ``used_share_high``. ``iso1328_grade`` None makes perfect gears: only the supports scatter. ``tooth_share`` is the
     part of the profile slope that differs from tooth to tooth, ``undulation_share`` that of the profile form that is
-    ``undulation_waves`` waves. Misalignment and backlash are uniform within plus and minus ``misalignment`` and
-    ``backlash_scatter``. The support scatters are standard deviations of the logarithm. Where the damping ratios are
-    given, each support of a gearbox has one between them, and their scatter is not read.
+    ``undulation_waves`` waves. Misalignment is uniform within plus and minus ``misalignment``, backlash within plus and
+    minus the share ``backlash_scatter`` of the nominal one. The support scatters are standard deviations of the
+    logarithm. Where the damping ratios are given, each support of a gearbox has one between them, and their scatter is
+    not read.
     """
 
     iso1328_grade: float | None
@@ -50,7 +52,7 @@ class Quality:
     undulation_share: float
     undulation_waves: int
     misalignment: float = unit("um")
-    backlash_scatter: float = unit("um")
+    backlash_scatter: float
     support_stiffness_scatter: float
     support_damping_scatter: float
     support_damping_ratio_low: float | None = None
@@ -62,29 +64,19 @@ class Quality:
             raise ConfigError(f"quality.iso1328_grade = {self.iso1328_grade:g} must lie in {grades}, or be null")
         if not 0.0 <= self.used_share_low <= self.used_share_high <= 1.0:
             raise ConfigError("quality.used_share_low and used_share_high must be ordered and lie in 0..1")
-        for key in ("tooth_share", "undulation_share", "support_stiffness_scatter", "support_damping_scatter"):
+        for key in ("tooth_share", "undulation_share", "backlash_scatter", *SUPPORT_SCATTERS):
             if not 0.0 <= getattr(self, key) <= 1.0:
                 raise ConfigError(f"quality.{key} = {getattr(self, key):g} must lie in 0..1")
         if not 1 <= self.undulation_waves <= 50:
             raise ConfigError(f"quality.undulation_waves = {self.undulation_waves} must lie in 1..50")
-        for key in ("misalignment_um", "backlash_scatter_um"):
-            value = getattr(self, key.removesuffix("_um"))
-            if value < 0.0:
-                raise ConfigError(f"quality.{key} = {from_si(key, value):g} must not be negative")
-
+        if self.misalignment < 0.0:
+            value = from_si("misalignment_um", self.misalignment)
+            raise ConfigError(f"quality.misalignment_um = {value:g} must not be negative")
         low, high = self.support_damping_ratio_low, self.support_damping_ratio_high
         if (low is None) != (high is None) or (low is not None and high is not None and not 0.0 < low <= high <= 1.0):
             raise ConfigError(
                 f"quality.support_damping_ratio_low = {low} and support_damping_ratio_high = {high} must be ordered, "
                 "above 0 and at most 1, or both null"
-            )
-
-    def check_backlash(self, backlash: float) -> None:
-        """Raise ConfigError where a drawn backlash could be negative; the nominal one in m."""
-        if self.iso1328_grade is not None and self.backlash_scatter > backlash:
-            raise ConfigError(
-                f"quality.backlash_scatter_um = {self.backlash_scatter * 1e6:g} must not be above "
-                f"gear.backlash_um = {backlash * 1e6:g}"
             )
 
     def check_covered(self, *gears: Gear) -> None:
@@ -109,7 +101,7 @@ class Specimen:
     pinion_error, wheel_error : (tooth,) m    how far every tooth stands back at the pitch point, as a gap
     pinion_tilt, wheel_tilt : (tooth,) m/m    how fast that grows with the contact's position along the path; 0: nowhere
     forms : what the flanks of all teeth share, as transforms that come before a record's own faults
-    backlash_change : m    along the line of action
+    backlash_factor : on the nominal backlash
     """
 
     pinion_error: Array
@@ -117,7 +109,7 @@ class Specimen:
     pinion_tilt: Array | float = 0.0
     wheel_tilt: Array | float = 0.0
     forms: tuple[FlankForm, ...] = ()
-    backlash_change: float = 0.0
+    backlash_factor: float = 1.0
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -156,7 +148,7 @@ def draw_specimen(rng: np.random.Generator, pinion: Gear, wheel: Gear, quality: 
         pinion_tilt=pinion_tilt,
         wheel_tilt=wheel_tilt,
         forms=(*pinion_forms, *wheel_forms, *((misalignment,) if misalignment.misalignment else ())),
-        backlash_change=play * quality.backlash_scatter,
+        backlash_factor=1.0 + play * quality.backlash_scatter,
     )
 
 

@@ -45,17 +45,14 @@ def read_spur_pair(config: Mapping[str, Any]) -> SpurPair:
         if key not in SYSTEM_KEYS:
             raise ConfigError(f"system: unknown key '{key}'; known: {', '.join(SYSTEM_KEYS)}")
     gears = {name: _read_gear(name, gear) for name in SIDES}
-    pair = GearPair(**gears, backlash=_number("gear.backlash_um", gear["backlash_um"]))
-    operating = read_operating(section(config, "operating"))
-    quality = read(Quality, section(config, "quality"), "quality")
-    quality.check_backlash(pair.backlash)
+    operating, quality = read_operating(section(config, "operating")), read(Quality, section(config, "quality"), "quality")
     bodies = {name: _read_body(gears[name], sides[name], material) for name in SIDES}
     held = {name: read_holding(gears[name], sides[name]) for name in SIDES}
     if on_bearings(machine.get("supports", AS_GIVEN), quality):
         force = operating.torque / gears["pinion"].base_radius
         bodies = {name: put_on_bearings(bodies[name], gears[name], held[name], material, force) for name in SIDES}
     return SpurPair(
-        pair=pair,
+        pair=GearPair(**gears, backlash=_number("gear.backlash_um", gear["backlash_um"])),
         material=material,
         mesh=read_mesh_options(section(config, "mesh")),
         pinion=bodies["pinion"],

@@ -131,9 +131,7 @@ class SpurPair:
     def _specimen_table(self, faults: Sequence[Fault], specimen: Specimen) -> PairTable:
         """The faults on the flanks of a set of gears, at its backlash; which asks for no tables of its own."""
         table = self.mesh_table((*specimen.forms, *faults))
-        if specimen.backlash_change == 0.0:
-            return table
-        return replace(table, pair=replace(self.pair, backlash=self.pair.backlash + specimen.backlash_change))
+        return replace(table, pair=replace(self.pair, backlash=self.pair.backlash * specimen.backlash_factor))
 
     @property
     def mesh_force(self) -> float:

@@ -138,12 +138,12 @@ class TestProfile:
 def test_drawn_backlash_asks_for_no_further_tables(xiamen):
     perfect = perfect_specimen(xiamen.pair.pinion, xiamen.pair.wheel)
     nominal, wider = (
-        Run(system=xiamen, faults=(), specimen=replace(perfect, backlash_change=change)).dynamics()
-        for change in (0.0, 15 * UM)
+        Run(system=xiamen, faults=(), specimen=replace(perfect, backlash_factor=factor)).dynamics()
+        for factor in (1.0, 1.2)
     )
     assert wider.table.pinion is nominal.table.pinion
     rows = [machine.numbers(1e-6, machine.rest())[BACKLASH] for machine in (nominal, wider)]
-    assert_allclose(np.diff(rows), 15 * UM, rtol=1e-9, atol=0)
+    assert_allclose(rows, [80 * UM, 96 * UM], rtol=1e-9, atol=0)
 
 
 @pytest.mark.parametrize("misalignment", [-12.0, 12.0])

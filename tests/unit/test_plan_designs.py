@@ -349,7 +349,7 @@ class TestSobol:
 NUMBERS = {  # keys of the configuration that are pure numbers; every other that can be drawn ends in its unit
     "poisson_ratio", "damping_ratio", "friction_coefficient", "friction_transition", "points_per_pitch",
     "oversampling", "max_error", "iso1328_grade", "used_share_low", "used_share_high", "tooth_share",
-    "undulation_share", "undulation_waves", "support_stiffness_scatter",
+    "undulation_share", "undulation_waves", "backlash_scatter", "support_stiffness_scatter",
     "support_damping_scatter", "drive_damping_ratio", "gain_scatter", "tooth", "pitted_share", "diameter_scatter",
     "depth_ratio", "region_low", "region_high", "pit_seed", "profile_waves", "sensitivity_tolerance",
     "transverse_sensitivity", "resonance_damping_ratio", "max_clipped_fraction",

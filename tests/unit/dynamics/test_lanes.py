@@ -62,7 +62,12 @@ def mix(run):
             run(
                 {**law, "operating.torque_nm": 2, "operating.speed_rpm": 2500, "gear.backlash_um": 4},
                 TWO_MISSING if gaps else MISSING,
-                specimen=Specimen(pinion_error=pinion[:23], wheel_error=wheel),
+                specimen=Specimen(
+                    pinion_error=pinion[:23],
+                    wheel_error=wheel,
+                    pinion_tilt=100.0 * wheel[:23],
+                    wheel_tilt=100.0 * pinion,
+                ),
             ),
             run({**law, **GEOMETRY}, start=Start(tooth_pinion=30, tooth_wheel=2, phase=0.1)),
             run(

@@ -192,11 +192,11 @@ class TestWhatIsDrawn:
             assert_allclose(waves / sum(form.profile_form for form in own), part, rtol=1e-12, atol=1e-15)
 
     def test_misalignment_and_backlash_keep_to_their_range(self, xiamen, quality):
-        own = quality(misalignment=8 * UM, backlash_scatter=30 * UM)
+        own = quality(misalignment=8 * UM, backlash_scatter=0.3)
         specimens = [draw(xiamen.pair, own, seed) for seed in range(60)]
         tilted = np.array([one.forms[-1].misalignment for one in specimens])
         assert all(isinstance(one.forms[-1], Misalignment) for one in specimens)
-        for values, reach in ((tilted, 8 * UM), (np.array([one.backlash_change for one in specimens]), 30 * UM)):
+        for values, reach in ((tilted, 8 * UM), (np.array([one.backlash_factor - 1 for one in specimens]), 0.3)):
             assert 0.85 * reach < np.abs(values).max() <= reach
             assert values.min() < 0.0 < values.max()
 
@@ -217,11 +217,12 @@ class TestWhatIsDrawn:
         assert_allclose(profile_of(xiamen.pair, specimen, "pinion")[0], 0.0, rtol=0, atol=1e-15)
 
     def test_no_grade_is_perfect(self, xiamen, quality):
-        nothing = quality(iso1328_grade=None, misalignment=9 * UM, backlash_scatter=9 * UM, undulation_share=0.5)
+        nothing = quality(iso1328_grade=None, misalignment=9 * UM, backlash_scatter=0.9, undulation_share=0.5)
         specimen, perfect = draw(xiamen.pair, nothing), perfect_specimen(xiamen.pair.pinion, xiamen.pair.wheel)
         for field in fields(perfect):
             assert_allclose(getattr(specimen, field.name), getattr(perfect, field.name), rtol=0, atol=0)
-            assert not np.any(getattr(specimen, field.name))
+        assert not any(np.any(getattr(specimen, field.name)) for field in fields(perfect)[:-1])
+        assert specimen.backlash_factor == 1.0
 
     def test_a_gear_outside_the_standard_needs_no_grade(self, machine):
         tiny = {"gear.normal_module_mm": 0.4, "gear.pinion.bore_radius_mm": 1.5, "gear.wheel.bore_radius_mm": 5}
@@ -256,7 +257,7 @@ def test_no_scatter_is_nominal(xiamen):
         ({"undulation_share": -0.1}, "quality.undulation_share = -0.1 must lie in 0..1"),
         ({"undulation_waves": 0}, "quality.undulation_waves = 0 must lie in 1..50"),
         ({"misalignment": -3e-6}, "quality.misalignment_um = -3 must not be negative"),
-        ({"backlash_scatter": -3e-6}, "quality.backlash_scatter_um = -3 must not be negative"),
+        ({"backlash_scatter": 1.5}, "quality.backlash_scatter = 1.5 must lie in 0..1"),
     ],
 )
 def test_values_out_of_range(xiamen, changes, text):
@@ -271,16 +272,8 @@ def test_values_out_of_range(xiamen, changes, text):
         ({"quality.undulation_waves": 2.5}, "quality.undulation_waves = 2.5 is not a whole number"),
         ({"quality.misalignment_um": "much"}, "quality.misalignment_um = 'much' is not a number"),
         ({"quality.tooth_share": None}, "quality.tooth_share is null; give a value"),
-        (
-            {"quality.backlash_scatter_um": 81},
-            "quality.backlash_scatter_um = 81 must not be above gear.backlash_um = 80",
-        ),
     ],
 )
 def test_keys_that_cannot_be_used(machine, changes, text):
     with pytest.raises(ConfigError, match=re.escape(text)):
         machine(changes)
-
-
-def test_without_a_grade_backlash_does_not_scatter(machine):
-    machine({"quality.backlash_scatter_um": 81, "quality.iso1328_grade": None})
