@@ -139,8 +139,8 @@ class TestRefusals:
             ({"share": "x", "order": 1}, ".share = 'x' is not a number"),
             ({"share": 0.1, "orders": 1}, ": unknown key 'orders'; did you mean 'order'?"),
             ({"share": 0.1, "frequency": 1}, ": 'frequency' has the wrong unit; write it as 'frequency_hz'"),
-            ({"share": 0.1, "frequency_hz": 101}, ": frequency_hz = 101 Hz, above 100 Hz; the course runs straight"),
-            ({"share": 0.1, "order": 4}, ": order 4 makes up to 120 Hz, above 100 Hz"),
+            ({"share": 0.1, "frequency_hz": 151}, ": frequency_hz = 151 Hz, above 150 Hz; the course runs straight"),
+            ({"share": 0.1, "order": 6}, ": order 6 makes up to 180 Hz, above 150 Hz"),
         ],
     )
     @pytest.mark.parametrize("key", ["operating.speed_ripple", "operating.torque_ripple"])
@@ -150,9 +150,9 @@ class TestRefusals:
         assert "\n" not in str(caught.value)
 
     def test_an_order_is_judged_at_the_fastest(self, operating):
-        ripple = {"share": 0.1, "order": 3}
-        assert operating({"operating.speed_ripple": ripple}).speed_ripple.order == 3
-        with pytest.raises(ConfigError, match="order 3 makes up to 135 Hz"):
+        ripple = {"share": 0.1, "order": 4}
+        assert operating({"operating.speed_ripple": ripple}).speed_ripple.order == 4
+        with pytest.raises(ConfigError, match="order 4 makes up to 180 Hz"):
             operating({"operating.speed_ripple": ripple, SPEED: [[0, 1], [1, 1.5]]})
 
     @pytest.mark.parametrize(
