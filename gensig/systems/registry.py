@@ -45,7 +45,10 @@ def read_spur_pair(config: Mapping[str, Any]) -> SpurPair:
         if key not in SYSTEM_KEYS:
             raise ConfigError(f"system: unknown key '{key}'; known: {', '.join(SYSTEM_KEYS)}")
     gears = {name: _read_gear(name, gear) for name in SIDES}
-    operating, quality = read_operating(section(config, "operating")), read(Quality, section(config, "quality"), "quality")
+    operating, quality = (
+        read_operating(section(config, "operating")),
+        read(Quality, section(config, "quality"), "quality"),
+    )
     bodies = {name: _read_body(gears[name], sides[name], material) for name in SIDES}
     held = {name: read_holding(gears[name], sides[name]) for name in SIDES}
     if on_bearings(machine.get("supports", AS_GIVEN), quality):
