@@ -68,6 +68,25 @@ def _folder(parser: argparse.ArgumentParser) -> None:
     parser.add_argument("folder", metavar="DIR", help="folder of a data set")
 
 
+def _twin(parser: argparse.ArgumentParser) -> None:
+    parser.add_argument(
+        "recording", metavar="RECORDING", help="healthy recording: .csv (time_s and sensors), .npy, .npz"
+    )
+    parser.add_argument(
+        "overrides", nargs="*", metavar="OVERRIDES", help="what you know of the gears: gear.pinion.face_width_mm=15"
+    )
+    two = ("DRIVING", "DRIVEN")
+    parser.add_argument("--teeth", type=int, nargs=2, required=True, metavar=two, help="teeth of both gears")
+    parser.add_argument("--speed", type=float, required=True, metavar="RPM", help="of the driving gear, within 3 %%")
+    parser.add_argument("--out", required=True, metavar="DIR", help="folder for the options; its name becomes theirs")
+    parser.add_argument("--rate", type=float, metavar="HZ", help="samples a second, where the file has no time_s")
+    parser.add_argument("--unit", default="m/s2", help="m/s2 or g, where the column does not say (default: m/s2)")
+    parser.add_argument("--channels", nargs="+", metavar="NAME", help="columns to use (default: all)")
+    parser.add_argument("--module", type=float, metavar="MM", help="normal module (default: 2, assumed)")
+    parser.add_argument("--torque", type=float, metavar="NM", help="of the driving gear (default: assumed by size)")
+    parser.add_argument("--check", metavar="FILE", help="healthy recording held out (default: the second half)")
+
+
 def _resume(parser: argparse.ArgumentParser) -> None:
     _folder(parser)
     parser.add_argument(
@@ -166,6 +185,13 @@ VERBS: dict[str, Verb] = {
         "gensig stiffness fault=crack fault.crack_depth_mm=1.5 --json crack.json --plot crack.png",
         "gensig.commands.physics:stiffness",
         _stiffness,
+    ),
+    "twin": Verb(
+        "a configuration like a measured healthy machine",
+        "gensig twin healthy.csv --teeth 23 46 --speed 2000 --module 2 --torque 20 --out my_machine\n"
+        "  gensig generate --config-dir my_machine experiment=my_machine out=runs/my_machine",
+        "gensig.commands.twin:twin",
+        _twin,
     ),
     "validate": Verb(
         "every printed figure of the source papers against ours",

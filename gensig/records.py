@@ -104,7 +104,7 @@ def _finish(
     noise_power: Array | SimulationError = np.zeros(n_sensors)
     if sensing.snr is not None and measured is not None:
         reference = _TWINS[twin] if sensing.snr_reference == "healthy_twin" else instrument.power(measured)
-        factor = 10.0 ** (-sensing.snr / 10.0)
+        factor = sensing.noise_factor(sensing.snr)
         noise_power = reference if isinstance(reference, SimulationError) else reference * factor
     problem = next((one for one in (result, noise_power) if isinstance(one, SimulationError)), None)
     if isinstance(result, SimulationError) or isinstance(noise_power, SimulationError) or measured is None:

@@ -14,7 +14,7 @@ from gensig.errors import ConfigError
 from gensig.sensing.accelerometer import Accelerometer
 from gensig.sensing.encoder import Encoder
 from gensig.sensing.measured_path import ImpulseResponses, MeasuredPath, read_responses
-from gensig.sensing.noise import Background, Noise, Place, ThroughPath
+from gensig.sensing.noise import Background, Noise, Place, Spectrum, ThroughPath
 from gensig.sensing.tachometer import Tachometer
 from gensig.sensing.tones import Nuisance
 from gensig.sensing.transfer_path import ModalPath
@@ -67,6 +67,11 @@ class Sensing:
                     f"sensing.noise.band_hz ends at {self.noise.band[1]:g} Hz, above half of "
                     f"sensing.sampling_rate_hz = {self.sampling_rate:g}"
                 )
+            if self.noise.offsets is not None and len(self.noise.offsets) != len(self.channel_names):
+                raise ConfigError(
+                    f"sensing.noise.offsets_db has {len(self.noise.offsets)} values for {len(self.channel_names)} "
+                    "sensors; give one a sensor, or null"
+                )
             if self.path is None and any(isinstance(part, ThroughPath) for part in self.noise.parts):
                 raise ConfigError(
                     "sensing.noise: kind path needs a transfer path; sensing.path.kind = identity has none"
@@ -76,6 +81,12 @@ class Sensing:
     def channel_names(self) -> tuple[str, ...]:
         """Names of what is recorded: the sensors, without a path the simulated channels."""
         return self.channels if self.sensors is None else self.sensors
+
+    def noise_factor(self, snr: float) -> Array:
+        """Power of the noise over that of its reference, (sensor,), at ``snr`` in dB."""
+        offsets = None if self.noise is None else self.noise.offsets
+        louder = np.zeros(len(self.channel_names)) if offsets is None else np.array(offsets)
+        return 10.0 ** (-snr / 10.0) * 10.0 ** (louder / 10.0)
 
     @property
     def n_lead(self) -> int:
@@ -103,6 +114,8 @@ class Sensing:
         for part in self.noise.parts if self.noise is not None else ():
             if isinstance(part, Background):
                 part.table(self.place(round(duration * self.sampling_rate)))
+            elif isinstance(part, Spectrum):
+                part.density(self.place(round(duration * self.sampling_rate)))
 
     def _responses(self) -> ImpulseResponses:
         if not isinstance(self.path, MeasuredPath):

@@ -224,6 +224,43 @@ def _background(file: str, sensors: tuple[str, ...], n_samples: int, sampling_ra
     return wanted, columns
 
 
+@dataclass(frozen=True, slots=True, kw_only=True)
+class Spectrum(Part):
+    """Gaussian noise of a given power density: a file with ``frequency_hz`` and one column a sensor, or ``background``.
+
+    Only the form of a column counts; its level is that of ``sensing.snr_db``. It is linear between the lines given and
+    held beyond them. Every record and sensor has its own noise.
+    """
+
+    file: str
+
+    def density(self, place: Place) -> tuple[Array, Array]:
+        """Frequencies (line,) in Hz and densities (sensor, line), checked against the sensors of a record."""
+        return _spectrum(self.file, place.sensors)
+
+    def make(self, rng: np.random.Generator, place: Place) -> Array:
+        """As ``Part.make``."""
+        frequency, density = self.density(place)
+        grid = np.fft.rfftfreq(place.n_samples, 1.0 / place.sampling_rate)
+        size = np.sqrt([np.interp(grid, frequency, row) for row in density])
+        return np.fft.irfft(size * np.fft.rfft(rng.standard_normal(place.shape), axis=1), place.n_samples, axis=1)
+
+
+@lru_cache(maxsize=4)
+def _spectrum(file: str, sensors: tuple[str, ...]) -> tuple[Array, Array]:
+    key = "sensing.noise: file"
+    names, values = read_table(key, file, least_rows=2)
+    wanted = ["background"] * len(sensors) if "background" in names else list(sensors)
+    check_columns(key, file, names, ["frequency_hz", *dict.fromkeys(wanted)])
+    frequency = values[names.index("frequency_hz")]
+    density = values[[names.index(name) for name in wanted]]
+    if frequency[0] < 0.0 or not np.all(np.diff(frequency) > 0.0):
+        raise ConfigError(f"{key} = {file}: frequency_hz must rise from line to line and not be negative")
+    if density.min() < 0.0 or not np.all(density.max(axis=1) > 0.0):
+        raise ConfigError(f"{key} = {file}: a power density must not be negative, nor 0 throughout")
+    return frequency, density
+
+
 PARTS: dict[str, type[Part]] = {
     "white": White,
     "pink": Pink,
@@ -232,15 +269,20 @@ PARTS: dict[str, type[Part]] = {
     "impulsive": Impulsive,
     "machine": Machine,
     "file": Background,
+    "spectrum": Spectrum,
 }
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Noise:
-    """Parts of the noise, and the band over which the signal-to-noise ratio is meant, (low, high) in Hz or all."""
+    """Parts of the noise, and the band over which the signal-to-noise ratio is meant, (low, high) in Hz or all.
+
+    ``offsets`` in dB, one a sensor: that sensor's noise is so much louder than ``sensing.snr_db`` says. None is 0 dB.
+    """
 
     parts: tuple[Part, ...]
     band: tuple[float, ...] | None = None
+    offsets: tuple[float, ...] | None = None
 
     def __post_init__(self) -> None:
         if not self.parts:
@@ -273,8 +315,8 @@ def read_noise(values: Any) -> Noise:
     ConfigError    for unknown kinds, keys or values, naming the part
     """
     where = "sensing.noise"
-    if not isinstance(values, Mapping) or set(values) != {"parts", "band_hz"}:
-        raise ConfigError(f"{where} must be a group of the keys parts and band_hz")
+    if not isinstance(values, Mapping) or set(values) - {"offsets_db"} != {"parts", "band_hz"}:
+        raise ConfigError(f"{where} must be a group of the keys parts and band_hz, and may have offsets_db")
     if not isinstance(values["parts"], list | tuple):
         raise ConfigError(f"{where}.parts = {values['parts']!r} must be a list, such as [{{kind: white, share: 1}}]")
     parts = []
@@ -288,15 +330,19 @@ def read_noise(values: Any) -> Noise:
         except ConfigError as error:
             text = str(error)
             raise ConfigError(text if text.startswith(place) else f"{place}.{text}") from None
-    band = values["band_hz"]
-    if band is not None:
-        numbers = isinstance(band, list | tuple) and all(
-            isinstance(end, int | float) and not isinstance(end, bool) for end in band
-        )
-        if not numbers:
-            raise ConfigError(f"{where}.band_hz = {band!r} must be [low, high] in Hz, or null")
-        band = tuple(float(end) for end in band)
-    return Noise(parts=tuple(parts), band=band)
+    band = _numbers(f"{where}.band_hz", values["band_hz"], "[low, high] in Hz")
+    offsets = _numbers(f"{where}.offsets_db", values.get("offsets_db"), "a list of numbers, one a sensor")
+    return Noise(parts=tuple(parts), band=band, offsets=offsets)
+
+
+def _numbers(key: str, value: Any, what: str) -> tuple[float, ...] | None:
+    if value is None:
+        return None
+    if not isinstance(value, list | tuple) or not all(
+        isinstance(one, int | float) and not isinstance(one, bool) and math.isfinite(one) for one in value
+    ):
+        raise ConfigError(f"{key} = {value!r} must be {what}, or null")
+    return tuple(float(one) for one in value)
 
 
 def tones(rng: np.random.Generator, place: Place, frequency: Array, amplitude: Array) -> Array:

@@ -46,7 +46,7 @@ def density(signal):
 
 
 def test_every_kind_is_tested():
-    assert set(KINDS) | {"file"} == set(PARTS)
+    assert set(KINDS) | {"file", "spectrum"} == set(PARTS)
 
 
 @pytest.mark.parametrize("n_samples", [2048, 51200])
@@ -113,6 +113,42 @@ def test_background_takes_a_stretch(tmp_path):
     assert starts[0] == starts[1]
     for k in range(2):
         assert np.corrcoef(recording[k, starts[k] : starts[k] + 1000], made[k])[0, 1] > 1 - 1e-6
+
+
+def spectrum(path, columns, *, names=("background",)):
+    np.savetxt(path, np.column_stack(columns), "%.9g", ",", header=",".join(["frequency_hz", *names]), comments="")
+    return {"kind": "spectrum", "share": 1.0, "file": str(path)}
+
+
+def test_spectrum_has_the_density_of_its_file(tmp_path):
+    part = spectrum(tmp_path / "s.csv", [[100.0, 1000.0, 2000.0], [1.0, 1.0, 9.0], [4.0, 1.0, 1.0]], names=("a", "b"))
+    noise = read_noise({"parts": [part], "band_hz": None})
+    made = noise.make(np.array([2.0, 0.3]), np.random.default_rng(3), place())
+    assert_allclose(np.var(made, axis=1), [2.0, 0.3], rtol=1e-9, atol=0)
+    found = density(made)
+    flat, high = found[:, 200:900].mean(axis=1), found[:, 3000:9000].mean(axis=1)
+    assert_allclose(high[0] / flat[0], 9.0, rtol=0.15)  # straight between the lines, held beyond the last
+    assert_allclose(found[0, 1400:1600].mean() / flat[0], 5.0, rtol=0.25)
+    other = noise.make(np.array([2.0, 0.3]), np.random.default_rng(4), place())
+    assert abs(np.corrcoef(made[0], other[0])[0, 1]) < 0.05
+
+
+def test_refused_spectra(tmp_path):
+    lines, good = [100.0, 1000.0], [1.0, 2.0]
+    cases = {
+        "no column b": ([lines, good], ("a",)),
+        "unknown column c": ([lines, good, good, good], ("a", "b", "c")),
+        "must rise": ([[1000.0, 100.0], good], ("background",)),
+        "must not be negative, nor 0 throughout": ([lines, [1.0, -1.0]], ("background",)),
+        "nor 0 throughout": ([lines, [0.0, 0.0], good], ("a", "b")),
+        "is no finite number": ([lines, [1.0, np.nan]], ("background",)),
+        "too short": ([[100.0], [1.0]], ("background",)),
+    }
+    for number, (text, (columns, names)) in enumerate(cases.items()):
+        part = spectrum(tmp_path / f"{number}.csv", columns, names=names)
+        with pytest.raises(ConfigError, match=re.escape(text)) as caught:
+            read_noise({"parts": [part], "band_hz": None}).make(np.ones(2), np.random.default_rng(1), place())
+        assert "\n" not in str(caught.value)
 
 
 def test_refused_backgrounds(tmp_path):

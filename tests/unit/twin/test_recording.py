@@ -1,0 +1,164 @@
+"""Recordings: what is read, and every file that is refused with one line."""
+
+import re
+
+import numpy as np
+import pytest
+from numpy.testing import assert_allclose
+
+from gensig.cli import main
+from gensig.errors import ConfigError
+from gensig.twin.recording import STANDARD_GRAVITY, read_recording
+from gensig.twin.speed import Teeth, find_motion
+
+RATE = 5120.0
+SIGNAL = np.random.default_rng(1).standard_normal((2, 20_000))
+
+
+def csv(path, columns, names):
+    np.savetxt(path, np.column_stack(columns), "%.9g", ",", header=",".join(names), comments="")
+    return str(path)
+
+
+def timed(path, signal=SIGNAL, names=("a", "b"), rate=RATE):
+    return csv(path, [np.arange(signal.shape[1]) / rate, *signal], ["time_s", *names])
+
+
+class TestRead:
+    def test_all_formats_say_the_same(self, tmp_path):
+        np.save(tmp_path / "r.npy", SIGNAL)
+        np.savez(tmp_path / "r.npz", acceleration=SIGNAL)
+        files = [str(tmp_path / "r.npy"), str(tmp_path / "r.npz"), csv(tmp_path / "r.csv", SIGNAL, "ab")]
+        centred = SIGNAL - SIGNAL.mean(axis=1, keepdims=True)
+        for found in [*(read_recording(file, rate=RATE) for file in files), read_recording(timed(tmp_path / "t.csv"))]:
+            assert found.sampling_rate == pytest.approx(RATE, rel=1e-9)
+            assert_allclose(found.acceleration, centred, rtol=0, atol=1e-7)
+
+    def test_units(self, tmp_path):
+        file = timed(tmp_path / "u.csv", names=("case_g", "lid_m_per_s2"))
+        found = read_recording(file)
+        assert found.sensors == ("case", "lid")
+        assert_allclose(found.acceleration.std(axis=1), SIGNAL.std(axis=1) * [STANDARD_GRAVITY, 1.0], rtol=1e-6)
+        plain = timed(tmp_path / "p.csv")
+        size = read_recording(plain, unit="g").acceleration.std(axis=1)
+        assert_allclose(size, STANDARD_GRAVITY * SIGNAL.std(axis=1), rtol=1e-6)
+
+    def test_channels_in_the_order_asked_for(self, tmp_path):
+        found = read_recording(timed(tmp_path / "t.csv"), channels=["b", "a"])
+        assert found.sensors == ("b", "a")
+        assert_allclose(found.acceleration.std(axis=1), SIGNAL[::-1].std(axis=1), rtol=1e-6)
+
+    def test_names_become_sensors(self, tmp_path):
+        found = read_recording(timed(tmp_path / "t.csv", names=("1 x", "gear case")))
+        assert found.sensors == ("s_1_x_a", "gear_case")
+
+    def test_halves(self, tmp_path):
+        found = read_recording(timed(tmp_path / "t.csv"))
+        first, second = found.part(0.0, 0.5), found.part(0.5, 1.0)
+        assert first.acceleration.shape == second.acceleration.shape == (2, 10_000)
+        assert_allclose(second.acceleration.mean(axis=1), 0.0, atol=1e-12)
+
+
+def refused(tmp_path):
+    """Text that must be in the line, file and options."""
+    bad = SIGNAL.copy()
+    bad[1, 7] = np.nan
+    np.save(tmp_path / "nan.npy", bad)
+    np.save(tmp_path / "tall.npy", SIGNAL.T)
+    np.save(tmp_path / "words.npy", np.array(["a", "b"] * 300))
+    np.save(tmp_path / "objects.npy", np.array([{"a": 1}], dtype=object), allow_pickle=True)
+    np.save(tmp_path / "short.npy", SIGNAL[:, :100])
+    np.save(tmp_path / "still.npy", np.ones((1, 1000)))
+    np.savez(tmp_path / "other.npz", velocity=SIGNAL)
+    (tmp_path / "garbage.npy").write_bytes(b"no numpy" * 10)
+    (tmp_path / "garbage.npz").write_bytes(b"no numpy" * 10)
+    time = np.arange(20_000) / RATE
+    jumping = csv(tmp_path / "jump.csv", [time + (time > 1.0), SIGNAL[0]], ["time_s", "a"])
+    rated = {"rate": RATE}
+    array = {name: str(tmp_path / name) for name in (
+        "nan.npy", "tall.npy", "words.npy", "objects.npy", "short.npy", "still.npy", "other.npz", "garbage.npy",
+        "garbage.npz", "none.npy",
+    )}  # fmt: skip
+    return [
+        ("the name must end in .csv, .npy, .npz", "recording.wav", {}),
+        ("cannot be read", array["none.npy"], rated),
+        ("cannot be read", str(tmp_path / "none.csv"), {}),
+        ("an array tells no rate; give the samples a second with --rate", array["nan.npy"], {}),
+        ("it has no column time_s; give", csv(tmp_path / "n.csv", SIGNAL, "ab"), {}),
+        ("sample 7 of channel_1 is no finite number", array["nan.npy"], rated),
+        ("transpose it", array["tall.npy"], rated),
+        ("give one array of real numbers", array["words.npy"], rated),
+        ("it is no plain array", array["objects.npy"], rated),
+        ("it is no plain array", array["garbage.npy"], rated),
+        ("it is no plain array", array["garbage.npz"], rated),
+        ("too short: 100 samples", array["short.npy"], rated),
+        ("channel_0 holds one value throughout", array["still.npy"], rated),
+        ("no array acceleration; it has velocity", array["other.npz"], rated),
+        ("no channel c; it has a, b", timed(tmp_path / "c.csv"), {"channels": ["c"]}),
+        ("each once", timed(tmp_path / "d.csv"), {"channels": ["a", "a"]}),
+        ("time_s must rise in even steps", jumping, {}),
+        ("time_s has 5120 samples a second, --rate says 6000", timed(tmp_path / "e.csv"), {"rate": 6000.0}),
+        ("--rate 3 must lie in 1000..1000000", timed(tmp_path / "f.csv"), {"rate": 3.0}),
+        ("--unit mm: allowed: m/s2, g", timed(tmp_path / "g.csv"), {"unit": "mm"}),
+        ("a_mm_per_s ends in _mm_per_s", timed(tmp_path / "h.csv", names=("a_mm_per_s", "b")), {}),
+        ("differ in nothing but signs", timed(tmp_path / "i.csv", names=("a b", "a-b")), {}),
+    ]
+
+
+def test_refused(tmp_path):
+    for text, file, options in refused(tmp_path):
+        with pytest.raises(ConfigError, match=re.escape(text)) as caught:
+            read_recording(file, **options)
+        assert "\n" not in str(caught.value)
+
+
+class TestNoMesh:
+    TEETH = Teeth(driving=23, driven=46)
+
+    @pytest.mark.parametrize("seed", range(8))
+    def test_noise_is_no_gear(self, tmp_path, seed):
+        noise = np.random.default_rng(seed).standard_normal((2, 20_000))
+        found = read_recording(timed(tmp_path / "n.csv", noise))
+        with pytest.raises(ConfigError, match="no sign of the mesh"):
+            find_motion(found, self.TEETH, 1200.0)
+
+    def test_too_short_and_too_fast(self, tmp_path):
+        found = read_recording(timed(tmp_path / "n.csv"))
+        with pytest.raises(ConfigError, match=r"turns of the slower gear, at least 8"):
+            find_motion(found, self.TEETH, 100.0)
+        with pytest.raises(ConfigError, match="above the usable band"):
+            find_motion(found, self.TEETH, 6000.0)
+
+
+@pytest.mark.parametrize(
+    ("words", "text"),
+    [
+        (["--speed", "0"], "--speed 0 must be positive"),
+        (["--module", "-1"], "--module -1 must be positive"),
+        (["--torque", "nan"], "--torque nan must be positive"),
+        (["--teeth", "5", "46"], "pinion: 5 teeth"),
+        (["seed=3"], "twin takes overrides of the gears only"),
+        (["gear.pinion.n_teeth=20"], "is what --teeth says"),
+        (["gear.pinion.bore_radius_mm=99"], "bore_radius_mm = 99 must lie between"),
+        (["gear.pinion.bore=3"], "gear.pinion.bore"),
+        (["--check", "OTHER"], "--check"),
+        (["--check", "FASTER"], "samples a second, the recording"),
+        ([], "no sign of the mesh"),
+        (["--out", "USED"], "is there and not an empty folder"),
+        (["--out", "a b"], "use letters, digits"),
+    ],
+)
+def test_the_command_refuses_in_one_line(tmp_path, monkeypatch, capsys, words, text):
+    monkeypatch.chdir(tmp_path)
+    files = {
+        "OTHER": timed(tmp_path / "other.csv", names=("a", "c")),
+        "FASTER": timed(tmp_path / "faster.csv", rate=2.0 * RATE),
+        "USED": "used",
+    }
+    (tmp_path / "used").mkdir()
+    (tmp_path / "used" / "file").write_text("x")
+    common = ["twin", timed(tmp_path / "r.csv"), "--teeth", "23", "46", "--speed", "1200", "--out", "mine"]
+    assert main([*common, *(files.get(word, word) for word in words)]) == 2
+    error = [line for line in capsys.readouterr().err.splitlines() if line.startswith("gensig: ")]
+    assert text in error[-1]
+    assert not (tmp_path / "mine").exists()
