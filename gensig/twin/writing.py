@@ -11,7 +11,6 @@ from typing import Any
 import numpy as np
 
 from gensig.errors import ConfigError
-from gensig.twin.course import drift_profile
 from gensig.twin.fitting import SOURCE_CHANNEL, Fit, minimum_phase, oversampling
 
 PATH_STEP = 20.0  # Hz between the lines of the path's file; its gain is smooth over a sixth of an octave
@@ -96,8 +95,7 @@ noise:
 
 
 def _experiment(name: str, fitted: Fit, torque_nm: float, duration: float) -> str:
-    profile = drift_profile(fitted.drift, fitted.motion.correlation_time)
-    found = "fitted: scatter and correlation time, drawn anew" if profile else "no drift to be seen; report.md says why"
+    profile, found = _drift(fitted)
     speed, steps = fitted.motion.mesh_frequency, oversampling(fitted.sampling_rate, DEFAULT_OVERSAMPLING)
     return f"""# gensig generate --config-dir {name} experiment={name} out=...
 defaults:
@@ -108,7 +106,7 @@ defaults:
 operating:
   torque_nm: {torque_nm!r}     # given, or assumed: a healthy recording does not tell it
   duration_s: {duration!r}
-  speed_profile: {json.dumps(profile)}   # {found}
+  speed_profile: {profile}   # {found}
 quality:
   iso1328_grade: {fitted.grade.grade:.2f}          # fitted: {fitted.grade.low:.1f} to {fitted.grade.high:.1f}
   support_stiffness_scatter: 0 # one machine
@@ -122,6 +120,14 @@ plan:
   classes: [healthy, crack, pitting, missing_tooth]
 # mesh frequency that was found: {speed:.4f} Hz
 """
+
+
+def _drift(fitted: Fit) -> tuple[str, str]:
+    """``operating.speed_profile`` as YAML and what to say of it."""
+    if fitted.drift is None or fitted.motion.correlation_time is None:
+        return "null", "no drift to be seen; report.md says why"
+    walk = f"kind: random_walk, scatter: {fitted.drift:.3g}, correlation_time_s: {fitted.motion.correlation_time:.3g}"
+    return f"{{{walk}}}", "fitted; drawn anew for each condition"
 
 
 def _write_path(file: Path, fitted: Fit) -> None:
