@@ -139,3 +139,14 @@ def test_a_run_that_cannot_be_is_a_failed_record(config, plan):
     assert found.values["status"] == "failed"
     assert "solver.oversampling" in found.values["status_reason"]
     assert np.isnan(found.signals["acceleration"]).all()
+
+
+def test_a_specimen_is_the_same_whatever_its_record_is_told_to_have(config, plan):
+    """Gears of a unit have one set of deviations: sound or faulty, and of the healthy twin."""
+    drawn = {}
+    for row in (plan.record(index) for index in range(8)):
+        run = records.row_run(config, records.record_system(config, records.row_values(row)), row)
+        assert len(run.specimen.forms) == 2
+        drawn.setdefault(row["specimen_id"], set()).add(repr(run.specimen))
+    assert all(len(some) == 1 for some in drawn.values())
+    assert len({row["label_name"] for row in (plan.record(index) for index in range(8))}) == 4
