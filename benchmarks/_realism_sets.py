@@ -7,6 +7,7 @@ import json
 import math
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
+from functools import lru_cache
 from pathlib import Path
 from typing import Any
 
@@ -59,7 +60,7 @@ QUICK = Size(n_units=8, n_gearboxes=2, n_turns=10.5, recording_duration=1.28)
 
 def yardstick_words(base: Sequence[str], size: Size) -> list[str]:
     """Overrides of the grid: every unit runs every speed and torque, healthy and with each fault."""
-    config = read_request(base).config
+    config = base_config(tuple(base))
     gear = config["gear"]
     speeds = [round(share * gear["rated_speed_rpm"], 6) for share in size.speeds]
     torques = [round(share * gear["rated_torque_nm"], 6) for share in size.torques]
@@ -84,7 +85,7 @@ def yardstick_words(base: Sequence[str], size: Size) -> list[str]:
 
 def recording_words(base: Sequence[str], size: Size, control: str) -> list[str]:
     """Overrides of the machine of the recording, healthy: right, or wrong on purpose in one thing."""
-    config = read_request(base).config
+    config = base_config(tuple(base))
     teeth = WRONG_TEETH if control == "wrong teeth" else RECORDING_TEETH
     step = {"errors / 3": -GRADE_STEPS, "errors x 3": GRADE_STEPS}.get(control, 0.0)
     return [
@@ -116,11 +117,17 @@ def middle_grade(config: Mapping[str, Any]) -> float:
     return float(grade)
 
 
+@lru_cache(maxsize=4)
+def base_config(base: tuple[str, ...]) -> dict[str, Any]:
+    """The base with a root crack as its only class, composed once: composing takes seconds."""
+    return read_request([*base, "fault=crack"]).config
+
+
 def root_chord(base: Sequence[str]) -> float:
     """Thickness of the sound tooth where the experiment's crack starts, m."""
-    request = read_request([*base, "fault=crack"])
-    system = read_system(request.config)
-    (crack,) = read_faults({key: value for key, value in request.config["fault"].items() if key != "vary"})
+    config = base_config(tuple(base))
+    system = read_system(config)
+    (crack,) = read_faults({key: value for key, value in config["fault"].items() if key != "vary"})
     assert isinstance(crack, Crack)
     return crack.root_chord(system.pair.pinion if crack.gear == "pinion" else system.pair.wheel)
 
