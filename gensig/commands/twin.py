@@ -131,7 +131,8 @@ def _remarks(gear: dict[str, Any], typed: set[str], knows_module: bool) -> dict[
             f"{side}.mass_kg": "derived from a solid disc",
             f"{side}.inertia_kg_m2": "derived from a solid disc",
         }
-        remarks |= {f"{side}.support.{key}": "assumed, the default's" for key in gear[side]["support"]}
+        for part in ("support", "bearing", "shaft"):
+            remarks |= {f"{side}.{part}.{key}": "assumed, the default's" for key in gear[side][part]}
     return {key: "given" if f"gear.{key}" in typed else text for key, text in remarks.items()}
 
 

@@ -58,8 +58,10 @@ class Fit:
     @property
     def drift(self) -> float | None:
         """Scatter of the speed beyond that of the pitch errors; None where there is none to be seen."""
-        scatter = self.motion.scatter
+        scatter, correlation = self.motion.scatter, self.motion.correlation_time
         if scatter is None or scatter < CLEAR * self.own_scatter:
+            return None
+        if correlation is None or correlation < self.motion.followed_time:
             return None
         return math.sqrt(scatter**2 - self.own_scatter**2)
 

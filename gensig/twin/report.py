@@ -30,7 +30,8 @@ def fitted_rows(fitted: Fit, n_driving: int) -> list[tuple[str, str]]:
             f"{100 * fitted.drift:.4f} % (standard deviation) over {motion.correlation_time:.3g} s; {seen}, {errors}"
         )
     elif seen:
-        drift = f"none written: {seen}, {errors}"
+        fast = f"; changes within {motion.followed_time:.2g} s are the gears' own or noise"
+        drift = f"none written: {seen} over {motion.correlation_time:.3g} s, {errors}{fast}"
     elif motion.detection_limit is not None:
         drift = f"none written: below the detection limit of {100 * motion.detection_limit:.4f} %"
     else:

@@ -26,6 +26,7 @@ LEAST_LINE_DB = 6.0  # ... by this much above what is around it,
 FALSE_ALARM = 1e-6  # and by more than noise would at one line with this probability
 TURNS_A_SEGMENT = 4  # of the slower gear, so that its sidebands are told from the mesh
 LEAST_TURNS = 8
+FOLLOWED = 0.4  # share of the slower shaft's frequency up to which the speed is followed
 PASSES = (1, 2, 4, 8)  # harmonics followed in each round: a coarse phase first, then a fine one
 
 
@@ -49,6 +50,7 @@ class Motion:
     ``mesh_frequency`` Hz, mean; ``cycles`` (sample,) mesh cycles since the first sample. ``scatter`` is the standard
     deviation of the speed over its mean, ``correlation_time`` s; both None where the speed is steadier than
     ``detection_limit``, the scatter that would have been seen, which is None where one harmonic alone was heard.
+    ``followed_time`` s is the correlation time that noise has after the lines are followed: a drift has a longer one.
     ``line_db`` (harmonic,) dB is how far the lines stand out, at the sensor that hears each best.
     """
 
@@ -57,6 +59,7 @@ class Motion:
     scatter: float | None
     correlation_time: float | None
     detection_limit: float | None
+    followed_time: float
     line_db: Array
 
 
@@ -129,7 +132,7 @@ def _follow(recording: Recording, teeth: Teeth, mesh: float, heard: NDArray[np.i
     edge = math.ceil(1.5 / slow * rate)
     for most in PASSES:
         used = [int(harmonic) for harmonic in heard if harmonic <= max(most, heard[0])]
-        width = 0.4 * (fast if most == PASSES[0] else slow)
+        width = FOLLOWED * (fast if most == PASSES[0] else slow)
         groups = _deviation(recording.acceleration, cycles, used, width, rate)
         deviation = groups[0]
         inner = slice(min(edge, n_samples // 8), n_samples - min(edge, n_samples // 8))
@@ -190,5 +193,6 @@ def _told(
         scatter=scatter,
         correlation_time=correlation,
         detection_limit=None if limit is None else 2.0 * limit,
+        followed_time=1.0 / (math.pi * 0.5 * FOLLOWED * slow),
         line_db=line_db,
     )
