@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import math
 from collections.abc import Sequence
+from dataclasses import replace
 
 import numpy as np
 from numpy.typing import NDArray
@@ -50,8 +51,9 @@ def pack(
     span : s    from when to when the course of speed and torque is needed, where they change
     """
     lanes = fill_lanes(dynamics, precision)
-    tables = [_pair_rows(one.table) for one in lanes]
-    rows = [np.concatenate([_rows(one.table.pinion), _rows(one.table.wheel)]) for one in lanes]
+    meshes = [in_use(one.table) for one in lanes]
+    tables = [_pair_rows(mesh) for mesh in meshes]
+    rows = [np.concatenate([_rows(mesh.pinion), _rows(mesh.wheel)]) for mesh in meshes]
     sizes = [table.size for table in tables]
     teeth = [len(row) for row in rows]
     numbers, exact = np.empty((N_NUMBERS, len(lanes)), dtype=precision), np.empty((N_EXACT, len(lanes)))
@@ -71,7 +73,7 @@ def pack(
             sum(sizes[:lane]),
             n_nodes * tables[lane].shape[2],
             n_nodes - 2,
-            *_row_steps(one.table),
+            *_row_steps(meshes[lane]),
         )
     systems = [one.system() for one in lanes]
     stiffness = np.stack([system.stiffness for system in systems])
@@ -145,6 +147,25 @@ def _nominal(lanes: Sequence[PairDynamics], span: tuple[float, float]) -> tuple[
         profile[:, NOMINAL_ACCELERATION, lane] = gain
         profile[:, TORQUE, lane], profile[:, TORQUE_SLOPE, lane] = nominal.torque_factor[:-1], slope
     return profile.ravel(), first, CELLS_PER_SECOND
+
+
+def in_use(table: PairTable) -> PairTable:
+    """The same without the rows of teeth that the gears have not: of the nominal one where every flank has errors."""
+    return replace(table, pinion=_used_rows(table.pinion), wheel=_used_rows(table.wheel))
+
+
+def _used_rows(side: GearTable) -> GearTable:
+    used, kind = np.unique(side.kind, return_inverse=True)
+    if len(used) == len(side.present):
+        return side
+    return GearTable(
+        compliance=side.compliance[used],
+        compliance_slope=side.compliance_slope[used],
+        gap=side.gap[used],
+        gap_slope=side.gap_slope[used],
+        present=side.present[used],
+        kind=kind,
+    )
 
 
 def _columns(side: GearTable) -> Array:
