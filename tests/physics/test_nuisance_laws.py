@@ -69,10 +69,10 @@ def test_unbalance_grows_with_the_square_of_the_speed_and_what_the_machine_answe
         found[speed] = (measured[mine] / answer[mine]) / w**2
         assert np.abs(measured[mine]).min() > 0.0
     for speed in (900.0, 3600.0):
-        assert_allclose(np.abs(found[speed]), np.abs(found[1800.0]), rtol=1e-6, atol=0)
+        assert_allclose(np.abs(found[speed]), np.abs(found[1800.0]), rtol=1e-4, atol=0)
     mass, rated = at().system.pinion.mass if gear == "pinion" else at().system.wheel.mass, 1800 * 2 * np.pi / 60
     eccentricity = 6.3e-3 / (rated * (1.0 if gear == "pinion" else 23 / 84))
-    assert_allclose(np.abs(found[1800.0]), mass * eccentricity, rtol=1e-6, atol=0)
+    assert_allclose(np.abs(found[1800.0]), mass * eccentricity, rtol=1e-4, atol=0)
 
 
 def test_its_angle_is_fixed_to_tooth_0(at):
@@ -104,7 +104,7 @@ def test_a_neighbour_is_heard_at_its_orders_however_the_shaft_wobbles(at):
             waves += [np.cos((order + k) * wheel), np.sin((order + k) * wheel)]
     waves = np.array(waves).T
     rest = signal[2:].T - waves @ np.linalg.lstsq(waves, signal[2:].T, rcond=None)[0]
-    assert rest.std() < 1e-6 * signal[2:].std()
+    assert rest.std() < 1e-4 * signal[2:].std()
     # by the clock the wobble smears the lines: order 75 swings by 0.4 rad
     steady = np.array([np.cos(order * run.system.operating.speed * 23 / 84 * times + phase) for order in (25, 50, 75)
                        for phase in (0.0, 1.5)]).T  # fmt: skip
