@@ -157,7 +157,20 @@ def _difference(folder: Path, row: Mapping[str, Any], record: Record) -> tuple[f
             if _sha256(stored) != _sha256(made):
                 wide = stored.astype(np.float64)
                 largest = max(largest, float(np.max(np.abs(wide - made) / _rms(wide)[:, None])))
+        for name in [name for name in record.signals if name in file and name not in SCALES]:
+            largest = max(largest, _other_difference(file[name][place], record.signals[name]))
     return largest, count
+
+
+def _other_difference(stored: NDArray[Any], made: NDArray[Any]) -> float:
+    """Largest difference of anything else over the RMS of its values; infinite where whole numbers differ."""
+    made = made.astype(stored.dtype)
+    if stored.dtype.kind in "iu":
+        return 0.0 if np.array_equal(stored, made) else np.inf
+    if np.array_equal(stored, made, equal_nan=True):
+        return 0.0
+    wide = stored.astype(np.float64).reshape(1, -1)
+    return float(np.max(np.abs(wide - made.reshape(1, -1)) / _rms(wide)))
 
 
 def _rms(signal: NDArray[Any]) -> NDArray[np.float64]:

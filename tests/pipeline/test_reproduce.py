@@ -11,7 +11,10 @@ from small_sets import make
 
 from gensig.cli import main
 
-SET = ("dataset.records_per_shard=4", "dataset.store_clean=true")
+SET = (
+    "dataset.records_per_shard=4", "dataset.store_clean=true", "dataset.store_tacho=true",
+    "dataset.store_mesh_state=true", "dataset.store_encoder=true",
+)  # fmt: skip
 
 
 @pytest.fixture(scope="module")
@@ -57,6 +60,21 @@ def test_a_difference_is_accepted_only_elsewhere_and_up_to_1e_6(
     assert "5 of 6 records have the same bits" in said
     assert f"largest difference {part:.2g} of the record's RMS, in r000005" in said
     assert ("made with cpu_model Another CPU" in said) == bool(environment)
+
+
+@pytest.mark.parametrize("name", ["tacho", "encoder_angle", "mesh_force", "mesh_pinion_tooth", "noise_power"])
+def test_all_that_is_stored_is_compared(
+    reference: Path, tmp_path: Path, capsys: pytest.CaptureFixture[str], name: str
+) -> None:
+    folder = alter(reference, tmp_path / "data", 0.0, {})
+    with h5py.File(folder / "shards" / "shard-00000.h5", "r+") as file:
+        values = file[name][2]
+        values.flat[0] += 1
+        file[name][2] = values
+    found, said = reproduce(folder, capsys)
+    assert found == 1
+    assert "5 of 6 records have the same bits" in said
+    assert "in r000002" in said
 
 
 def read_one(path: Path) -> dict[str, np.ndarray]:
