@@ -4,7 +4,6 @@ from __future__ import annotations
 
 import math
 from collections.abc import Sequence
-from dataclasses import replace
 
 import numpy as np
 from numpy.typing import NDArray
@@ -51,9 +50,7 @@ def pack(
     span : s    from when to when the course of speed and torque is needed, where they change
     """
     lanes = fill_lanes(dynamics, precision)
-    meshes = [in_use(one.table) for one in lanes]
-    tables = [_pair_rows(mesh) for mesh in meshes]
-    rows = [np.concatenate([_rows(mesh.pinion), _rows(mesh.wheel)]) for mesh in meshes]
+    tables, rows, steps = zip(*[_table_rows(one.table) for one in lanes], strict=True)
     sizes = [table.size for table in tables]
     teeth = [len(row) for row in rows]
     numbers, exact = np.empty((N_NUMBERS, len(lanes)), dtype=precision), np.empty((N_EXACT, len(lanes)))
@@ -73,7 +70,7 @@ def pack(
             sum(sizes[:lane]),
             n_nodes * tables[lane].shape[2],
             n_nodes - 2,
-            *_row_steps(meshes[lane]),
+            *steps[lane],
         )
     systems = [one.system() for one in lanes]
     stiffness = np.stack([system.stiffness for system in systems])
@@ -149,25 +146,6 @@ def _nominal(lanes: Sequence[PairDynamics], span: tuple[float, float]) -> tuple[
     return profile.ravel(), first, CELLS_PER_SECOND
 
 
-def in_use(table: PairTable) -> PairTable:
-    """The same without the rows of teeth that the gears have not: of the nominal one where every flank has errors."""
-    return replace(table, pinion=_used_rows(table.pinion), wheel=_used_rows(table.wheel))
-
-
-def _used_rows(side: GearTable) -> GearTable:
-    used, kind = np.unique(side.kind, return_inverse=True)
-    if len(used) == len(side.present):
-        return side
-    return GearTable(
-        compliance=side.compliance[used],
-        compliance_slope=side.compliance_slope[used],
-        gap=side.gap[used],
-        gap_slope=side.gap_slope[used],
-        present=side.present[used],
-        kind=kind,
-    )
-
-
 def _columns(side: GearTable) -> Array:
     """Table columns [c, c', g, g'], (distinct, node, 4)."""
     return np.stack([side.compliance, side.compliance_slope, side.gap, side.gap_slope], axis=-1)
@@ -180,27 +158,31 @@ def at_step(group: Group, before: float, after: float) -> Group:
     return group._replace(numbers=numbers.ravel())
 
 
-def _are_many(table: PairTable) -> bool:
-    """Whether all pairs of distinct teeth would take much more memory than the teeth."""
-    n_pinion, n_wheel = len(table.pinion.compliance), len(table.wheel.compliance)
-    return n_pinion * n_wheel > 2 * (n_pinion + n_wheel)
+def _table_rows(table: PairTable) -> tuple[Array, NDArray[np.int64], tuple[int, int]]:
+    """Rows (row, node, 4) of which the first is that of sound teeth, row (tooth,) of every tooth, and two steps.
+
+    Rows are pairs of the distinct teeth that the gears have, or, where those would take much more memory, the teeth
+    themselves. The steps lead from one pinion tooth to the next and, where teeth stand by themselves, to the wheel's.
+    """
+    (pinion, pinion_row), (wheel, wheel_row) = _used(table.pinion), _used(table.wheel)
+    if len(pinion) * len(wheel) > 2 * (len(pinion) + len(wheel)):
+        everything = np.concatenate([_columns(table.pinion), _columns(table.wheel)])
+        row = np.concatenate([_present(side, side.kind) for side in (table.pinion, table.wheel)])
+        return everything, row, (1, len(table.pinion.compliance))
+    pairs = (pinion[:, None] + wheel[None]).reshape(-1, *pinion.shape[1:])
+    if not (np.any(table.pinion.kind == 0) and np.any(table.wheel.kind == 0)):  # back flanks are those of sound teeth
+        pairs = np.concatenate([(_columns(table.pinion)[0] + _columns(table.wheel)[0])[None], pairs])
+        wheel_row = wheel_row + 1
+    row = np.concatenate([_present(table.pinion, pinion_row), _present(table.wheel, wheel_row)])
+    return pairs, row, (len(wheel), 0)
 
 
-def _pair_rows(table: PairTable) -> Array:
-    """Rows of the pairs of distinct teeth, or of the teeth where the pairs are many, (row, node, 4)."""
-    pinion, wheel = _columns(table.pinion), _columns(table.wheel)
-    if _are_many(table):
-        return np.concatenate([pinion, wheel])
-    return (pinion[:, None] + wheel[None]).reshape(-1, *pinion.shape[1:])
+def _used(side: GearTable) -> tuple[Array, NDArray[np.int64]]:
+    """Columns of the distinct teeth that the gear has, (distinct, node, 4), and which of them every tooth is."""
+    used, row = np.unique(side.kind, return_inverse=True)
+    return _columns(side)[used], row
 
 
-def _row_steps(table: PairTable) -> tuple[int, int]:
-    """Rows from one pinion tooth to the next, and to the wheel's first where the teeth stand by themselves, else 0."""
-    if _are_many(table):
-        return 1, len(table.pinion.compliance)
-    return len(table.wheel.compliance), 0
-
-
-def _rows(side: GearTable) -> NDArray[np.int64]:
-    """Table row of every tooth, -1 for a missing one, (tooth,)."""
-    return np.where(side.present[side.kind], side.kind, -1)
+def _present(side: GearTable, row: NDArray[np.int64]) -> NDArray[np.int64]:
+    """Row of every tooth, -1 for a missing one, (tooth,)."""
+    return np.where(side.present[side.kind], row, -1)

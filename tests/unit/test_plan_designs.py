@@ -352,7 +352,8 @@ NUMBERS = {  # keys of the configuration that are pure numbers; every other that
     "undulation_share", "undulation_waves", "backlash_scatter", "support_stiffness_scatter",
     "support_damping_scatter", "drive_damping_ratio", "gain_scatter", "tooth", "pitted_share", "diameter_scatter",
     "depth_ratio", "region_low", "region_high", "pit_seed", "profile_waves", "sensitivity_tolerance",
-    "transverse_sensitivity", "resonance_damping_ratio", "max_clipped_fraction",
+    "transverse_sensitivity", "resonance_damping_ratio", "max_clipped_fraction", "dropped_fraction",
+    "dropped_run_samples", "course_seed", "drift_scatter",
 }  # fmt: skip
 
 
