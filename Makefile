@@ -4,6 +4,8 @@ PYTHON ?= python3
 VENV ?= .venv
 PIP_ARGS ?=
 DEMO ?= demo
+# two test processes: half the time, 2 GB of memory each
+PYTEST_ARGS ?= -n 2 --dist loadfile
 BIN := $(VENV)/bin
 
 .PHONY: demo test check clean
@@ -16,7 +18,7 @@ demo: $(VENV)/.installed
 	@echo "Look at $(DEMO)/report/report.md (figures beside it); the data set is $(DEMO)/data, described in its README.md"
 
 test: $(VENV)/.installed-test
-	$(BIN)/python -m pytest
+	$(BIN)/python -m pytest $(PYTEST_ARGS)
 
 check: $(VENV)/.installed-test
 	$(BIN)/ruff check . && $(BIN)/ruff format --check . && $(BIN)/mypy && $(BIN)/lint-imports
