@@ -1,5 +1,7 @@
 """Scores in closed form, intervals over units, indicators and baselines."""
 
+from dataclasses import replace
+
 import numpy as np
 import pytest
 from fake_dataset import FakeDataset
@@ -7,7 +9,7 @@ from numpy.testing import assert_allclose
 from threadpoolctl import threadpool_limits
 
 from diagnose.baselines import indicator_model, rms_threshold
-from diagnose.features import GEARS, INDICATORS, FeatureTable, feature_table, indicators
+from diagnose.features import FEATURES, GEARS, INDICATORS, FeatureTable, feature_table, indicators
 from diagnose.metrics import balanced_accuracy, confusion_by_unit, macro_f1, over_records, recall, score_with_interval
 from diagnose.windows import SUBSETS, subset_segments, task_of
 from gensig.errors import DatasetError
@@ -110,6 +112,41 @@ def test_indicators_are_nan_without_a_whole_turn():
     assert GEARS == ("pinion", "wheel")
 
 
+def test_all_features_are_the_basic_ones_and_more_from_twenty_turns_up():
+    x = np.random.default_rng(0).standard_normal((2, 12800))
+    speed, teeth = {"pinion": 20.0, "wheel": 19.9}, {"pinion": 23, "wheel": 84}
+    basic, table = indicators(x, 12800.0, speed, teeth), indicators(x, 12800.0, speed, teeth, features="all")
+    assert table.shape == (2, len(FEATURES["all"])) == (2, 20)
+    for index, name in enumerate(FEATURES["all"]):
+        assert np.isnan(table[:, index]).all() == name.endswith("_wheel"), name
+    known = [index for index, name in enumerate(INDICATORS) if not name.endswith("_wheel")]
+    np.testing.assert_array_equal(table[:, known], basic[:, known])
+    assert np.isfinite(basic).all()
+    short = indicators(x[:, :100], 12800.0, speed, teeth, features="all")
+    assert np.isnan(short[:, FEATURES["all"].index("spectral_kurtosis")]).all()
+
+
+def test_all_features_see_the_impulses_of_a_missing_tooth():
+    dataset = FakeDataset(n_units=4, records_per_unit=16, strength=2.0, duration=1.5)
+    task = task_of(dataset, window_samples=1000, stride_samples=1000, normalise="rms")
+    table = feature_table(task, subset_segments(task, "by_unit", "train"), features="all")
+    assert len(table.names) == table.values.shape[1] == len(FEATURES["all"])
+    for name in ("spectral_kurtosis", "fm0_pinion", "m6a_pinion", "na4_pinion"):
+        column = table.values[:, table.names.index(f"channel_0/{name}")]
+        healthy, missing = (column[table.label == label] for label in (0, 3))
+        assert np.median(missing) > 1.5 * np.median(healthy), name
+
+
+def test_all_features_at_a_rate_that_holds_no_mesh_band_are_nan():
+    x = np.random.default_rng(0).standard_normal((1, 30000))
+    table = indicators(x, 1000.0, {"pinion": 16.0, "wheel": 30.0}, {"pinion": 23, "wheel": 84}, features="all")
+    found = dict(zip(FEATURES["all"], np.isnan(table[0]).tolist(), strict=True))
+    assert found["fm0_wheel"]
+    assert found["nb4_pinion"]
+    assert found["spectral_kurtosis"]
+    assert not found["fm0_pinion"]
+
+
 def test_features_do_not_depend_on_threads_or_cache():
     _, task = make_tables(n_units=4, records_per_unit=4)
     segments = subset_segments(task, "by_unit", "train")
@@ -139,6 +176,18 @@ def test_indicator_model_finds_the_fault_and_stays_at_chance_without_one():
     (train, validation, test), task = make_tables(strength=0.0, n_units=12)
     _, record, predicted = indicator_model(train, validation, test, n_classes=4, with_level=True)
     assert accuracy(record, predicted, task) < 0.55
+
+
+def test_indicator_model_passes_over_what_no_stretch_is_long_enough_for():
+    tables, _ = make_tables(n_units=4, records_per_unit=4)
+    with_gap = []
+    for table in tables:
+        values = np.concatenate([table.values, np.full((len(table.values), 1), np.nan)], axis=1)
+        with_gap.append(replace(table, values=values, names=(*table.names, "channel_0/nb4_wheel")))
+    first = indicator_model(*tables, n_classes=4, with_level=True)
+    second = indicator_model(*with_gap, n_classes=4, with_level=True)
+    assert first[0] == second[0]
+    np.testing.assert_array_equal(first[2], second[2])
 
 
 def test_rms_threshold_uses_the_level_only():
