@@ -30,9 +30,9 @@ def probabilities(log_probability: FloatArray, temperature: float = 1.0) -> Floa
 def fit_temperature(log_probability: FloatArray, label: IntArray) -> float:
     """Temperature with the least cross-entropy over records that took no part in the training.
 
-    A class with n records has the target (n + 1) / (n + c) for itself and 1 / (n + c) for each of the other c - 1, which
-    is what n right ones in a row tell. With targets of 1 and 0, a network that errs on none of few records would be
-    certain of everything. Convex in 1 / temperature, so that the minimum is the only one.
+    A class with n records has the target (n + 1) / (n + c) for itself and 1 / (n + c) for each of the other c - 1,
+    which is what n right ones in a row tell. With targets of 1 and 0, a network that errs on none of few records would
+    be certain of everything. Convex in 1 / temperature, so that the minimum is the only one.
 
     Parameters
     ----------

@@ -43,6 +43,11 @@ class ModelDescription:
     seed: int
     best_epoch: int
     n_bootstrap: int
+    temperature: float = 1.0  # see `diagnose.calibration`; models of before have none
+
+    def __post_init__(self) -> None:
+        if not 0 < self.temperature < float("inf"):
+            raise ValueError(f"temperature must be greater than 0, not {self.temperature!r}")
 
 
 def model_description(task: Task, settings: TrainSettings, prediction: Prediction) -> ModelDescription:
@@ -62,6 +67,7 @@ def model_description(task: Task, settings: TrainSettings, prediction: Predictio
         seed=prediction.seed,
         best_epoch=prediction.best_epoch,
         n_bootstrap=settings.n_bootstrap,
+        temperature=prediction.temperature,
     )
 
 

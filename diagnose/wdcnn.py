@@ -29,8 +29,8 @@ class Wdcnn(nn.Module):
     n_positions : of the last map that the hidden layer sees
     n_hidden : units of the hidden layer
 
-    Source: Zhang, Peng, Li, Chen & Zhang (2017), "A new deep learning model for fault diagnosis with good anti-noise and
-    domain adaptation ability on raw vibration signals", Sensors 17 (2), 425, table 2.
+    Source: Zhang, Peng, Li, Chen & Zhang (2017), "A new deep learning model for fault diagnosis with good anti-noise
+    and domain adaptation ability on raw vibration signals", Sensors 17 (2), 425, table 2.
     """
 
     input_scale: torch.Tensor
