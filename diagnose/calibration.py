@@ -12,6 +12,7 @@ FloatArray = NDArray[np.floating]
 IntArray = NDArray[np.integer]
 N_BINS = 10
 LOG_TEMPERATURE_BOUNDS = (-4.0, 4.0)
+N_DRAWS = 100
 
 
 def probabilities(log_probability: FloatArray, temperature: float = 1.0) -> FloatArray:
@@ -30,41 +31,35 @@ def probabilities(log_probability: FloatArray, temperature: float = 1.0) -> Floa
 def fit_temperature(log_probability: FloatArray, label: IntArray) -> float:
     """Temperature with the least cross-entropy over records that took no part in the training.
 
-    A class with n records has the target (n + 1) / (n + c) for itself and 1 / (n + c) for each of the other c - 1,
-    which is what n right ones in a row tell. With targets of 1 and 0, a network that errs on none of few records would
-    be certain of everything. Convex in 1 / temperature, so that the minimum is the only one.
+    Without more, a network that errs on none of few records would be certain of everything. So the logarithm of the
+    temperature has a normal prior, mean 0 and standard deviation 1, which weighs as much as one record. This is ours.
 
     Parameters
     ----------
     log_probability : (record, class) mean over the windows of a record
     label : (record,)
 
-    Source: temperature by Guo et al. (2017), section 4.2; targets by Platt (1999), "Probabilistic outputs for support
-    vector machines", section 2.2, for two classes, here for c.
+    Source: Guo et al. (2017), section 4.2.
     """
     from scipy.optimize import minimize_scalar
 
-    n_classes = log_probability.shape[1]
-    count = np.bincount(label, minlength=n_classes)[label]
-    target = np.repeat(1 / (count + n_classes)[:, None], n_classes, axis=1)
-    target[np.arange(label.size), label] = (count + 1) / (count + n_classes)
+    rows = np.arange(label.size)
 
-    def cross_entropy(log_temperature: float) -> float:
-        return -float(np.mean(np.sum(target * _scaled(log_probability, np.exp(log_temperature)), axis=1)))
+    def loss(log_temperature: float) -> float:
+        fitted = _scaled(log_probability, np.exp(log_temperature))[rows, label]
+        return float(log_temperature**2 / 2 - fitted.sum())
 
-    return float(np.exp(minimize_scalar(cross_entropy, bounds=LOG_TEMPERATURE_BOUNDS, method="bounded").x))
+    return float(np.exp(minimize_scalar(loss, bounds=LOG_TEMPERATURE_BOUNDS, method="bounded").x))
 
 
-def reliability(probability: FloatArray, label: IntArray) -> list[dict[str, float | int]]:
+def reliability(confidence: FloatArray, right: NDArray[np.bool_]) -> list[dict[str, float | int]]:
     """Share of right predictions against the probability given to them, in `N_BINS` equal bins; empty ones left out.
 
     Parameters
     ----------
-    probability : (record, class)
-    label : (record,)
+    confidence : (record,) probability of the predicted class
+    right : (record,) whether the predicted class is the true one
     """
-    confidence = probability.max(axis=1)
-    right = probability.argmax(axis=1) == label
     place = np.clip(np.ceil(confidence * N_BINS).astype(int) - 1, 0, N_BINS - 1)
     return [
         {
@@ -79,12 +74,19 @@ def reliability(probability: FloatArray, label: IntArray) -> list[dict[str, floa
 def calibration_error(rows: Sequence[dict[str, float | int]]) -> float:
     """Expected calibration error of the rows of `reliability`: mean distance of confidence and accuracy over records.
 
-    Few records make it large by chance alone: it is no smaller than their scatter.
+    Few records make it large by chance alone, see `error_by_chance`.
 
     Source: Naeini, Cooper & Hauskrecht (2015), "Obtaining well calibrated probabilities using Bayesian binning", AAAI.
     """
     total = sum(row["n_records"] for row in rows)
     return float(sum(row["n_records"] * abs(row["confidence"] - row["accuracy"]) for row in rows) / total)
+
+
+def error_by_chance(confidence: FloatArray) -> float:
+    """Calibration error that such probabilities (record,) have on average when every one of them is true."""
+    rng = np.random.default_rng(0)
+    draws = rng.uniform(size=(N_DRAWS, confidence.size)) < confidence
+    return float(np.mean([calibration_error(reliability(confidence, right)) for right in draws]))
 
 
 def calibration_scores(
@@ -99,19 +101,20 @@ def calibration_scores(
     temperatures : one a seed
     """
     result: dict[str, Any] = {"temperature": [float(value) for value in temperatures], "n_bins": N_BINS}
-    label = np.concatenate(labels)
+    right = [values.argmax(axis=1) == truth for values, truth in zip(log_probabilities, labels, strict=True)]
     for name, scales in (("before", [1.0] * len(temperatures)), ("after", temperatures)):
-        parts = [probabilities(values, scale) for values, scale in zip(log_probabilities, scales, strict=True)]
-        losses = [
-            -float(np.mean(_scaled(values, scale)[np.arange(truth.size), truth]))
-            for values, truth, scale in zip(log_probabilities, labels, scales, strict=True)
-        ]
+        logs = [_scaled(values, scale) for values, scale in zip(log_probabilities, scales, strict=True)]
+        confidence = [np.exp(values.max(axis=1)) for values in logs]
         result[name] = {
             "expected_calibration_error": [
-                calibration_error(reliability(part, truth)) for part, truth in zip(parts, labels, strict=True)
+                calibration_error(reliability(sure, hits)) for sure, hits in zip(confidence, right, strict=True)
             ],
-            "cross_entropy": losses,
-            "reliability": reliability(np.concatenate(parts), label),
+            "error_by_chance": [error_by_chance(sure) for sure in confidence],
+            "cross_entropy": [
+                -float(np.mean(values[np.arange(truth.size), truth]))
+                for values, truth in zip(logs, labels, strict=True)
+            ],
+            "reliability": reliability(np.concatenate(confidence), np.concatenate(right)),
         }
     return result
 

@@ -150,21 +150,33 @@ def _trust_section(metrics: Mapping[str, Any]) -> list[str]:
     lines = [
         "## What its probabilities are worth",
         "",
-        "One temperature a network, fitted on the records of its validation units, makes the probabilities of records "
-        "as sure as they are right; it changes no label. Calibration error: mean distance between the probability of "
-        "the predicted class and the share that is right, over test records (with few records some of it is chance). "
-        "The network is the one of its best epoch on validation units; the score of its last epoch stands beside.",
+        "One temperature a network, fitted on the records of its validation units, brings the probabilities of records "
+        "nearer to the share that is right; it changes no label. Calibration error: mean distance between the two over "
+        "test records, and what such probabilities would have by chance if they were all true. Cross-entropy: smaller "
+        "is better. The network is the one of its best epoch on validation units; the score of its last epoch stands "
+        "beside.",
         "",
-        "| protocol | calibration error before | after | temperature | best epoch | last epoch | score of the last |",
+        "| protocol | calibration error before, after (chance) | cross-entropy before, after | temperature | best epoch"
+        " | last epoch | score of the last |",
         "|---" * 7 + "|",
     ]
     for name, result in clean.items():
         calibration, last = result["calibration"], result["last_epoch"]
-        errors = [np.mean(calibration[key]["expected_calibration_error"]) for key in ("before", "after")]
-        lines.append(
-            f"| **{name}** | {errors[0]:.3f} | {errors[1]:.3f} | {_several(calibration['temperature'], '.2f')} | "
-            f"{_several(result['best_epoch'], 'd')} | {_several(last['epoch'], 'd')} | {_cell(last)} |"
+        before, after = (
+            {key: np.mean(calibration[when][key]) for key in ("expected_calibration_error", "cross_entropy")}
+            for when in ("before", "after")
         )
+        cells = (
+            f"**{name}**",
+            f"{before['expected_calibration_error']:.3f}, {after['expected_calibration_error']:.3f} "
+            f"({np.mean(calibration['after']['error_by_chance']):.3f})",
+            f"{before['cross_entropy']:.3f}, {after['cross_entropy']:.3f}",
+            _several(calibration["temperature"], ".2f"),
+            _several(result["best_epoch"], "d"),
+            _several(last["epoch"], "d"),
+            _cell(last),
+        )
+        lines.append("| " + " | ".join(cells) + " |")
     return [*lines, "", "![reliability](reliability.png)"] if clean else lines
 
 
