@@ -39,7 +39,7 @@ class Bank:
 
     dilation: int
     weight: torch.Tensor
-    bias: torch.Tensor
+    bias: NDArray[np.float32]
     padded: NDArray[np.bool_]
 
 
@@ -72,7 +72,7 @@ def fit_minirocket(windows: FloatArray, *, n_features: int, rng: np.random.Gener
             Bank(
                 dilation=dilation,
                 weight=weight,
-                bias=torch.from_numpy(bias.astype(np.float32)),
+                bias=bias.astype(np.float32),
                 padded=(index + np.arange(len(KERNELS))) % 2 == 0,
             )
         )
@@ -81,20 +81,28 @@ def fit_minirocket(windows: FloatArray, *, n_features: int, rng: np.random.Gener
 
 
 def minirocket_features(windows: FloatArray, banks: list[Bank]) -> FloatArray:
-    """(window, feature) share of positive values of every convolution less its threshold, of float32 windows."""
-    signal = torch.from_numpy(windows)
-    columns = []
-    for bank in banks:
-        margin = 4 * bank.dilation
-        output = torch.nn.functional.conv1d(signal, bank.weight, dilation=bank.dilation, padding=margin)
-        for padded in (True, False):
-            kernels = torch.from_numpy(np.flatnonzero(bank.padded == padded))
-            part = output[:, kernels] if padded else output[:, kernels, margin:-margin]
-            counts = [
-                torch.count_nonzero(part > bias[:, None], dim=-1) / part.shape[-1] for bias in bank.bias[kernels].T
-            ]
-            columns.append(torch.stack(counts, dim=-1).flatten(1))
-    return torch.cat(columns, dim=1).numpy()
+    """(window, feature) share of positive values of every convolution less its threshold, of float32 windows.
+
+    Two windows at a time stay in the cache of a processor; sums of bytes are ten times as fast in numpy as in torch.
+    """
+    blocks = torch.from_numpy(windows).split(2)
+    return np.concatenate([np.concatenate([_shares(block, bank) for bank in banks], axis=1) for block in blocks])
+
+
+def _shares(windows: torch.Tensor, bank: Bank) -> FloatArray:
+    """(window, feature) of one dilation, kernel by kernel."""
+    n_samples, margin = windows.shape[-1], 4 * bank.dilation
+    padded = torch.nn.functional.pad(windows, (margin, margin))
+    taps = [padded[..., tap * bank.dilation :][..., :n_samples] for tap in range(KERNEL_LENGTH)]
+    output = torch.matmul(bank.weight.flatten(1), torch.stack(taps, dim=2).flatten(1, 2)).numpy()
+    shares = np.empty((len(windows), *bank.bias.shape), dtype=np.float32)
+    for ends, span in ((True, slice(None)), (False, slice(margin, n_samples - margin))):
+        kernels = np.flatnonzero(bank.padded == ends)
+        part = output[:, kernels, span]
+        for index, bias in enumerate(bank.bias[kernels].T):
+            above = (part > bias[:, None]).view(np.uint8)
+            shares[:, kernels, index] = above.sum(axis=-1, dtype=np.uint32) / part.shape[-1]
+    return shares.reshape(len(windows), -1)
 
 
 def _dilations(n_samples: int, per_kernel: int) -> list[tuple[int, int]]:
