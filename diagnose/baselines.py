@@ -60,6 +60,42 @@ def indicator_model(
     return (name, *_vote(model, test.values[:, kept], test.record, n_classes))
 
 
+def nearest_spectrum(train: FeatureTable, test: FeatureTable, *, n_classes: int) -> Prediction:
+    """Class of the training stretch whose spectrum is nearest, by the Euclidean distance of `spectrum_table` rows.
+
+    Returns
+    -------
+    what was fitted, records (record,), predicted labels (record,)
+    """
+    from sklearn.neighbors import KNeighborsClassifier
+
+    model = KNeighborsClassifier(n_neighbors=1).fit(train.values, train.label)
+    return (f"1-NN of {len(train.label)} spectra", *_vote(model, test.values, test.record, n_classes))
+
+
+def ridge_model(train: FeatureTable, validation: FeatureTable, test: FeatureTable, *, n_classes: int) -> Prediction:
+    """Ridge regression on class membership, features standardised, its penalty chosen on the validation units.
+
+    Returns
+    -------
+    what was chosen, records (record,), predicted labels (record,)
+    """
+    from sklearn.linear_model import RidgeClassifier
+    from sklearn.pipeline import make_pipeline
+    from sklearn.preprocessing import StandardScaler
+
+    scored = []
+    for penalty in np.logspace(5, -1, 7):
+        model = make_pipeline(StandardScaler(), RidgeClassifier(alpha=penalty, class_weight="balanced"))
+        model.fit(train.values, train.label)
+        records, predicted = _vote_by_score(model, validation.values, validation.record, n_classes)
+        label = _label_of(records, validation)
+        confusion = confusion_by_unit(label, predicted, np.zeros_like(label), n_classes)
+        scored.append((float(balanced_accuracy(confusion[0])), f"ridge, penalty {penalty:g}", model))
+    _, name, model = max(scored, key=lambda row: row[0])
+    return (name, *_vote_by_score(model, test.values, test.record, n_classes))
+
+
 def _candidates() -> dict[str, Callable[[], Any]]:
     """Untrained models by name, the first winning ties."""
     from sklearn.ensemble import HistGradientBoostingClassifier
@@ -96,6 +132,17 @@ def _vote(model: Any, values: FloatArray, record: IntArray, n_classes: int) -> t
     log_probability = np.full((values.shape[0], n_classes), np.log(1e-9))
     log_probability[:, model.classes_] = np.log(np.maximum(model.predict_proba(values), 1e-9))
     records, by_record = over_records(log_probability, record)
+    return records, by_record.argmax(axis=1)
+
+
+def _vote_by_score(model: Any, values: FloatArray, record: IntArray, n_classes: int) -> tuple[IntArray, IntArray]:
+    """Records and their predicted labels: the largest mean score over the record's rows."""
+    score = model.decision_function(values)
+    if score.ndim == 1:  # two classes: one score, positive for the second
+        score = np.stack([-score, score], axis=1)
+    by_class = np.full((values.shape[0], n_classes), -np.inf)
+    by_class[:, model.classes_] = score
+    records, by_record = over_records(by_class, record)
     return records, by_record.argmax(axis=1)
 
 

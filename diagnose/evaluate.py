@@ -45,6 +45,7 @@ def evaluate_model(
     DatasetError    if schema version, sampling rate, channels or classes do not fit the network
     ConfigError    for a protocol or subset that does not exist
     """
+    from diagnose.calibration import calibration_scores
     from diagnose.metrics import over_records
     from diagnose.study import score_predictions
     from diagnose.train import predict_windows
@@ -63,6 +64,7 @@ def evaluate_model(
         "model": str(description.model.get("name", "network")),
         "trained_on_protocol": description.protocol,
         "seed": description.seed,
+        "calibration": calibration_scores([log_probability], [task.labels()[record]], [description.temperature]),
         **scores,
     }
 

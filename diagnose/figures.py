@@ -54,6 +54,28 @@ def severity_figure(path: Path, protocols: Mapping[str, Sequence[Mapping[str, An
     _save(figure, path)
 
 
+def reliability_figure(path: Path, protocols: Mapping[str, Mapping[str, Any]]) -> None:
+    """Share of right predictions against their probability, one panel a protocol; `calibration.calibration_scores`."""
+    figure, axes = _subplots(len(protocols), size=(3.9 * len(protocols) + 0.6, 3.9))
+    for panel, (protocol, calibration) in zip(axes, protocols.items(), strict=True):
+        panel.plot([0, 1], [0, 1], color="0.6", linestyle="--", label="calibrated")
+        for index, name in enumerate(("before", "after")):
+            rows = calibration[name]["reliability"]
+            error = np.mean(calibration[name]["expected_calibration_error"])
+            panel.plot(
+                [row["confidence"] for row in rows],
+                [row["accuracy"] for row in rows],
+                color=COLORS[index],
+                marker=MARKERS[index],
+                label=f"{name} scaling, error {error:.2f}",
+            )
+        panel.set(xlabel="probability of the predicted class", xlim=(0, 1), ylim=(0, 1.03), title=protocol)
+        panel.grid(alpha=0.3)
+        panel.legend(loc="upper left", fontsize=8)
+    axes[0].set_ylabel("share of records that are right")
+    _save(figure, path)
+
+
 def _subplots(n_panels: int, *, size: tuple[float, float]) -> tuple[Any, list[Any]]:
     """Figure and axes without touching the state of pyplot, so that no display is needed."""
     from matplotlib.backends.backend_agg import FigureCanvasAgg

@@ -17,16 +17,16 @@ import numpy as np
 import torch
 from numpy.typing import NDArray
 
-from diagnose.baselines import indicator_model, rms_threshold
+from diagnose.baselines import Prediction as BaselinePrediction
+from diagnose.baselines import indicator_model, nearest_spectrum, ridge_model, rms_threshold
 from diagnose.domain import Domain, fit_domain
 from diagnose.features import Cache, feature_table
 from diagnose.metrics import over_records
 from diagnose.settings import TrainSettings
-from diagnose.train import predict_windows, train_network, with_shuffled_labels
+from diagnose.train import input_scale, predict_windows, train_network, with_shuffled_labels
+from diagnose.window_features import rocket_tables, spectrum_table
 from diagnose.windows import SUBSETS, Task, WindowSet, load_windows, subset_segments
 from gensig.errors import GensigError
-
-BASELINES = ("indicators", "indicators_without_level", "rms_threshold")
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -40,7 +40,14 @@ class Job:
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Prediction:
-    """Test records of a protocol with their predicted labels, and what was fitted or trained."""
+    """Test records of a protocol with their predicted labels, and what was fitted or trained.
+
+    Attributes of networks only
+    ---------------------------
+    log_probability : (record, class) mean over the windows
+    temperature : see `diagnose.calibration`
+    last_predicted : (record,) labels that the weights of the last epoch give
+    """
 
     protocol: str
     method: str
@@ -52,6 +59,9 @@ class Prediction:
     domain: Domain | None = None
     best_epoch: int = 0
     validation_loss: tuple[float, ...] = ()
+    log_probability: NDArray[np.floating] | None = None
+    temperature: float = 1.0
+    last_predicted: NDArray[np.integer] | None = None
 
 
 def run_jobs(
@@ -95,7 +105,7 @@ def run_job(task: Task, settings: TrainSettings, job: Job) -> list[Prediction]:
     """Predictions on the test part of each of the job's protocols."""
     if job.seed is None:
         cache: Cache = {}
-        return [prediction for name in job.protocols for prediction in _run_baselines(task, name, settings, cache)]
+        return [prediction for name in job.protocols for prediction in _run_baselines(task, settings, name, cache)]
     return [_run_training(task, settings, name, job.seed, job.shuffled) for name in job.protocols]
 
 
@@ -111,6 +121,9 @@ def _run_training(task: Task, settings: TrainSettings, protocol: str, seed: int,
     )
     record, log_probability = over_records(predict_windows(training.model, test), test.record)
     domain = None if shuffled else fit_domain(train, validation)
+    last = log_probability
+    if training.last_model is not None and not shuffled:
+        _, last = over_records(predict_windows(training.last_model, test), test.record)
     return Prediction(
         protocol=protocol,
         method="label_shuffle" if shuffled else str(settings.model.get("name", "network")),
@@ -122,24 +135,39 @@ def _run_training(task: Task, settings: TrainSettings, protocol: str, seed: int,
         domain=domain,
         best_epoch=training.best_epoch,
         validation_loss=training.validation_loss,
+        log_probability=log_probability,
+        temperature=training.temperature,
+        last_predicted=last.argmax(axis=1),
     )
 
 
-def _run_baselines(task: Task, protocol: str, settings: TrainSettings, cache: Cache) -> list[Prediction]:
+def _run_baselines(task: Task, settings: TrainSettings, protocol: str, cache: Cache) -> list[Prediction]:
+    predictions = []
+    for method in settings.baselines:
+        detail, record, predicted = _fit_baseline(task, settings, protocol, method, cache)
+        predictions.append(
+            Prediction(protocol=protocol, method=method, seed=0, record=record, predicted=predicted, detail=detail)
+        )
+    return predictions
+
+
+def _fit_baseline(task: Task, settings: TrainSettings, protocol: str, method: str, cache: Cache) -> BaselinePrediction:
+    """Fit one of `diagnose.settings.BASELINES` and judge it on the test part."""
     n_classes = len(task.class_names)
+    if method in ("nearest_spectrum", "minirocket"):
+        sets = [_windows(task, protocol)[subset] for subset in SUBSETS]
+        if method == "minirocket":
+            return ridge_model(*rocket_tables(*sets, n_features=settings.minirocket_features), n_classes=n_classes)
+        scale = input_scale(sets[0])
+        train, _, test = (spectrum_table(windows, scale) for windows in sets)
+        return nearest_spectrum(train, test, n_classes=n_classes)
     train, validation, test = (
         feature_table(task, subset_segments(task, protocol, subset), features=settings.features, cache=cache)
         for subset in SUBSETS
     )
-    fitted = {
-        "indicators": indicator_model(train, validation, test, n_classes=n_classes, with_level=True),
-        "indicators_without_level": indicator_model(train, validation, test, n_classes=n_classes, with_level=False),
-        "rms_threshold": rms_threshold(train, test, n_classes=n_classes),
-    }
-    return [
-        Prediction(protocol=protocol, method=method, seed=0, record=record, predicted=predicted, detail=detail)
-        for method, (detail, record, predicted) in fitted.items()
-    ]
+    if method == "rms_threshold":
+        return rms_threshold(train, test, n_classes=n_classes)
+    return indicator_model(train, validation, test, n_classes=n_classes, with_level=method == "indicators")
 
 
 # Windows of the protocol a process works on; jobs come protocol by protocol.

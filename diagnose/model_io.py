@@ -51,6 +51,11 @@ class ModelDescription:
     n_bootstrap: int
     speed_rpm_range: tuple[float, float] | None = None
     out_of_distribution: dict[str, Any] | None = None
+    temperature: float = 1.0  # see `diagnose.calibration`; models of before have none
+
+    def __post_init__(self) -> None:
+        if not 0 < self.temperature < float("inf"):
+            raise ValueError(f"temperature must be greater than 0, not {self.temperature!r}")
 
 
 def model_description(task: Task, settings: TrainSettings, prediction: Prediction) -> ModelDescription:
@@ -74,6 +79,7 @@ def model_description(task: Task, settings: TrainSettings, prediction: Predictio
         n_bootstrap=settings.n_bootstrap,
         speed_rpm_range=(float(speed.min()), float(speed.max())),
         out_of_distribution=None if prediction.domain is None else prediction.domain.facts(),
+        temperature=prediction.temperature,
     )
 
 

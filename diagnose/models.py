@@ -9,6 +9,8 @@ from typing import Any
 import torch
 from torch import nn
 
+from diagnose.spectrum import SpectrumCnn
+from diagnose.wdcnn import Wdcnn
 from gensig.errors import ConfigError
 
 
@@ -77,7 +79,7 @@ def _start_as_band_passes(weight: torch.Tensor) -> None:
         weight.copy_(2 * size * carrier * torch.hann_window(kernel, periodic=False))
 
 
-MODELS: dict[str, Callable[..., nn.Module]] = {"small_cnn": SmallCnn}
+MODELS: dict[str, Callable[..., nn.Module]] = {"small_cnn": SmallCnn, "wdcnn": Wdcnn, "spectrum_cnn": SpectrumCnn}
 
 
 def build_model(
@@ -98,3 +100,19 @@ def build_model(
         return MODELS[kind](n_channels=n_channels, n_classes=n_classes, input_scale=scale, **parameters)
     except (TypeError, ValueError, RuntimeError) as error:
         raise ConfigError(f"model {kind}: {' '.join(str(error).split())}") from None
+
+
+def check_window(model: nn.Module, n_channels: int, window_samples: int) -> None:
+    """Refuse a window that the network cannot take, before anything is trained.
+
+    Raises
+    ------
+    ConfigError    if it is too short
+    """
+    try:
+        with torch.inference_mode():
+            model.eval()(torch.zeros(1, n_channels, window_samples))
+    except RuntimeError:
+        raise ConfigError(
+            f"window_samples={window_samples} is too short for this network; make it longer or choose another model"
+        ) from None

@@ -9,7 +9,7 @@ from typing import Any
 
 import numpy as np
 
-from diagnose.figures import confusion_figure, severity_figure
+from diagnose.figures import confusion_figure, reliability_figure, severity_figure
 from diagnose.protocols import MEANING
 
 FEW_UNITS = 10
@@ -17,7 +17,7 @@ CONFUSED = 0.1
 
 
 def write_report(folder: Path, metrics: Mapping[str, Any]) -> Path:
-    """Write ``metrics.json``, ``confusion_<protocol>.png``, ``severity.png`` and ``report.md``; return the page."""
+    """Write ``metrics.json``, the figures (confusion by protocol, severity, reliability), ``report.md``; return it."""
     (folder / "metrics.json").write_text(json.dumps(metrics, indent=2, allow_nan=False) + "\n", encoding="utf-8")
     model = metrics["model"]
     for protocol, result in metrics["protocols"].items():
@@ -28,6 +28,9 @@ def write_report(folder: Path, metrics: Mapping[str, Any]) -> Path:
     rows = {name: part for name, part in rows.items() if part}
     if rows:
         severity_figure(folder / "severity.png", rows)
+    clean = {name: result for name, result in metrics["protocols"].items() if not result["leaky"]}
+    if clean:
+        reliability_figure(folder / "reliability.png", {name: result["calibration"] for name, result in clean.items()})
     page = folder / "report.md"
     page.write_text("\n".join(_page(metrics, list(rows))) + "\n", encoding="utf-8")
     return page
@@ -40,6 +43,8 @@ def result_table(metrics: Mapping[str, Any]) -> list[str]:
         "indicators": "indicators",
         "indicators_without_level": "indicators without RMS",
         "rms_threshold": "RMS threshold",
+        "nearest_spectrum": "1-NN on spectra",
+        "minirocket": "MiniRocket",
         "label_shuffle": "label shuffle",
         "chance": "chance",
     }
@@ -98,6 +103,7 @@ def _page(metrics: Mapping[str, Any], with_severity: Sequence[str]) -> list[str]
         "- **indicators**: logistic regression or gradient boosting (chosen on validation units) on RMS, kurtosis, "
         "crest factor, FM4 and sideband ratio of every channel over the whole stretch of signal; it knows the speed "
         "and the tooth counts. **RMS threshold**: thresholds on the level alone.",
+        *_optional_baselines(metrics),
         "- **label shuffle**: the same training on shuffled labels. Chance must lie in its interval, which covers the "
         "units and the luck of the shuffle; if it lies below, something leaks.",
         "",
@@ -110,9 +116,21 @@ def _page(metrics: Mapping[str, Any], with_severity: Sequence[str]) -> list[str]
     lines += ["", *[f"![confusion, {name}](confusion_{name}.png)" for name in results]]
     if with_severity:
         lines += ["", "## How severe a fault must be", "", "![recognised by severity](severity.png)"]
+    lines += ["", *_trust_section(metrics)]
     lines += ["", "## Caveats", "", *_caveats(metrics), ""]
     lines.append("Everything in numbers, with macro-F1, recall and settings: `metrics.json`. Networks: `models/`.")
     return lines
+
+
+def _optional_baselines(metrics: Mapping[str, Any]) -> list[str]:
+    """One line for each baseline that does not run by default."""
+    texts = {
+        "nearest_spectrum": "- **1-NN on spectra**: the class of the training signal with the nearest log-magnitude "
+        "spectrum, mean over the windows.",
+        "minirocket": "- **MiniRocket**: ridge regression on the shares of positive values of fixed convolutions "
+        "(Dempster et al. 2021), mean over the windows; the penalty is chosen on validation units.",
+    }
+    return [text for name, text in texts.items() if name in metrics["settings"]["baselines"]]
 
 
 def _recall_table(metrics: Mapping[str, Any]) -> list[str]:
@@ -126,13 +144,55 @@ def _recall_table(metrics: Mapping[str, Any]) -> list[str]:
     return lines
 
 
+def _trust_section(metrics: Mapping[str, Any]) -> list[str]:
+    """How far the network's probabilities can be believed, and what the choice of the epoch brought."""
+    clean = {name: result for name, result in metrics["protocols"].items() if not result["leaky"]}
+    lines = [
+        "## What its probabilities are worth",
+        "",
+        "One temperature a network, fitted on the records of its validation units, brings the probabilities of records "
+        "nearer to the share that is right; it changes no label. Calibration error: mean distance between the two over "
+        "test records, and what such probabilities would have by chance if they were all true. Cross-entropy: smaller "
+        "is better. The network is the one of its best epoch on validation units; the score of its last epoch stands "
+        "beside.",
+        "",
+        "| protocol | calibration error before, after (chance) | cross-entropy before, after | temperature | best epoch"
+        " | last epoch | score of the last |",
+        "|---" * 7 + "|",
+    ]
+    for name, result in clean.items():
+        calibration, last = result["calibration"], result["last_epoch"]
+        before, after = (
+            {key: np.mean(calibration[when][key]) for key in ("expected_calibration_error", "cross_entropy")}
+            for when in ("before", "after")
+        )
+        cells = (
+            f"**{name}**",
+            f"{before['expected_calibration_error']:.3f}, {after['expected_calibration_error']:.3f} "
+            f"({np.mean(calibration['after']['error_by_chance']):.3f})",
+            f"{before['cross_entropy']:.3f}, {after['cross_entropy']:.3f}",
+            _several(calibration["temperature"], ".2f"),
+            _several(result["best_epoch"], "d"),
+            _several(last["epoch"], "d"),
+            _cell(last),
+        )
+        lines.append("| " + " | ".join(cells) + " |")
+    return [*lines, "", "![reliability](reliability.png)"] if clean else lines
+
+
+def _several(values: Sequence[float], form: str) -> str:
+    """One value a seed."""
+    return ", ".join(format(value, form) for value in values)
+
+
 def _headline(name: str, result: Mapping[str, Any], model: str) -> str:
     """One sentence: the score against chance and against the best baseline."""
     methods = result["methods"]
     score, chance = methods[model]["balanced_accuracy"], methods["chance"]["balanced_accuracy"]
     verdict = "above chance" if score["low"] > chance else "not distinguishable from chance"
     text = f"**{name}**: {model} {score['mean']:.2f}, {verdict} ({chance:.2f})"
-    others = {key: methods[key] for key in ("indicators", "rms_threshold") if key in methods}
+    named = ("indicators", "rms_threshold", "nearest_spectrum", "minirocket")
+    others = {key: methods[key] for key in named if key in methods}
     if others:
         best = max(others, key=lambda key: others[key]["balanced_accuracy"]["mean"])
         value = others[best]["balanced_accuracy"]["mean"]

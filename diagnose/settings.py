@@ -9,6 +9,10 @@ from typing import Any
 
 from gensig.errors import ConfigError
 
+BASELINES = ("indicators", "indicators_without_level", "rms_threshold", "nearest_spectrum", "minirocket")
+DEVICES = ("auto", "cpu", "cuda")
+LEAST_ROCKET_FEATURES = 84  # one for each of the kernels
+
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class TrainSettings:
@@ -32,10 +36,12 @@ class TrainSettings:
     epoch_fraction: float
     shuffle_control: bool
     n_seeds_control: int
-    baselines: bool
+    baselines: tuple[str, ...]
     features: str
+    minirocket_features: int
     n_bootstrap: int
     n_threads: int | None
+    device: str
 
     def __post_init__(self) -> None:
         for name in (
@@ -48,6 +54,7 @@ class TrainSettings:
         ):
             _check_whole(name, getattr(self, name), least=1)
         _check_whole("batch_size", self.batch_size, least=2)
+        _check_whole("minirocket_features", self.minirocket_features, least=LEAST_ROCKET_FEATURES)
         if self.n_threads is not None:
             _check_whole("n_threads", self.n_threads, least=1)
         for name in ("learning_rate", "weight_decay", "epoch_fraction"):
@@ -58,11 +65,17 @@ class TrainSettings:
                 raise ConfigError(f"{name} must be a list of different values, at least one")
         for seed in self.seeds:
             _check_whole("seeds", seed, least=0)
-        for name in ("shuffle_control", "baselines"):
-            if not isinstance(getattr(self, name), bool):
-                raise ConfigError(f"{name} must be true or false, not {getattr(self, name)!r}")
+        if not isinstance(self.shuffle_control, bool):
+            raise ConfigError(f"shuffle_control must be true or false, not {self.shuffle_control!r}")
+        if len(set(self.baselines)) < len(self.baselines) or not set(self.baselines) <= set(BASELINES):
+            raise ConfigError(
+                f"baselines must be false or a list of different names out of {', '.join(BASELINES)}, "
+                f"not {', '.join(str(name) for name in self.baselines)}"
+            )
         if self.features not in ("basic", "all"):
             raise ConfigError(f"features must be basic or all, not {self.features!r}")
+        if self.device not in DEVICES:
+            raise ConfigError(f"device must be one of {', '.join(DEVICES)}, not {self.device!r}")
 
 
 def settings_from(config: Mapping[str, Any]) -> TrainSettings:
@@ -80,6 +93,7 @@ def settings_from(config: Mapping[str, Any]) -> TrainSettings:
         values[name] = _as_tuple(name, values[name])
     if values["seeds"] is None:
         raise ConfigError("seeds must be a list of different values, at least one")
+    values["baselines"] = () if values["baselines"] is False else _as_tuple("baselines", values["baselines"]) or ()
     values["data"], values["out"] = str(values["data"]), str(values["out"])
     return TrainSettings(**values)
 

@@ -15,12 +15,14 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from diagnose.jobs import BASELINES, Job, Prediction, run_jobs
+from diagnose.calibration import calibration_scores
+from diagnose.jobs import Job, Prediction, run_jobs
 from diagnose.metrics import SCORES, confusion_by_unit, recall, score_with_interval
 from diagnose.model_io import data_fingerprint, model_description, save_model
-from diagnose.models import build_model
+from diagnose.models import build_model, check_window
 from diagnose.protocols import choose_protocols
-from diagnose.settings import TrainSettings
+from diagnose.settings import BASELINES, TrainSettings
+from diagnose.train import device_of
 from diagnose.windows import SUBSETS, Task, plan_windows, subset_segments, task_of
 from gensig.errors import ConfigError
 
@@ -39,8 +41,8 @@ def plan_study(task: Task, settings: TrainSettings) -> tuple[tuple[str, ...], li
 
     Raises
     ------
-    ConfigError    for a protocol that does not exist or cannot be trained on, an empty subset or a window that does
-        not fit
+    ConfigError    for a protocol that does not exist or cannot be trained on, a device that does not exist, an empty
+        subset or a window that does not fit
     """
     wanted, _ = choose_protocols(task.dataset, settings.protocols)
     protocols = tuple(sorted(wanted, key=lambda name: (is_leaky(name), wanted.index(name))))
@@ -53,7 +55,9 @@ def plan_study(task: Task, settings: TrainSettings) -> tuple[tuple[str, ...], li
             if subset != "validation" and present.size < 2:
                 name = task.class_names[int(present[0])]
                 raise ConfigError(f"protocol {protocol}: one class only in its {subset} part ({name})")
-    build_model(settings.model, n_channels=len(task.channel_names), n_classes=len(task.class_names))
+    model = build_model(settings.model, n_channels=len(task.channel_names), n_classes=len(task.class_names))
+    check_window(model, len(task.channel_names), task.window_samples)
+    device_of(settings.device)
     jobs = [Job(protocols=protocols, seed=None)] if settings.baselines else []
     for protocol in protocols:
         jobs += [Job(protocols=(protocol,), seed=seed) for seed in settings.seeds]
@@ -221,7 +225,24 @@ def _protocol_result(
         "by_severity": severity_rows(task, [(run.record, run.predicted) for run in network]),
         "validation_loss": [list(run.validation_loss) for run in network],
         "best_epoch": [run.best_epoch for run in network],
+        "last_epoch": _last_epoch(task, settings, network),
+        "calibration": _calibration(task, network),
     }
+
+
+def _last_epoch(task: Task, settings: TrainSettings, network: Sequence[Prediction]) -> dict[str, Any]:
+    """Epochs run and the scores of the weights of the last one: what choosing the best epoch brought."""
+    pairs = [(run.record, run.last_predicted) for run in network if run.last_predicted is not None]
+    scores = score_predictions(task, pairs, settings.n_bootstrap)
+    return {"epoch": [len(run.validation_loss) for run in network], **{name: scores[name] for name in SCORES}}
+
+
+def _calibration(task: Task, network: Sequence[Prediction]) -> dict[str, Any]:
+    """Calibration of the probabilities of test records, see `diagnose.calibration.calibration_scores`."""
+    labels = task.labels()
+    runs = [(run.log_probability, labels[run.record], run.temperature) for run in network]
+    known = [(values, truth, scale) for values, truth, scale in runs if values is not None]
+    return calibration_scores(*(list(column) for column in zip(*known, strict=True)))
 
 
 def _n_cores() -> int:

@@ -13,11 +13,12 @@ from numpy.typing import NDArray
 from torch import nn
 from torch.nn.functional import cross_entropy, log_softmax
 
+from diagnose.calibration import fit_temperature
 from diagnose.metrics import over_records
 from diagnose.models import build_model
 from diagnose.settings import TrainSettings
 from diagnose.windows import WindowSet
-from gensig.errors import SimulationError
+from gensig.errors import ConfigError, SimulationError
 
 FloatArray = NDArray[np.floating]
 IntArray = NDArray[np.integer]
@@ -29,14 +30,18 @@ class Training:
 
     Attributes
     ----------
-    model : in evaluation mode, weights of the best epoch
+    model : in evaluation mode, weights of the best epoch, on the processor
+    last_model : the same with the weights of the last epoch; None where the last epoch is the best one
     best_epoch : counted from 1
     validation_loss : one value an epoch
+    temperature : of the best epoch's record predictions, see `diagnose.calibration.fit_temperature`
     """
 
     model: nn.Module
+    last_model: nn.Module | None
     best_epoch: int
     validation_loss: tuple[float, ...]
+    temperature: float
 
 
 def train_network(
@@ -56,44 +61,81 @@ def train_network(
     train, validation : windows of different units; training windows start anywhere in their stretch, anew each epoch
     model_config : see `diagnose.models.build_model`
     n_classes : of the task
-    settings : epochs, patience, batch size, learning rate, weight decay, share drawn an epoch
+    settings : epochs, patience, batch size, learning rate, weight decay, share drawn an epoch, device
     seed : decides initial weights, order, window starts and dropout; same seed, threads and machine, same weights
     on_epoch : called after each epoch
+
+    Raises
+    ------
+    ConfigError    for a device that is not there
+    SimulationError    if the first epoch diverges
     """
+    device = device_of(settings.device)
     rng = np.random.default_rng([seed, 1])
     with torch.random.fork_rng(devices=[]):
         torch.manual_seed(seed)
         scale = input_scale(train)
         model = build_model(model_config, n_channels=len(scale), n_classes=n_classes, input_scale=scale)
+        model.to(device)  # the weights were drawn on the processor: the same ones on every device
         optimizer = torch.optim.AdamW(model.parameters(), lr=settings.learning_rate, weight_decay=settings.weight_decay)
         n_drawn = _windows_an_epoch(train, settings.epoch_fraction)
         n_batches = max(n_drawn // settings.batch_size, 1)
         schedule = torch.optim.lr_scheduler.OneCycleLR(
             optimizer, max_lr=settings.learning_rate, total_steps=settings.epochs * n_batches, pct_start=0.15
         )
-        weight = torch.from_numpy(_class_weights(train.label, n_classes))
+        weight = torch.from_numpy(_class_weights(train.label, n_classes)).to(device)
         held_out = torch.from_numpy(validation.cut(np.arange(len(validation))))
         losses: list[float] = []
         best_weights, best_epoch = copy.deepcopy(model.state_dict()), 0
         for epoch in range(1, settings.epochs + 1):
             model.train()
             for batch in np.array_split(rng.permutation(len(train))[:n_drawn], n_batches):
-                windows, label = torch.from_numpy(train.cut(batch, rng)), torch.from_numpy(train.label[batch])
+                windows = torch.from_numpy(train.cut(batch, rng)).to(device)
+                label = torch.from_numpy(train.label[batch]).to(device)
                 optimizer.zero_grad()
-                cross_entropy(model(windows), label, weight=weight).backward()
+                with _mixed_precision(device):
+                    loss = cross_entropy(model(windows), label, weight=weight)
+                loss.backward()
                 optimizer.step()
                 schedule.step()
-            losses.append(record_loss(_log_probabilities(model, held_out), validation))
+            log_probability = _log_probabilities(model, held_out)
+            losses.append(record_loss(log_probability, validation))
             on_epoch()
             if np.isfinite(losses[-1]) and losses[-1] <= min(losses):
                 best_weights, best_epoch = copy.deepcopy(model.state_dict()), epoch
+                best_log_probability = log_probability
             if epoch - best_epoch >= settings.patience:
                 break
     if best_epoch == 0:
         raise SimulationError("the training diverged from its first epoch; reduce learning_rate")
+    last_model = copy.deepcopy(model).cpu().eval() if best_epoch < len(losses) else None
     model.load_state_dict(best_weights)
-    model.eval()
-    return Training(model=model, best_epoch=best_epoch, validation_loss=tuple(losses))
+    return Training(
+        model=model.cpu().eval(),
+        last_model=last_model,
+        best_epoch=best_epoch,
+        validation_loss=tuple(losses),
+        temperature=fit_temperature(*_over_labelled_records(best_log_probability, validation)),
+    )
+
+
+def device_of(name: str) -> torch.device:
+    """Device of a setting: ``auto`` is a GPU if one is present, else the processor; the name of one must be there.
+
+    Raises
+    ------
+    ConfigError    for ``cuda`` where there is none
+    """
+    present = torch.cuda.is_available()
+    if name == "cuda" and not present:
+        raise ConfigError("device=cuda: torch finds no GPU here; use device=auto or device=cpu")
+    return torch.device("cuda" if present and name != "cpu" else "cpu")
+
+
+def _mixed_precision(device: torch.device) -> torch.autocast:
+    """Products in bfloat16 on a GPU that computes in it (compute capability 8), everything in 32 bits elsewhere."""
+    capable = device.type == "cuda" and torch.cuda.get_device_capability(device)[0] >= 8
+    return torch.autocast(device.type, dtype=torch.bfloat16, enabled=capable)
 
 
 def predict_windows(model: nn.Module, windows: WindowSet, *, batch_size: int = 64) -> FloatArray:
@@ -106,18 +148,24 @@ def predict_windows(model: nn.Module, windows: WindowSet, *, batch_size: int = 6
 def _log_probabilities(model: nn.Module, windows: torch.Tensor, *, batch_size: int = 16) -> FloatArray:
     """(window, class), in batches that stay in the cache of a processor."""
     model.eval()
+    device = next(model.parameters()).device
     with torch.inference_mode():
-        blocks = [log_softmax(model(block), dim=1) for block in windows.split(batch_size)]
-    return torch.cat(blocks).numpy().astype(float)
+        blocks = [log_softmax(model(block.to(device)), dim=1) for block in windows.split(batch_size)]
+    return torch.cat(blocks).cpu().numpy().astype(float)
 
 
 def record_loss(log_probability: FloatArray, windows: WindowSet) -> float:
     """Cross-entropy of record predictions, each class present counting the same."""
-    records, by_record = over_records(log_probability, windows.record)
-    _, first = np.unique(windows.record, return_index=True)
-    label = windows.label[first]
-    losses = -by_record[np.arange(records.size), label]
+    by_record, label = _over_labelled_records(log_probability, windows)
+    losses = -by_record[np.arange(label.size), label]
     return float(np.mean([losses[label == present].mean() for present in np.unique(label)]))
+
+
+def _over_labelled_records(log_probability: FloatArray, windows: WindowSet) -> tuple[FloatArray, IntArray]:
+    """Predictions (record, class) and labels (record,)."""
+    _, by_record = over_records(log_probability, windows.record)
+    _, first = np.unique(windows.record, return_index=True)
+    return by_record, windows.label[first]
 
 
 def with_shuffled_labels(windows: WindowSet, n_classes: int, rng: np.random.Generator) -> WindowSet:

@@ -58,7 +58,7 @@ def fails(capsys, words, message):
 def test_train_writes_what_it_promises(trained):
     names = {path.name for path in trained.iterdir()}
     assert names == {
-        "metrics.json", "report.md", "models", "severity.png", "confusion_by_unit.png",
+        "metrics.json", "report.md", "models", "severity.png", "reliability.png", "confusion_by_unit.png",
         "confusion_random_window_leaky.png",
     }  # fmt: skip
     metrics = json.loads((trained / "metrics.json").read_text())
@@ -74,6 +74,10 @@ def test_train_writes_what_it_promises(trained):
         assert 0 <= value["low"] <= value["high"] <= 1
         assert np.sum(methods[name]["confusion"]) == 16 * len(methods[name]["seeds"])
     assert methods["chance"]["balanced_accuracy"] == 0.25
+    for seed, epoch in enumerate(metrics["protocols"]["by_unit"]["last_epoch"]["epoch"]):
+        assert metrics["protocols"]["by_unit"]["best_epoch"][seed] <= epoch == 2
+        stored = json.loads((trained / "models" / f"by_unit-seed{seed}" / "model.json").read_text())
+        assert stored["temperature"] == metrics["protocols"]["by_unit"]["calibration"]["temperature"][seed]
     assert not list(trained.rglob("*.pkl")) + list(trained.rglob("*.pt"))
 
 
@@ -90,6 +94,27 @@ def test_report_shows_the_leaky_protocol_last_and_says_so(trained):
     assert "LEAKY" in result_table(metrics)[-1]
 
 
+def test_report_says_what_the_probabilities_are_worth(trained):
+    page = (trained / "report.md").read_text()
+    part = page.partition("## What its probabilities are worth")[2].partition("\n## ")[0]
+    assert "![reliability](reliability.png)" in part
+    assert "| **by_unit** | " in part
+    assert "leaky" not in part
+    assert "1-NN" not in page
+
+
+def test_chosen_baselines_stand_in_the_report(data, tmp_path):
+    out = tmp_path / "out"
+    few = ["protocols=[by_unit]", "shuffle_control=false", "baselines=[nearest_spectrum,minirocket]"]
+    words = ["train", "data=good", f"out={out}", *FAST[:2], "epochs=1", "seeds=[0]", *FAST[4:], *few]
+    assert main([*words, "minirocket_features=168"]) == 0
+    page = (out / "report.md").read_text()
+    assert "| protocol | CNN | 1-NN on spectra | MiniRocket | chance |" in page
+    assert "- **MiniRocket**: ridge" in page
+    methods = json.loads((out / "metrics.json").read_text())["protocols"]["by_unit"]["methods"]
+    assert list(methods) == ["nearest_spectrum", "minirocket", "cnn", "chance"]
+
+
 def test_evaluate_repeats_the_test_score_of_its_seed(trained, data, capsys, tmp_path):
     model = trained / "models" / "by_unit-seed1"
     assert main(["evaluate", "data=good", f"model_dir={model}", f"out={tmp_path / 'e'}"]) == 0
@@ -98,6 +123,10 @@ def test_evaluate_repeats_the_test_score_of_its_seed(trained, data, capsys, tmp_
     study = json.loads((trained / "metrics.json").read_text())
     expected = study["protocols"]["by_unit"]["methods"]["cnn"]["balanced_accuracy"]["per_seed"][1]
     assert result["balanced_accuracy"]["mean"] == pytest.approx(expected, abs=1e-12)
+    calibration = study["protocols"]["by_unit"]["calibration"]
+    assert result["calibration"]["temperature"] == calibration["temperature"][1:]
+    error = calibration["after"]["expected_calibration_error"][1]
+    assert result["calibration"]["after"]["expected_calibration_error"] == pytest.approx([error], abs=1e-6)
     assert (tmp_path / "e" / "confusion.png").stat().st_size > 1000
 
 
