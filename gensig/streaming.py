@@ -12,8 +12,9 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from gensig.dataset.plan import Plan
+from gensig.dataset.protocols import make_splits, why_left_out
 from gensig.dataset.schema import COLUMNS, DEFAULTS
-from gensig.dataset.splits import SUBSETS, make_splits
+from gensig.dataset.splits import SUBSETS
 from gensig.dynamics._vector import n_lanes
 from gensig.errors import ConfigError, DatasetError
 from gensig.planning import check_switches, make_plan
@@ -102,7 +103,8 @@ class RecordStream:
         """Subset -> list of (place in this part, start_fraction, stop_fraction), as the stored data set has it."""
         tables = make_splits(self.plan, self.seed)
         if protocol not in tables:
-            raise DatasetError(f"split {protocol!r} does not exist; the plan can have {', '.join(sorted(tables))}")
+            reason = why_left_out(self.plan, self.seed).get(protocol, f"the plan can have {', '.join(sorted(tables))}")
+            raise DatasetError(f"split {protocol!r} does not exist; {reason}")
         table = tables[protocol]
         places = {name: place for place, name in enumerate(self.column("record_id").tolist())}
         rows: dict[str, list[tuple[int, float, float]]] = {subset: [] for subset in SUBSETS}

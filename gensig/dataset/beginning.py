@@ -24,7 +24,7 @@ from gensig.dataset.layout import (
 )
 from gensig.dataset.manifest import deciding, identity_hash, plain_data
 from gensig.dataset.plan import Plan, plan_text
-from gensig.dataset.splits import make_splits
+from gensig.dataset.protocols import make_splits
 from gensig.errors import DatasetError
 
 

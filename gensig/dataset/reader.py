@@ -15,6 +15,7 @@ from gensig.dataset.compression import compression_of
 from gensig.dataset.guard import datasets, first_line, open_file, open_shard, read_rows, same_file
 from gensig.dataset.layout import PLAN, SPLITS, Manifest, read_manifest, shard_path
 from gensig.dataset.plan import Plan, read_plan
+from gensig.dataset.protocols import PROTOCOLS, why_left_out
 from gensig.dataset.quantization import read_signal
 from gensig.dataset.schema import SCALES, SIGNALS
 from gensig.dataset.selection import Selection, StoredRecord, structured, unknown_name
@@ -237,9 +238,19 @@ class Dataset:
         """
         return Selection(self, np.arange(self.n_records)).where(**conditions)
 
+    @property
+    def left_out(self) -> dict[str, str]:
+        """Known protocol that this data set has not -> one line that says why."""
+        absent = [name for name in PROTOCOLS if name not in self.protocols]
+        reasons = why_left_out(self.plan, self.manifest.seed) if absent else {}
+        made_by = f"gensig {self.manifest.generator_version}, which made the set, did not know it"
+        return {name: reasons.get(name, made_by) for name in absent}
+
     def split(self, protocol: str) -> SplitRows:
         """subset -> list of (record_index, start_fraction, stop_fraction); failed records are in it, see `usable`."""
         if protocol not in self.protocols:
+            if protocol in PROTOCOLS:
+                raise DatasetError(f"split {protocol!r} does not exist in {self.folder}; {self.left_out[protocol]}")
             raise unknown_name("split", protocol, self.protocols, self.folder)
         path = self.folder / SPLITS / f"{protocol}.csv"
         table = read_split(path)

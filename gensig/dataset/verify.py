@@ -28,6 +28,8 @@ from gensig.dataset.manifest import file_digests, identity_hash
 from gensig.dataset.plan import Plan, read_plan
 from gensig.dataset.quantization import is_scale, read_signal
 from gensig.dataset.schema import COLUMNS, SCALES
+from gensig.dataset.split_check import split_problems
+from gensig.dataset.splits import read_split
 from gensig.errors import DatasetError
 
 __all__ = ["VerifyResult", "inspect", "verify"]
@@ -52,7 +54,7 @@ class VerifyResult:
 
 
 def verify(folder: Path, *, quick: bool = False) -> VerifyResult:
-    """Check a data-set folder: state, sha256, sizes, row counts, schema, plan against rows, scales, finite values.
+    """Check a data-set folder: state, sha256, sizes, rows, schema, plan against rows, splits, scales, finite values.
 
     Parameters
     ----------
@@ -76,7 +78,7 @@ def verify(folder: Path, *, quick: bool = False) -> VerifyResult:
     plan = None
     if not quick:
         found, plan = _beside_shards(folder, manifest)
-        problems += found
+        problems += found + (_splits(folder, manifest, plan) if plan is not None else [])
     starts = np.cumsum([0, *(entry.rows for entry in manifest.shards)])
     reference: dict | None = None
     for i, entry in enumerate(manifest.shards):
@@ -162,6 +164,19 @@ def _beside_shards(folder: Path, manifest: Manifest) -> tuple[list[str], Plan | 
     if plan.shard_sizes() != [entry.rows for entry in manifest.shards]:
         return [*problems, f"{PLAN} and the manifest have different shards; one was altered"], None
     return problems, plan
+
+
+def _splits(folder: Path, manifest: Manifest, plan: Plan) -> list[str]:
+    """Splits that do not keep apart what their protocol says."""
+    problems = []
+    for name in sorted(name for name in manifest.files if name.startswith(f"{SPLITS}/") and (folder / name).is_file()):
+        try:
+            problems += [
+                f"{SPLITS}/{line}" for line in split_problems(Path(name).stem, read_split(folder / name), plan)
+            ]
+        except DatasetError as error:
+            problems.append(str(error))
+    return problems
 
 
 def _bytes_differ(path: Path, entry: ShardEntry, manifest: Manifest, *, quick: bool) -> list[str]:

@@ -14,8 +14,8 @@ from scipy.stats import qmc
 
 from gensig.config import read_request
 from gensig.dataset.plan import plan_text
+from gensig.dataset.protocols import make_splits
 from gensig.dataset.schema import COLUMNS
-from gensig.dataset.splits import make_splits
 from gensig.errors import ConfigError
 from gensig.planning import MOST_IN_GRID, describe_design, make_plan
 from gensig.records import simulate_records

@@ -44,7 +44,7 @@ def test_folder_holds_what_is_needed(folder: Path, plan: Plan) -> None:
     assert set(_tree(folder)) == {
         "config.yaml", "overrides.yaml", "plan.csv", "manifest.json", "index.h5", "README.md", "croissant.json",
         "SHA256SUMS",
-        "splits/by_unit.csv", "splits/cross_specimen.csv", "splits/random_window_leaky.csv",
+        "splits/by_unit.csv", "splits/cross_gearbox.csv", "splits/cross_specimen.csv", "splits/random_window_leaky.csv",
         *(f"shards/shard-0000{i}.h5" for i in range(4)),
     }  # fmt: skip
     manifest = read_manifest(folder)

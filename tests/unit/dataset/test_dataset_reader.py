@@ -22,7 +22,7 @@ def test_facts(folder: Path) -> None:
         assert data.channel_names == ["pinion_y", "wheel_ü"]
         assert data.class_names == CLASSES
         assert data.attributes["n_teeth_wheel"] == 84
-        assert data.protocols == ["by_unit", "cross_specimen", "random_window_leaky"]
+        assert data.protocols == ["by_unit", "cross_gearbox", "cross_specimen", "random_window_leaky"]
         assert {"label", "params/crack_depth_mm", "noise_power"} <= set(data.column_names)
         assert "acceleration" not in data.column_names
         assert data.usable.all()

@@ -1,5 +1,6 @@
 """Splits: clean ones share no group, the leaky one leaks on purpose, and none lacks a class."""
 
+import hashlib
 from pathlib import Path
 
 import numpy as np
@@ -7,8 +8,15 @@ import pytest
 from dataset_samples import make_plan
 
 from gensig.dataset.plan import Plan
-from gensig.dataset.splits import SUBSETS, SplitTable, make_splits, read_split
+from gensig.dataset.protocols import make_splits
+from gensig.dataset.splits import SUBSETS, SplitTable, read_split
 from gensig.errors import DatasetError
+
+OLD_DIGESTS = {
+    "random_window_leaky": "672ec8f53ae644fb",
+    "by_unit": "960f6bfc3b8dfc14",
+    "cross_specimen": "67d65a0b728714b0",
+}
 
 
 def _sides(table: SplitTable, plan: Plan, column: str) -> list[set]:
@@ -21,7 +29,10 @@ def _disjoint(sides: list[set]) -> bool:
     return sum(map(len, sides)) == len(set.union(*sides))
 
 
-@pytest.mark.parametrize(("protocol", "column"), [("by_unit", "unit_id"), ("cross_specimen", "specimen_id")])
+@pytest.mark.parametrize(
+    ("protocol", "column"),
+    [("by_unit", "unit_id"), ("cross_specimen", "specimen_id"), ("cross_gearbox", "gearbox_id")],
+)
 def test_clean_protocols_share_no_group(protocol: str, column: str) -> None:
     plan = make_plan(n_records=300, n_units=10)
     table = make_splits(plan, 1)[protocol]
@@ -46,7 +57,7 @@ def test_leaky_protocol_has_every_record_on_several_sides() -> None:
 
 
 def test_protocol_that_lacks_a_class_or_groups_is_left_out() -> None:
-    assert set(make_splits(make_plan(n_units=3), 1)) == {"random_window_leaky", "by_unit"}
+    assert set(make_splits(make_plan(n_units=3), 1)) == {"random_window_leaky", "by_unit", "cross_gearbox"}
     assert set(make_splits(make_plan(n_units=2), 1)) == {"random_window_leaky"}
     plan = make_plan(n_units=6)
     one_unit_only = np.where(plan.columns["unit_id"] == "u0", 2, 0)
@@ -93,3 +104,12 @@ def test_malformed_split_is_refused(tmp_path: Path, text: str) -> None:
     path.write_text(text)
     with pytest.raises(DatasetError, match=r"by_unit\.csv"):
         read_split(path)
+
+
+def test_the_first_three_protocols_keep_their_bits() -> None:
+    """Digests of the tables of gensig 0.5.0: data sets are compared by them."""
+    digests = {
+        name: hashlib.sha256(table.to_csv().encode()).hexdigest()[:16]
+        for name, table in make_splits(make_plan(n_records=300, n_units=10), 1).items()
+    }
+    assert {name: digests[name] for name in OLD_DIGESTS} == OLD_DIGESTS
