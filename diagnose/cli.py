@@ -12,7 +12,8 @@ from typing import Any, NoReturn
 from gensig.errors import ConfigError, DatasetError, GensigError
 
 TRAIN_HELP = """\
-Train a network and its baselines on every split of a data set and write a report.
+Train a network and its baselines on splits of a data set and write a report. Default protocols: by_unit,
+cross_specimen and the leaky one, as far as the data set has them.
 
   data=DIR    data set made by gensig generate
   out=DIR     folder to write; must not exist or be empty. Receives report.md, metrics.json, figures, models/
@@ -22,6 +23,7 @@ TRAIN_EXAMPLE = """\
 examples:
   diagnose train data=runs/quickstart out=runs/report
   diagnose train data=runs/quickstart out=runs/report protocols=[by_unit] seeds=[0,1,2,3,4] epochs=30
+  diagnose train data=runs/quickstart out=runs/cross protocols=[cross_speed,cross_torque,unseen_severity_outer]
   diagnose train -m data=runs/quickstart out=runs/levels normalise=rms,none"""
 EVALUATE_HELP = """\
 Evaluate a trained network on a data set.
@@ -123,12 +125,15 @@ def _train_one(config: dict[str, Any]) -> None:
     out = Path(settings.out)
     _refuse_existing(out)
     from diagnose.progress import progress
+    from diagnose.protocols import choose_protocols
     from diagnose.report import result_table, write_report
     from diagnose.study import plan_study, run_study, task_from
     from gensig.dataset.reader import open_dataset
 
     task = task_from(open_dataset(settings.data), settings)
     protocols, jobs = plan_study(task, settings)
+    for name, reason in choose_protocols(task.dataset, settings.protocols)[1].items():
+        print(f"protocol {name} is left out: {reason}", file=sys.stderr, flush=True)
     out.mkdir(parents=True, exist_ok=True)
     with progress(len(jobs)) as on_done:
         metrics = run_study(task, settings, out, protocols=protocols, jobs=jobs, on_done=on_done)

@@ -10,6 +10,7 @@ from typing import Any
 import numpy as np
 
 from diagnose.figures import confusion_figure, severity_figure
+from diagnose.protocols import MEANING
 
 FEW_UNITS = 10
 CONFUSED = 0.1
@@ -91,8 +92,7 @@ def _page(metrics: Mapping[str, Any], with_severity: Sequence[str]) -> list[str]
         "",
         "- **Balanced accuracy**: mean over the classes of the share of records recognised. A record's label is the "
         "class with the largest mean log-probability over its windows.",
-        "- **by_unit**: tested on machines (unit = one set of gears in one gearbox) never seen in training. "
-        "**cross_specimen**: on sets of gears never seen.",
+        *[f"- **{name}**: {MEANING[name]}." for name in results if name in MEANING],
         "- **LEAKY**: windows of one record on both sides of the split, as in many papers. It shows how much a "
         "careless split flatters; it is no measure of diagnosis.",
         "- **indicators**: logistic regression or gradient boosting (chosen on validation units) on RMS, kurtosis, "
@@ -177,6 +177,8 @@ def _caveats(metrics: Mapping[str, Any]) -> list[str]:
             "- The network sees windows without their level, the indicators with it unless stated; "
             "`normalise=none` gives the level to the network too."
         )
+    for name, reason in metrics["protocols_left_out"].items():
+        lines.append(f"- {name} is left out: {_safe(reason)}.")
     if metrics["n_records_unusable"]:
         lines.append(f"- {metrics['n_records_unusable']} record(s) failed in simulation and are left out.")
     return lines

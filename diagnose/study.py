@@ -19,6 +19,7 @@ from diagnose.jobs import BASELINES, Job, Prediction, run_jobs
 from diagnose.metrics import SCORES, confusion_by_unit, recall, score_with_interval
 from diagnose.model_io import data_fingerprint, model_description, save_model
 from diagnose.models import build_model
+from diagnose.protocols import choose_protocols
 from diagnose.settings import TrainSettings
 from diagnose.windows import SUBSETS, Task, plan_windows, subset_segments, task_of
 from gensig.errors import ConfigError
@@ -38,11 +39,10 @@ def plan_study(task: Task, settings: TrainSettings) -> tuple[tuple[str, ...], li
 
     Raises
     ------
-    ConfigError    for a protocol that does not exist, an empty subset or a window that does not fit
+    ConfigError    for a protocol that does not exist or cannot be trained on, an empty subset or a window that does
+        not fit
     """
-    wanted = settings.protocols if settings.protocols is not None else tuple(task.dataset.protocols)
-    if not wanted:
-        raise ConfigError(f"{task.dataset.folder} has no splits: too few units or records to hold any out")
+    wanted, _ = choose_protocols(task.dataset, settings.protocols)
     protocols = tuple(sorted(wanted, key=lambda name: (is_leaky(name), wanted.index(name))))
     labels = task.labels()
     for protocol in protocols:
@@ -120,6 +120,7 @@ def run_study(
         "model": str(settings.model.get("name", "network")),
         "settings": {**asdict(settings), "model": dict(settings.model)},
         "protocols": results,
+        "protocols_left_out": choose_protocols(task.dataset, settings.protocols)[1],
         "duration_s": round(time.perf_counter() - started, 1),
         "environment": _environment(),
     }

@@ -42,9 +42,9 @@ class Task:
     normalise: str
 
     def __post_init__(self) -> None:
-        _check_names("class", self.class_names, self.dataset.class_names)
-        _check_names("channel", self.channel_names, self.dataset.channel_names)
-        _check_names("normalisation", (self.normalise,), NORMALISATIONS)
+        check_names("class", self.class_names, self.dataset.class_names)
+        check_names("channel", self.channel_names, self.dataset.channel_names)
+        check_names("normalisation", (self.normalise,), NORMALISATIONS)
         if self.window_samples < 1 or self.stride_samples < 1:
             raise ConfigError("window_samples and stride_samples must be at least 1")
         if len(self.class_names) < 2:
@@ -100,8 +100,8 @@ def subset_segments(task: Task, protocol: str, subset: str) -> Segments:
     ------
     ConfigError    for a protocol or subset that does not exist, or a subset without records
     """
-    _check_names("protocol", (protocol,), task.dataset.protocols)
-    _check_names("subset", (subset,), SUBSETS)
+    check_names("protocol", (protocol,), task.dataset.protocols)
+    check_names("subset", (subset,), SUBSETS)
     labels, length = task.labels(), n_samples(task.dataset)
     rows = [
         (record, int(np.ceil(start * length - 1e-6)), int(np.floor(stop * length + 1e-6)))
@@ -233,7 +233,7 @@ def n_samples(dataset: Dataset) -> int:
     return int(dataset.n_samples)
 
 
-def _check_names(kind: str, wanted: Sequence[Any], available: Sequence[str]) -> None:
+def check_names(kind: str, wanted: Sequence[Any], available: Sequence[str]) -> None:
     """Refuse a name that does not exist, with the nearest ones."""
     for name in wanted:
         if name not in available:

@@ -135,3 +135,13 @@ def test_damaged_shard_is_one_line(folder: Path) -> None:
     shard_path(folder, 1).write_bytes(b"no hdf5")
     with open_dataset(folder) as data, pytest.raises(DatasetError, match=r"shard-00001\.h5"):
         data.signals(10)
+
+
+def test_a_protocol_that_is_left_out_is_explained(folder: Path) -> None:
+    with open_dataset(folder) as data:
+        assert "cross_specimen" not in data.left_out
+        assert data.left_out["cross_speed"] == "the plan has no column speed_set_rpm"
+        with pytest.raises(DatasetError, match=r"split .cross_speed. does not exist in .*no column speed_set_rpm"):
+            data.split("cross_speed")
+        del data.manifest.files["splits/by_unit.csv"]
+        assert data.left_out["by_unit"] == "gensig 0.1.0, which made the set, did not know it"

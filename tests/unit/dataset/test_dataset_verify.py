@@ -51,6 +51,15 @@ def test_failed_record_is_counted_not_hidden(tmp_path: Path, plan: Plan) -> None
     assert result.n_failed == 1
 
 
+def test_split_with_a_unit_on_two_sides_is_found(folder: Path) -> None:
+    path = folder / "splits" / "by_unit.csv"
+    header, first, *others = path.read_text().splitlines(keepends=True)
+    record, _, subset = first.strip().partition(",0,1,")
+    path.write_text("".join([header, f"{record},0,1,{'test' if subset != 'test' else 'train'}\n", *others]))
+    problems = [problem for problem in verify(folder).problems if problem.startswith("splits/by_unit: ")]
+    assert problems == ["splits/by_unit: unit_id u0 is in more than one subset (1 such)"]
+
+
 @pytest.mark.parametrize("part", [0.0, 0.5, 0.999])
 @pytest.mark.parametrize("name", ["shards/shard-00002.h5", "plan.csv", "config.yaml", "splits/by_unit.csv", "index.h5"])
 def test_flipped_byte_is_found(folder: Path, name: str, part: float) -> None:

@@ -33,6 +33,7 @@ class FakeDataset:
         self.channel_names = tuple(f"channel_{index}" for index in range(n_channels))
         self.attributes = {"schema_version": 1, "sampling_rate_hz": sampling_rate, **N_TEETH}
         self.protocols = ("by_unit", "random_window_leaky")
+        self.left_out = {"cross_specimen": "1 specimen_id in the plan, and at least 4 are needed"}
         self.usable = np.ones(self.n_records, dtype=bool)
         self.strength, self.noise, self.seed = strength, noise, seed
         self.n_samples = round(duration * sampling_rate)

@@ -63,6 +63,8 @@ def test_train_writes_what_it_promises(trained):
     }  # fmt: skip
     metrics = json.loads((trained / "metrics.json").read_text())
     assert list(metrics["protocols"]) == ["by_unit", "random_window_leaky"]
+    assert metrics["protocols_left_out"] == {"cross_specimen": "1 specimen_id in the plan, and at least 4 are needed"}
+    assert "cross_specimen is left out: 1 specimen" in (trained / "report.md").read_text()
     methods = metrics["protocols"]["by_unit"]["methods"]
     assert set(methods) == {
         "cnn", "label_shuffle", "indicators", "indicators_without_level", "rms_threshold", "chance",
@@ -162,6 +164,9 @@ def test_evaluate_refuses_damaged_models(trained, data, capsys, tmp_path):
         (["train", "data=good"], "out is required"),
         (["train", "data=none", "out=OUT"], "none is no data set"),
         (["train", "data=good", "out=OUT", "protocols=[by_unitt]"], "no protocol 'by_unitt'; did you mean by_unit"),
+        (["train", "data=good", "out=OUT", "protocols=[cross_specimen]"], "cross_specimen: 1 specimen_id in the plan"),
+        (["train", "data=good", "out=OUT", "protocols=[by_unit,healthy_only]"], "training has not all classes"),
+        (["train", "data=good", "out=OUT", "protocols=[open_set]"], "protocol open_set: training has not all classes"),
         (["train", "data=good", "out=OUT", "classes=[healthy,crak]"], "no class 'crak'; did you mean crack"),
         (["train", "data=good", "out=OUT", "classes=[crack]"], "one class only (crack)"),
         (["train", "data=good", "out=OUT", "epoch=3"], "epochs"),
