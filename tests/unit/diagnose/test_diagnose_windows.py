@@ -19,6 +19,8 @@ from diagnose.windows import (
     subset_segments,
     task_of,
 )
+from gensig.dataset.plan import Plan
+from gensig.dataset.protocols import PROTOCOLS, make_splits
 from gensig.errors import ConfigError, DatasetError
 
 WINDOW = {"window_samples": 700, "stride_samples": 300}
@@ -33,9 +35,45 @@ def samples_of(record, start, length):
     return {(int(r), s) for r, first in zip(record, start, strict=True) for s in range(first, first + length)}
 
 
-@pytest.mark.parametrize("protocol", ["by_unit", "random_window_leaky"])
-def test_windows_of_two_subsets_share_no_sample(protocol):
-    task = make_task()
+class PlannedDataset(FakeDataset):
+    """The splits that a plan of its records has, with values and groups to hold out."""
+
+    def __init__(self):
+        super().__init__(n_units=12, records_per_unit=8, n_channels=1)
+        rng = np.random.default_rng(5)
+        unit = self.columns["unit_id"]
+        columns = {name: self.columns[name] for name in ("record_id", "label", "severity", "unit_id")}
+        self.plan = Plan(
+            columns=columns
+            | {name: np.repeat(rng.uniform(1, 2, 24), 4) for name in ("speed_set_rpm", "torque_nm", "snr_db")}
+            | {"gearbox_id": np.char.add("g", unit), "specimen_id": np.char.add("s", unit)}
+            | {"shard": np.zeros(self.n_records, dtype=int), "row": np.arange(self.n_records)}
+            | {"faults_json": np.where(columns["label"] == 0, "[]", "[{}]")}
+        )
+        self.tables = make_splits(self.plan, 0)
+        self.protocols = tuple(self.tables)
+
+    def split(self, protocol):
+        table = self.tables[protocol]
+        number = [int(name.lstrip("r")) for name in table.record_id]
+        rows = list(zip(number, table.start_fraction.tolist(), table.stop_fraction.tolist(), strict=True))
+        return {s: [row for row, mine in zip(rows, table.subset == s, strict=True) if mine] for s in SUBSETS}
+
+
+def test_the_planned_data_set_has_every_protocol():
+    assert set(PlannedDataset().protocols) == set(PROTOCOLS)
+
+
+@pytest.mark.parametrize(
+    ("dataset", "protocol"),
+    [
+        (FakeDataset, "by_unit"),
+        (FakeDataset, "random_window_leaky"),
+        *((PlannedDataset, name) for name in PROTOCOLS if "leaky" not in name),
+    ],
+)
+def test_windows_of_two_subsets_share_no_sample(dataset, protocol):
+    task = make_task(dataset())
     seen = []
     for subset in SUBSETS:
         segments = subset_segments(task, protocol, subset)
