@@ -17,7 +17,7 @@ from gensig.planning import describe_design, make_plan
 from gensig.records import Record, forget_twins, simulate_records
 
 # Bytes beside shards and plan: index, cards and configuration; more for each shard, record (splits) and class (figure).
-BESIDE, BESIDE_A_SHARD, BESIDE_A_RECORD, BESIDE_A_CLASS = 42_000, 3_000, 250, 40_000
+BESIDE, BESIDE_A_SHARD, BESIDE_A_RECORD, BESIDE_A_CLASS = 42_000, 3_000, 380, 40_000
 
 CLOSING = 2.0  # s for index, cards and figures, most of it the import of matplotlib
 
