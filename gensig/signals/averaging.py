@@ -1,4 +1,4 @@
-"""Synchronous averaging at constant speed: the angle domain, the average turn, and what is left without the mesh.
+"""Synchronous averaging: the angle domain at constant speed, the average turn, its regular part and what is left.
 
 Time-synchronous averaging: S. Braun (1975), Acustica 32, 69-77; P. D. McFadden (1989), "Interpolation techniques for
 time domain averaging of gear vibration", Mechanical Systems and Signal Processing 3 (1), 87-97.
@@ -13,6 +13,8 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 FloatArray = NDArray[np.floating]
+
+MIN_TURNS = 20  # an average of fewer holds more than 1/20 of the power of what does not repeat
 
 
 def samples_per_turn_for(sampling_rate: float, rotation_frequency: float) -> int:
@@ -63,7 +65,7 @@ def resample_to_angle(
         raise ValueError(f"{n_samples} samples hold no whole turn of {samples_in_a_turn:.1f} samples")
     per_turn = samples_per_turn or samples_per_turn_for(sampling_rate, rotation_frequency)
     position = np.arange(n_turns * per_turn) * (samples_in_a_turn / per_turn)
-    return interpolate(x, position).reshape(*x.shape[:-1], n_turns, per_turn)
+    return interpolate(x, position.reshape(n_turns, per_turn))
 
 
 def interpolate(x: FloatArray, position: FloatArray) -> FloatArray:
@@ -71,11 +73,11 @@ def interpolate(x: FloatArray, position: FloatArray) -> FloatArray:
 
     Parameters
     ----------
-    position : (point,)    in samples from the first; at most the last sample or just behind it
+    position : (turn, point)    in samples from the first; at most the last sample or just behind it
 
     Returns
     -------
-    (..., point)
+    (..., turn, point)
     """
     from scipy.ndimage import spline_filter1d
 
@@ -101,17 +103,36 @@ def interpolate(x: FloatArray, position: FloatArray) -> FloatArray:
 
 
 def time_synchronous_average(
-    signal: ArrayLike, sampling_rate: float, rotation_frequency: float, samples_per_turn: int | None = None
+    signal: ArrayLike,
+    sampling_rate: float,
+    rotation_frequency: float,
+    samples_per_turn: int | None = None,
+    *,
+    min_turns: int = 1,
 ) -> FloatArray:
+    """Average turn of a shaft at constant speed: `resample_to_angle`, then `average_turn` with its ``min_turns``."""
+    turns = resample_to_angle(signal, sampling_rate, rotation_frequency, samples_per_turn)
+    return average_turn(turns, min_turns=min_turns)
+
+
+def average_turn(turns: ArrayLike, *, min_turns: int = MIN_TURNS) -> FloatArray:
     """Mean turn of a shaft: what repeats every turn stays, the rest falls with the square root of the turns.
 
-    Parameters and errors as `resample_to_angle`.
+    Parameters
+    ----------
+    turns : (..., turn, sample)    at any course of the speed: from `resample_to_angle`,
+                                   `gensig.signals.rotation.resample_by_angle` or
+                                   `gensig.signals.tacho.resample_by_pulses`
+    min_turns : with fewer the average is NaN, and with it every indicator that needs one
 
     Returns
     -------
     (..., sample)    one turn; order k of the shaft is bin k of its discrete Fourier transform
     """
-    return resample_to_angle(signal, sampling_rate, rotation_frequency, samples_per_turn).mean(axis=-2)
+    x = np.asarray(turns, dtype=float)
+    if x.shape[-2] < min_turns:
+        return np.full((*x.shape[:-2], x.shape[-1]), np.nan)
+    return x.mean(axis=-2)
 
 
 def remove_orders(average: ArrayLike, orders: Iterable[int]) -> FloatArray:
@@ -129,6 +150,27 @@ def remove_orders(average: ArrayLike, orders: Iterable[int]) -> FloatArray:
     return np.fft.irfft(spectrum, n=turn.shape[-1], axis=-1)
 
 
+def regular_signal(average: ArrayLike, n_teeth: int, *, n_sidebands: int = 1) -> FloatArray:
+    """What a sound gear makes: every mesh harmonic with the lowest sidebands, without the lowest shaft orders.
+
+    Parameters
+    ----------
+    average : (..., sample)    one turn of the gear
+    n_teeth : teeth of the gear
+    n_sidebands : kept on either side of every mesh harmonic; 0 for the mesh alone
+
+    Notes
+    -----
+    With 1 it is what `difference_signal` takes away, less the mean and the shaft orders: for the energy ratio those of
+    unbalance and misalignment are no sign of the mesh.
+
+    Source: regular mesh components of M. Lebold, K. McClintic, R. Campbell, C. Byington & K. Maynard (2000), "Review of
+    vibration analysis methods for gearbox diagnostics and prognostics", Proc. 54th MFPT Meeting, 623-634.
+    """
+    kept = _mesh_orders(average, n_teeth, n_sidebands)
+    return remove_orders(average, set(range(np.shape(average)[-1] // 2 + 1)) - kept)
+
+
 def residual_signal(average: ArrayLike, n_teeth: int, *, n_shaft_orders: int = 2) -> FloatArray:
     """Average turn without the mean, the lowest shaft orders and every mesh harmonic.
 
@@ -140,7 +182,7 @@ def residual_signal(average: ArrayLike, n_teeth: int, *, n_shaft_orders: int = 2
 
     Source: residual signal of Zakrajsek, Townsend & Decker (1993), NASA TM-105950, sidebands kept.
     """
-    return remove_orders(average, _regular_orders(average, n_teeth, n_shaft_orders, n_sidebands=0))
+    return remove_orders(average, _mesh_orders(average, n_teeth, 0).union(range(n_shaft_orders + 1)))
 
 
 def difference_signal(average: ArrayLike, n_teeth: int, *, n_shaft_orders: int = 2) -> FloatArray:
@@ -150,12 +192,11 @@ def difference_signal(average: ArrayLike, n_teeth: int, *, n_shaft_orders: int =
 
     Source: difference signal of Zakrajsek, Townsend & Decker (1993), NASA TM-105950, after R. M. Stewart (1977).
     """
-    return remove_orders(average, _regular_orders(average, n_teeth, n_shaft_orders, n_sidebands=1))
+    return remove_orders(average, _mesh_orders(average, n_teeth, 1).union(range(n_shaft_orders + 1)))
 
 
-def _regular_orders(average: ArrayLike, n_teeth: int, n_shaft_orders: int, n_sidebands: int) -> list[int]:
-    """Orders of a healthy gear up to half the samples of a turn."""
+def _mesh_orders(average: ArrayLike, n_teeth: int, n_sidebands: int) -> set[int]:
+    """Orders of the mesh harmonics and their sidebands, of those that half the samples of a turn can hold."""
     top = np.shape(average)[-1] // 2
     mesh = range(n_teeth, top + n_sidebands + 1, n_teeth)
-    sidebands = [order + k for order in mesh for k in range(-n_sidebands, n_sidebands + 1)]
-    return sorted({*range(n_shaft_orders + 1), *sidebands})
+    return {order + k for order in mesh for k in range(-n_sidebands, n_sidebands + 1)}

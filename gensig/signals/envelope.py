@@ -56,6 +56,40 @@ def envelope(signal: ArrayLike, sampling_rate: float, band: tuple[float, float] 
     return np.abs(hilbert(x, axis=-1))
 
 
+def mesh_envelope(average: ArrayLike, n_teeth: int, *, harmonic: int = 1, n_sidebands: int | None = None) -> FloatArray:
+    """Amplitude of one mesh harmonic over a turn, from the band of its sidebands: amplitude demodulation.
+
+    Parameters
+    ----------
+    average : (..., sample)    time-synchronous average of one turn of the gear
+    n_teeth : teeth of the gear
+    harmonic : of the mesh
+    n_sidebands : taken on either side; default: all that are nearer to this harmonic than to another
+
+    Returns
+    -------
+    (..., sample) in the unit of the signal
+
+    Raises
+    ------
+    ValueError    if the average has too few samples for the band, or the sidebands reach order 0
+
+    Source: P. D. McFadden (1986), "Detecting fatigue cracks in gears by amplitude and phase demodulation of the meshing
+    vibration", J. Vibration, Acoustics, Stress and Reliability in Design 108 (2), 165-170; here the harmonic itself
+    stays in, so that the mean is its amplitude.
+    """
+    turn = np.asarray(average, dtype=float)
+    n_samples = turn.shape[-1]
+    reach = (n_teeth - 1) // 2 if n_sidebands is None else n_sidebands
+    low, high = harmonic * n_teeth - reach, harmonic * n_teeth + reach
+    if not 0 < low <= high < n_samples / 2:
+        raise ValueError(f"{n_samples} samples a turn cannot hold the band of mesh orders {low} to {high}")
+    spectrum = np.fft.fft(turn, axis=-1)
+    one_sided = np.zeros_like(spectrum)
+    one_sided[..., low : high + 1] = 2.0 * spectrum[..., low : high + 1]
+    return np.abs(np.fft.ifft(one_sided, axis=-1))
+
+
 def envelope_spectrum(
     signal: ArrayLike, sampling_rate: float, band: tuple[float, float] | None = None, *, window: str = "hann"
 ) -> tuple[FloatArray, FloatArray]:

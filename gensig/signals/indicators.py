@@ -1,13 +1,19 @@
-"""Condition indicators: one number for a signal, or for the average turn of a gear. Batched over leading axes."""
+"""Condition indicators: one number for a signal, or for the average turn of a gear. Batched over leading axes.
+
+What each is blind to: ``docs/theory/indicators.md``. Those of an average are NaN where it is NaN: of too few turns.
+"""
 
 from __future__ import annotations
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from gensig.signals.averaging import difference_signal
+from gensig.signals.averaging import difference_signal, regular_signal
+from gensig.signals.synchronous import mesh_harmonics
 
 FloatArray = NDArray[np.floating]
+
+ROUNDING = 1e-12  # of the average's RMS: what is left of a transform forth and back where nothing is
 
 
 def rms(signal: ArrayLike) -> FloatArray:
@@ -37,10 +43,7 @@ def kurtosis(signal: ArrayLike) -> FloatArray:
 
     Source: Dyer & Stewart (1978), J. Mechanical Design 100 (2), 229-235.
     """
-    x = np.asarray(signal, dtype=float)
-    squared = np.square(x - x.mean(axis=-1, keepdims=True))
-    variance = squared.mean(axis=-1)
-    return _ratio(np.mean(np.square(squared), axis=-1), variance**2)
+    return _standardised_moment(signal, 2)
 
 
 def crest_factor(signal: ArrayLike) -> FloatArray:
@@ -58,6 +61,34 @@ def crest_factor(signal: ArrayLike) -> FloatArray:
     return _ratio(np.max(np.abs(x), axis=-1), rms(x))
 
 
+def fm0(average: ArrayLike, n_teeth: int, *, n_harmonics: int | None = None) -> FloatArray:
+    """Peak to peak of the average turn over the sum of the mesh's amplitudes: 2 for a mesh that is one sine.
+
+    Parameters
+    ----------
+    average : (..., sample)    time-synchronous average of one turn of the gear
+    n_teeth : teeth of the gear
+    n_harmonics : mesh harmonics counted, from the first; default: all below half the samples of a turn
+
+    Returns
+    -------
+    (...) dimensionless; NaN without any mesh harmonic
+
+    Raises
+    ------
+    ValueError    if the average has too few samples for the first mesh harmonic
+
+    Source: R. M. Stewart (1977), "Some useful data analysis techniques for gearbox diagnostics", ISVR Southampton,
+    MHM/R/10/77.
+    """
+    turn = np.asarray(average, dtype=float)
+    n_held = (turn.shape[-1] - 1) // 2 // n_teeth
+    if n_held < 1:
+        raise ValueError(f"{turn.shape[-1]} samples a turn cannot hold mesh order {n_teeth}")
+    mesh = mesh_harmonics(turn, n_teeth, min(n_harmonics or n_held, n_held)).sum(axis=-1)
+    return _ratio(np.ptp(turn, axis=-1), np.where(mesh > ROUNDING * rms(turn), mesh, 0.0))
+
+
 def fm4(average: ArrayLike, n_teeth: int) -> FloatArray:
     """Kurtosis of the difference signal: a fault of one or two teeth makes it peak, a healthy gear stays near 3.
 
@@ -72,10 +103,46 @@ def fm4(average: ArrayLike, n_teeth: int) -> FloatArray:
 
     Source: FM4 of R. M. Stewart (1977), ISVR Southampton, MHM/R/10/77, in the form of NASA TM-105950 (1993).
     """
+    return _standardised_moment(_difference(average, n_teeth), 2)
+
+
+def m6a(average: ArrayLike, n_teeth: int) -> FloatArray:
+    """Sixth moment of the difference signal over its cubed variance, 15 for noise: peaks count more than in `fm4`.
+
+    Parameters, returns : as `fm4`
+
+    Source: H. R. Martin (1989), "Statistical moment analysis as a means of surface damage detection", Proc. 7th
+    International Modal Analysis Conference, 1016-1021.
+    """
+    return _standardised_moment(_difference(average, n_teeth), 3)
+
+
+def m8a(average: ArrayLike, n_teeth: int) -> FloatArray:
+    """Eighth moment of the difference signal over the fourth power of its variance: 105 for Gaussian noise.
+
+    Parameters, returns, source : as `m6a`
+    """
+    return _standardised_moment(_difference(average, n_teeth), 4)
+
+
+def energy_ratio(average: ArrayLike, n_teeth: int) -> FloatArray:
+    """RMS of the difference signal over that of the regular mesh with its first sidebands: wear of all teeth raises it.
+
+    Parameters
+    ----------
+    average : (..., sample)    time-synchronous average of one turn of the gear
+    n_teeth : teeth of the gear
+
+    Returns
+    -------
+    (...) dimensionless; NaN without any mesh
+
+    Source: N. S. Swansson (1980), Conf. on Lubrication, Friction and Wear in Engineering, Institution of Engineers
+    Australia, 262-267, in the form of Lebold et al. (2000), see `gensig.signals.averaging.regular_signal`.
+    """
     turn = np.asarray(average, dtype=float)
-    difference = difference_signal(turn, n_teeth)
-    rounding = 1e-12 * rms(turn)
-    return np.where(rms(difference) > rounding, kurtosis(difference), np.nan)
+    mesh = rms(regular_signal(turn, n_teeth))
+    return _ratio(rms(_difference(turn, n_teeth)), np.where(mesh > ROUNDING * rms(turn), mesh, 0.0))
 
 
 def sideband_ratio(average: ArrayLike, n_teeth: int, *, n_harmonics: int = 3, n_sidebands: int = 6) -> FloatArray:
@@ -107,6 +174,20 @@ def sideband_ratio(average: ArrayLike, n_teeth: int, *, n_harmonics: int = 3, n_
     steps = np.arange(1, reach + 1)
     sidebands = (centers[:, None] + np.concatenate([-steps, steps])).ravel()
     return _ratio(amplitude[..., sidebands].sum(axis=-1), amplitude[..., centers].sum(axis=-1))
+
+
+def _difference(average: ArrayLike, n_teeth: int) -> FloatArray:
+    """Difference signal, exactly zero where only rounding is left."""
+    turn = np.asarray(average, dtype=float)
+    difference = difference_signal(turn, n_teeth)
+    return np.where((rms(difference) > ROUNDING * rms(turn))[..., None], difference, 0.0)
+
+
+def _standardised_moment(signal: ArrayLike, half_order: int) -> FloatArray:
+    """Central moment of twice the half order over that power of the standard deviation; NaN for a constant signal."""
+    x = np.asarray(signal, dtype=float)
+    squared = np.square(x - x.mean(axis=-1, keepdims=True))
+    return _ratio(np.mean(squared**half_order, axis=-1), squared.mean(axis=-1) ** half_order)
 
 
 def _ratio(numerator: FloatArray, denominator: FloatArray) -> FloatArray:

@@ -12,20 +12,22 @@ import math
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
+from gensig.signals.averaging import interpolate, samples_per_turn_for
+
 FloatArray = NDArray[np.floating]
 
 PADDING = 8  # bins of the searched spectrum for one of the record's
 FADED = 0.2  # of the median amplitude; band-limited noise is below it for 3 % of the time
 
 
-def resample_by_angle(signal: ArrayLike, angle: ArrayLike, samples_per_turn: int) -> FloatArray:
+def resample_by_angle(signal: ArrayLike, angle: ArrayLike, samples_per_turn: int | None = None) -> FloatArray:
     """Cut a signal into whole turns of a shaft, sampled uniformly in its angle.
 
     Parameters
     ----------
     signal : (..., sample)
     angle : (sample,) rad      of the shaft at every sample, rising; its first value is where the first turn starts
-    samples_per_turn : int     fewer than the samples in the fastest turn alias
+    samples_per_turn : int     default: `samples_per_turn_for` the slowest turn; fewer alias
 
     Returns
     -------
@@ -37,10 +39,9 @@ def resample_by_angle(signal: ArrayLike, angle: ArrayLike, samples_per_turn: int
 
     Notes
     -----
-    Cubic spline through the samples; errors as in `gensig.signals.averaging.resample_to_angle`.
+    Between samples the angle is a straight line. The signal is interpolated as in
+    `gensig.signals.averaging.resample_to_angle`.
     """
-    from scipy.interpolate import make_interp_spline
-
     x, turned = np.asarray(signal, dtype=float), np.asarray(angle, dtype=float)
     if turned.shape != x.shape[-1:] or not np.all(np.diff(turned) > 0.0):
         raise ValueError("the angle must rise from sample to sample, and have a value for every sample of the signal")
@@ -48,10 +49,11 @@ def resample_by_angle(signal: ArrayLike, angle: ArrayLike, samples_per_turn: int
     n_turns = math.floor(turned[-1] + 1e-9)
     if n_turns < 1:
         raise ValueError(f"{turned.size} samples hold {turned[-1]:.3g} turns of the shaft, less than a whole one")
-    wanted = np.arange(n_turns * samples_per_turn) / samples_per_turn
-    place = np.interp(wanted, turned, np.arange(turned.size))
-    values = make_interp_spline(np.arange(turned.size), x, k=3, axis=-1)(place)
-    return values.reshape(*x.shape[:-1], n_turns, samples_per_turn)
+    samples = np.arange(turned.size)
+    longest = float(np.max(np.diff(np.interp(np.arange(n_turns + 1), turned, samples))))
+    per_turn = samples_per_turn or samples_per_turn_for(longest, 1.0)
+    wanted = np.arange(n_turns * per_turn).reshape(n_turns, per_turn) / per_turn
+    return interpolate(x, np.interp(wanted, turned, samples))
 
 
 def find_mesh_frequency(

@@ -54,13 +54,27 @@ def order_spectrum(
 
     Returns
     -------
-    order : (bin,) multiples of the rotation frequency, in steps of one over the number of turns
-    amplitude : (..., bin) m/s^2, no window: whole orders fall on bins
+    order, amplitude : as `spectrum_of_turns`
 
     Raises
     ------
     ValueError    if the signal holds no whole turn
     """
-    turns = resample_to_angle(signal, sampling_rate, rotation_frequency, samples_per_turn)
-    per_turn = turns.shape[-1]
-    return amplitude_spectrum(turns.reshape(*turns.shape[:-2], -1), per_turn, window="boxcar")
+    return spectrum_of_turns(resample_to_angle(signal, sampling_rate, rotation_frequency, samples_per_turn))
+
+
+def spectrum_of_turns(turns: ArrayLike) -> tuple[FloatArray, FloatArray]:
+    """Amplitude spectrum over the orders of a shaft, of turns cut at any course of the speed: order tracking.
+
+    Parameters
+    ----------
+    turns : (..., turn, sample) m/s^2    by constant speed, by angle or by pulses, see
+                                         `gensig.signals.averaging.average_turn`
+
+    Returns
+    -------
+    order : (bin,) multiples of the rotation frequency, in steps of one over the number of turns
+    amplitude : (..., bin) m/s^2, no window: whole orders fall on bins
+    """
+    x = np.asarray(turns, dtype=float)
+    return amplitude_spectrum(x.reshape(*x.shape[:-2], -1), x.shape[-1], window="boxcar")

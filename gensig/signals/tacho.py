@@ -63,8 +63,8 @@ def resample_by_pulses(
 ) -> FloatArray:
     """Cut a signal into whole turns, sampled uniformly in shaft angle, at any course of the speed.
 
-    The first turn starts at the first pulse; what comes before it and after the last whole turn is left out. The mean
-    over turns is the synchronous average.
+    The first turn starts at the first pulse; what comes before it and after the last whole turn is left out. Their
+    mean is `gensig.signals.averaging.average_turn`.
 
     Parameters
     ----------
@@ -95,7 +95,7 @@ def resample_by_pulses(
     longest = float(np.max(instants[pulses_per_turn:] - instants[:-pulses_per_turn]))
     per_turn = samples_per_turn or samples_per_turn_for(sampling_rate, 1.0 / longest)
     at = CubicSpline(np.arange(len(instants)) / pulses_per_turn, instants)
-    turned = np.arange(n_turns * per_turn) / per_turn
+    turned = np.arange(n_turns * per_turn).reshape(n_turns, per_turn) / per_turn
     x = np.asarray(signal, dtype=float)
     position = np.clip(at(turned) * sampling_rate, 0.0, x.shape[-1] - 1.0)
-    return interpolate(x, position).reshape(*x.shape[:-1], n_turns, per_turn)
+    return interpolate(x, position)

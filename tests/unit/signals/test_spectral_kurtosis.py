@@ -1,0 +1,62 @@
+"""Spectral kurtosis of signals whose value is known in every line."""
+
+import numpy as np
+import pytest
+from numpy.testing import assert_allclose
+
+from gensig.signals.spectral_kurtosis import spectral_kurtosis
+
+RATE, N_SAMPLES, WINDOW = 10_000.0, 100_000, 100
+TIME = np.arange(N_SAMPLES) / RATE
+SPREAD = 1.2 * np.sqrt(WINDOW / N_SAMPLES)
+
+
+def noise(seed=0, shape=()):
+    return np.random.default_rng(seed).standard_normal((*shape, N_SAMPLES))
+
+
+@pytest.mark.parametrize("window", [64, 65, 100, 500])
+def test_gaussian_noise_is_zero_in_every_line_and_scatters_as_stated(window):
+    frequency, kurtosis = spectral_kurtosis(noise(shape=(20,)), RATE, window)
+    spread = 1.2 * np.sqrt(window / N_SAMPLES)
+    assert kurtosis.shape == (20, frequency.size)
+    assert frequency[0] >= 2 * RATE / window * 0.999
+    assert frequency[-1] <= RATE / 2 - 2 * RATE / window * 0.999
+    assert np.std(kurtosis) == pytest.approx(spread, rel=0.15)
+    assert np.abs(kurtosis.mean(axis=0) + 1.5 * window / N_SAMPLES).max() < 5 * spread / np.sqrt(20)
+
+
+def test_a_tone_is_minus_one():
+    frequency, kurtosis = spectral_kurtosis(np.cos(2 * np.pi * 2500 * TIME), RATE, WINDOW)
+    assert kurtosis[frequency == 2500.0] == pytest.approx(-1.0, abs=1e-9)
+
+
+def test_noise_switched_on_for_a_share_of_the_time():
+    """Gaussian noise whose power A is random: 2 <A^2> / <A>^2 - 2, but for the windows that see both states."""
+    share, period = 0.2, 5000
+    x = noise(1) * (np.arange(N_SAMPLES) % period < share * period)
+    _, kurtosis = spectral_kurtosis(x, RATE, WINDOW)
+    assert kurtosis.mean() == pytest.approx(2 / share - 2, rel=0.05)
+
+
+def test_rings_are_found_in_their_band():
+    x = noise(2)
+    for start in range(500, N_SAMPLES - 500, 1000):
+        late = TIME[:200]
+        x[start : start + 200] += 8 * np.exp(-late / 2e-3) * np.cos(2 * np.pi * 3200 * late)
+    frequency, kurtosis = spectral_kurtosis(x, RATE, WINDOW)
+    assert abs(frequency[np.argmax(kurtosis)] - 3200) <= 200
+    assert kurtosis.max() > 5
+    assert np.abs(kurtosis[frequency < 1500]).max() < 6 * SPREAD
+
+
+def test_gain_does_not_matter_and_silence_is_nan():
+    x = noise(3)
+    assert_allclose(spectral_kurtosis(1e-4 * x, RATE, WINDOW)[1], spectral_kurtosis(x, RATE, WINDOW)[1], atol=1e-9)
+    assert np.isnan(spectral_kurtosis(0 * x, RATE, WINDOW)[1]).all()
+
+
+@pytest.mark.parametrize(("n_samples", "window"), [(100, 7), (199, 100)])
+def test_windows_that_do_not_suit_are_refused(n_samples, window):
+    with pytest.raises(ValueError, match="does not suit"):
+        spectral_kurtosis(np.ones(n_samples), RATE, window)
