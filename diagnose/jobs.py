@@ -93,7 +93,7 @@ def run_job(task: Task, settings: TrainSettings, job: Job) -> list[Prediction]:
     """Predictions on the test part of each of the job's protocols."""
     if job.seed is None:
         cache: Cache = {}
-        return [prediction for name in job.protocols for prediction in _run_baselines(task, name, cache)]
+        return [prediction for name in job.protocols for prediction in _run_baselines(task, name, settings, cache)]
     return [_run_training(task, settings, name, job.seed, job.shuffled) for name in job.protocols]
 
 
@@ -121,10 +121,11 @@ def _run_training(task: Task, settings: TrainSettings, protocol: str, seed: int,
     )
 
 
-def _run_baselines(task: Task, protocol: str, cache: Cache) -> list[Prediction]:
+def _run_baselines(task: Task, protocol: str, settings: TrainSettings, cache: Cache) -> list[Prediction]:
     n_classes = len(task.class_names)
     train, validation, test = (
-        feature_table(task, subset_segments(task, protocol, subset), cache=cache) for subset in SUBSETS
+        feature_table(task, subset_segments(task, protocol, subset), features=settings.features, cache=cache)
+        for subset in SUBSETS
     )
     fitted = {
         "indicators": indicator_model(train, validation, test, n_classes=n_classes, with_level=True),

@@ -33,6 +33,7 @@ class TrainSettings:
     shuffle_control: bool
     n_seeds_control: int
     baselines: bool
+    features: str
     n_bootstrap: int
     n_threads: int | None
 
@@ -60,6 +61,8 @@ class TrainSettings:
         for name in ("shuffle_control", "baselines"):
             if not isinstance(getattr(self, name), bool):
                 raise ConfigError(f"{name} must be true or false, not {getattr(self, name)!r}")
+        if self.features not in ("basic", "all"):
+            raise ConfigError(f"features must be basic or all, not {self.features!r}")
 
 
 def settings_from(config: Mapping[str, Any]) -> TrainSettings:

@@ -167,6 +167,7 @@ def test_evaluate_refuses_damaged_models(trained, data, capsys, tmp_path):
         (["train", "data=good", "out=OUT", "epoch=3"], "epochs"),
         (["train", "data=good", "out=OUT", "model=cnnn"], "cnn"),
         (["train", "data=good", "out=OUT", "normalise=rms,none"], "-m"),
+        (["train", "data=good", "out=OUT", "features=al"], "features must be basic or all, not 'al'"),
         (["train", "data=good", "out=OUT", "window_samples=100000"], "longest stretch"),
         (["train", "--fast"], "unrecognized arguments: --fast"),
         (["evaluate", "data=good"], "model_dir is required"),

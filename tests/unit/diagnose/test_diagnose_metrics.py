@@ -7,7 +7,7 @@ from numpy.testing import assert_allclose
 from threadpoolctl import threadpool_limits
 
 from diagnose.baselines import indicator_model, rms_threshold
-from diagnose.features import GEARS, INDICATORS, FeatureTable, feature_table, indicators
+from diagnose.features import FEATURES, GEARS, INDICATORS, FeatureTable, feature_table, indicators
 from diagnose.metrics import balanced_accuracy, confusion_by_unit, macro_f1, over_records, recall, score_with_interval
 from diagnose.windows import SUBSETS, subset_segments, task_of
 from gensig.errors import DatasetError
@@ -108,6 +108,41 @@ def test_indicators_are_nan_without_a_whole_turn():
     for index, name in enumerate(INDICATORS):
         assert np.isnan(table[:, index]).all() == name.endswith("_wheel"), name
     assert GEARS == ("pinion", "wheel")
+
+
+def test_all_features_are_the_basic_ones_and_more_from_twenty_turns_up():
+    x = np.random.default_rng(0).standard_normal((2, 12800))
+    speed, teeth = {"pinion": 20.0, "wheel": 19.9}, {"pinion": 23, "wheel": 84}
+    basic, table = indicators(x, 12800.0, speed, teeth), indicators(x, 12800.0, speed, teeth, features="all")
+    assert table.shape == (2, len(FEATURES["all"])) == (2, 20)
+    for index, name in enumerate(FEATURES["all"]):
+        assert np.isnan(table[:, index]).all() == name.endswith("_wheel"), name
+    known = [index for index, name in enumerate(INDICATORS) if not name.endswith("_wheel")]
+    np.testing.assert_array_equal(table[:, known], basic[:, known])
+    assert np.isfinite(basic).all()
+    short = indicators(x[:, :100], 12800.0, speed, teeth, features="all")
+    assert np.isnan(short[:, FEATURES["all"].index("spectral_kurtosis")]).all()
+
+
+def test_all_features_see_the_impulses_of_a_missing_tooth():
+    dataset = FakeDataset(n_units=4, records_per_unit=16, strength=2.0, duration=1.5)
+    task = task_of(dataset, window_samples=1000, stride_samples=1000, normalise="rms")
+    table = feature_table(task, subset_segments(task, "by_unit", "train"), features="all")
+    assert len(table.names) == table.values.shape[1] == len(FEATURES["all"])
+    for name in ("spectral_kurtosis", "fm0_pinion", "m6a_pinion", "na4_pinion"):
+        column = table.values[:, table.names.index(f"channel_0/{name}")]
+        healthy, missing = (column[table.label == label] for label in (0, 3))
+        assert np.median(missing) > 1.5 * np.median(healthy), name
+
+
+def test_all_features_at_a_rate_that_holds_no_mesh_band_are_nan():
+    x = np.random.default_rng(0).standard_normal((1, 30000))
+    table = indicators(x, 1000.0, {"pinion": 16.0, "wheel": 30.0}, {"pinion": 23, "wheel": 84}, features="all")
+    found = dict(zip(FEATURES["all"], np.isnan(table[0]).tolist(), strict=True))
+    assert found["fm0_wheel"]
+    assert found["nb4_pinion"]
+    assert found["spectral_kurtosis"]
+    assert not found["fm0_pinion"]
 
 
 def test_features_do_not_depend_on_threads_or_cache():
