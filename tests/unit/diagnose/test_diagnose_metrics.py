@@ -1,5 +1,7 @@
 """Scores in closed form, intervals over units, indicators and baselines."""
 
+from dataclasses import replace
+
 import numpy as np
 import pytest
 from fake_dataset import FakeDataset
@@ -174,6 +176,18 @@ def test_indicator_model_finds_the_fault_and_stays_at_chance_without_one():
     (train, validation, test), task = make_tables(strength=0.0, n_units=12)
     _, record, predicted = indicator_model(train, validation, test, n_classes=4, with_level=True)
     assert accuracy(record, predicted, task) < 0.55
+
+
+def test_indicator_model_passes_over_what_no_stretch_is_long_enough_for():
+    tables, _ = make_tables(n_units=4, records_per_unit=4)
+    with_gap = []
+    for table in tables:
+        values = np.concatenate([table.values, np.full((len(table.values), 1), np.nan)], axis=1)
+        with_gap.append(replace(table, values=values, names=(*table.names, "channel_0/nb4_wheel")))
+    first = indicator_model(*tables, n_classes=4, with_level=True)
+    second = indicator_model(*with_gap, n_classes=4, with_level=True)
+    assert first[0] == second[0]
+    np.testing.assert_array_equal(first[2], second[2])
 
 
 def test_rms_threshold_uses_the_level_only():
