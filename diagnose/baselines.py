@@ -46,8 +46,8 @@ def indicator_model(
     -------
     what was chosen, records (record,), predicted labels (record,)
     """
-    known = np.isfinite(train.values).any(axis=0)  # the boosting's bins need a value
-    kept = [i for i, name in enumerate(train.names) if known[i] and (with_level or not name.endswith("log_rms"))]
+    known = np.flatnonzero(np.isfinite(train.values).any(axis=0)).tolist()  # the boosting's bins need a value
+    kept = [index for index in known if with_level or not train.names[index].endswith("log_rms")]
     scored = []
     for name, make in _candidates().items():
         model = make()
