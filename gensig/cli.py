@@ -70,7 +70,9 @@ def _folder(parser: argparse.ArgumentParser) -> None:
 
 def _twin(parser: argparse.ArgumentParser) -> None:
     parser.add_argument(
-        "recording", metavar="RECORDING", help="healthy recording: .csv (time_s and sensors), .npy, .npz"
+        "recording",
+        metavar="RECORDING",
+        help="healthy recording: .csv (time_s and sensors), .npy, .npz, .wav, .h5, .mat",
     )
     parser.add_argument(
         "overrides", nargs="*", metavar="OVERRIDES", help="what you know of the gears: gear.pinion.face_width_mm=15"
@@ -79,9 +81,10 @@ def _twin(parser: argparse.ArgumentParser) -> None:
     parser.add_argument("--teeth", type=int, nargs=2, required=True, metavar=two, help="teeth of both gears")
     parser.add_argument("--speed", type=float, required=True, metavar="RPM", help="of the driving gear, within 3 %%")
     parser.add_argument("--out", required=True, metavar="DIR", help="folder for the options; its name becomes theirs")
-    parser.add_argument("--rate", type=float, metavar="HZ", help="samples a second, where the file has no time_s")
+    parser.add_argument("--rate", type=float, metavar="HZ", help="samples a second, where the file does not tell")
     parser.add_argument("--unit", default="m/s2", help="m/s2 or g, where the column does not say (default: m/s2)")
     parser.add_argument("--channels", nargs="+", metavar="NAME", help="columns to use (default: all)")
+    parser.add_argument("--array", metavar="NAME", help="array of a .npz, .h5 or .mat file (default: acceleration)")
     parser.add_argument("--module", type=float, metavar="MM", help="normal module (default: 2, assumed)")
     parser.add_argument("--torque", type=float, metavar="NM", help="of the driving gear (default: assumed by size)")
     parser.add_argument("--check", metavar="FILE", help="healthy recording held out (default: the second half)")

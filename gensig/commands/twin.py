@@ -10,10 +10,11 @@ from typing import Any
 
 from gensig.config import read_request
 from gensig.errors import ConfigError
+from gensig.signals.recording import Recording
 from gensig.systems.registry import read_system
 from gensig.twin.check import check, held_out_duration
 from gensig.twin.fitting import Fit, fit
-from gensig.twin.recording import Recording, read_recording
+from gensig.twin.recording import read_recording
 from gensig.twin.report import check_summary, fitted_rows, report_text, verdict
 from gensig.twin.speed import Teeth, find_motion
 from gensig.twin.writing import option_name, write_options
@@ -67,7 +68,9 @@ def _tell(text: str) -> None:
 
 
 def _read(file: str, arguments: Namespace) -> Recording:
-    return read_recording(file, rate=arguments.rate, unit=arguments.unit, channels=arguments.channels)
+    return read_recording(
+        file, rate=arguments.rate, unit=arguments.unit, channels=arguments.channels, array=arguments.array
+    )
 
 
 def _split(recording: Recording, arguments: Namespace) -> tuple[Recording, Recording, str]:

@@ -13,8 +13,8 @@ from numpy.typing import NDArray
 from gensig.courses import Profile, Ramp, RandomWalk, Ripple
 from gensig.errors import ConfigError
 from gensig.operating import Operating
-from gensig.sensing.user_file import check_columns, read_table
 from gensig.units import read, to_si
+from gensig.user_file import check_columns, read_table
 
 Array = NDArray[np.float64]
 

@@ -15,7 +15,7 @@ from numpy.typing import NDArray
 
 from gensig.dynamics.decimation import usable_band
 from gensig.errors import ConfigError
-from gensig.twin.recording import Recording
+from gensig.signals.recording import Recording
 
 Array = NDArray[np.float64]
 

@@ -8,7 +8,8 @@ from numpy.testing import assert_allclose
 
 from gensig.cli import main
 from gensig.errors import ConfigError
-from gensig.twin.recording import STANDARD_GRAVITY, read_recording
+from gensig.signals.recording import STANDARD_GRAVITY
+from gensig.twin.recording import read_recording
 from gensig.twin.speed import Teeth, find_motion
 
 RATE = 5120.0
@@ -80,7 +81,7 @@ def refused(tmp_path):
         "garbage.npz", "none.npy",
     )}  # fmt: skip
     return [
-        ("the name must end in .csv, .npy, .npz", "recording.wav", {}),
+        ("the name must end in .csv, .npy, .npz", "recording.flac", {}),
         ("cannot be read", array["none.npy"], rated),
         ("cannot be read", str(tmp_path / "none.csv"), {}),
         ("an array tells no rate; give the samples a second with --rate", array["nan.npy"], {}),

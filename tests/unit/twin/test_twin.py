@@ -8,8 +8,8 @@ from machines import GRADE, RATE, SPEED, TEETH, drifting, measured
 from gensig.cli import main
 from gensig.config import read_request
 from gensig.dataset.reader import open_dataset
+from gensig.signals.recording import Recording
 from gensig.twin.fitting import gain_at, minimum_phase
-from gensig.twin.recording import Recording
 from gensig.twin.speed import Teeth, find_motion
 
 BOTH = Teeth(driving=TEETH[0], driven=TEETH[1])

@@ -1,0 +1,167 @@
+"""Files of recordings: WAV, numpy, HDF5 and MATLAB. Numbers only: nothing is unpickled, no link is followed."""
+
+from __future__ import annotations
+
+import warnings
+import zipfile
+from collections.abc import Iterator, Mapping
+from contextlib import contextmanager
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from gensig.errors import ConfigError
+from gensig.user_file import MOST_BYTES
+
+Array = NDArray[np.float64]
+
+ARRAY_KEY = "acceleration"
+RATE_KEY = "sampling_rate_hz"
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class Content:
+    """What a file without column names holds.
+
+    Attributes
+    ----------
+    values : (channel, sample)
+    sampling_rate : Hz    None where the file does not tell
+    rate_from : what told it, in words
+    has_level : False for samples of whole numbers without a unit
+    """
+
+    values: Array
+    sampling_rate: float | None
+    rate_from: str = RATE_KEY
+    has_level: bool = True
+
+
+def read_wav(file: str, array: str | None) -> Content:
+    """Samples and rate of a WAV file; whole numbers have no level in m/s2."""
+    from scipy.io import wavfile
+
+    _no_array_name(file, array)
+    with _one_line(file, "it is no WAV file"), warnings.catch_warnings():
+        warnings.simplefilter("ignore", wavfile.WavFileWarning)  # chunks that are no samples
+        rate, samples = wavfile.read(Path(file).expanduser())
+    rows = np.atleast_2d(np.asarray(samples).T).astype(np.float64)
+    return Content(values=rows, sampling_rate=float(rate), rate_from="its header", has_level=samples.dtype.kind == "f")
+
+
+def read_npy(file: str, array: str | None) -> Content:
+    """The array of a .npy file."""
+    _no_array_name(file, array)
+    with _one_line(file, "it is no plain array of numbers of numpy"):
+        content = np.load(Path(file).expanduser(), allow_pickle=False)
+        if not isinstance(content, np.ndarray):
+            raise ValueError
+    return Content(values=_rows(file, content), sampling_rate=None)
+
+
+def read_npz(file: str, array: str | None) -> Content:
+    """One array of a .npz file, with its rate where the file has one."""
+    with _one_line(file, "it is no plain array of numbers of numpy"):
+        content = np.load(Path(file).expanduser(), allow_pickle=False)
+        if not isinstance(content, np.lib.npyio.NpzFile):
+            raise ValueError
+        with content:
+            name = _chosen(file, array, content.files)
+            values, rate = content[name], content[RATE_KEY] if RATE_KEY in content.files else None
+    return Content(values=_rows(file, values), sampling_rate=_rate(file, rate))
+
+
+def read_hdf5(file: str, array: str | None, *, from_matlab: bool = False) -> Content:
+    """One array of an HDF5 file; the rate may be an array or an attribute of the file or of the array."""
+    import h5py
+
+    with _one_line(file, "it is no HDF5 file"), h5py.File(Path(file).expanduser(), "r") as content:
+        found: dict[str, Any] = {}
+        # visits what the file itself holds: neither soft nor external links
+        content.visititems(lambda name, item: found.update({name: item}) if _is_plain(item) else None)
+        chosen = found[_chosen(file, array, found)]
+        if 8 * chosen.size > MOST_BYTES:
+            raise ConfigError(f"{file}: {chosen.name} is larger than {MOST_BYTES // 1_000_000} MB; cut it")
+        values = chosen[()]
+        rates: list[Mapping[str, Any]] = [chosen.attrs, content.attrs]
+        rate = next((place[RATE_KEY] for place in rates if RATE_KEY in place), None)
+        if rate is None and RATE_KEY in found:
+            rate = found[RATE_KEY][()]
+    return Content(values=_rows(file, values, from_matlab=from_matlab), sampling_rate=_rate(file, rate))
+
+
+def read_mat(file: str, array: str | None) -> Content:
+    """One array of a MATLAB file of version 4, 5 or 7 (scipy) or 7.3 (HDF5), samples along its longer side."""
+    import h5py
+    from scipy import io
+
+    path = Path(file).expanduser()
+    if h5py.is_hdf5(path):
+        return read_hdf5(file, array, from_matlab=True)
+    with _one_line(file, "it is no MATLAB file"):
+        name = _chosen(file, array, [row[0] for row in io.whosmat(path)])
+        content = io.loadmat(path, variable_names=[name, RATE_KEY])
+    return Content(
+        values=_rows(file, content[name], from_matlab=True), sampling_rate=_rate(file, content.get(RATE_KEY))
+    )
+
+
+@contextmanager
+def _one_line(file: str, what: str) -> Iterator[None]:
+    """Whatever a reader raises on a damaged file, one line; our own messages pass."""
+    try:
+        yield
+    except ConfigError:
+        raise
+    except zipfile.BadZipFile:
+        raise ConfigError(f"{file} cannot be read: {what}") from None
+    except OSError as error:
+        raise ConfigError(f"{file} cannot be read: {(error.errno and error.strerror) or what}") from None
+    except Exception:  # the parsers of scipy and h5py raise nearly any on bytes that were made to mislead them
+        raise ConfigError(f"{file} cannot be read: {what}") from None
+
+
+def _is_plain(item: Any) -> bool:
+    """A data set whose numbers lie in the file itself."""
+    import h5py
+
+    return isinstance(item, h5py.Dataset) and item.dtype.kind in "fiu" and not item.is_virtual and not item.external
+
+
+def _chosen(file: str, array: str | None, names: Any) -> str:
+    wanted = ARRAY_KEY if array is None else array
+    if wanted not in names:
+        has = ", ".join(sorted(names)[:12]) or "nothing"
+        hint = "; name one with --array" if array is None and names else ""
+        raise ConfigError(f"{file}: no array {wanted}; it has {has}{hint}")
+    return wanted
+
+
+def _no_array_name(file: str, array: str | None) -> None:
+    if array is not None:
+        raise ConfigError(f"{file}: --array is for .npz, .h5, .hdf5 and .mat; leave it out")
+
+
+def _rows(file: str, content: Any, *, from_matlab: bool = False) -> Array:
+    """(channel, sample) of an array; those of MATLAB may stand either way."""
+    if not isinstance(content, np.ndarray) or content.dtype.kind not in "fiu" or content.ndim not in (1, 2):
+        raise ConfigError(f"{file}: give one array of real numbers, (sample,) or (sensor, sample)")
+    rows = np.atleast_2d(content).astype(np.float64)
+    if rows.shape[0] > rows.shape[1]:
+        if not from_matlab:
+            raise ConfigError(f"{file} has the shape {content.shape}; give (sensor, sample): transpose it")
+        rows = np.ascontiguousarray(rows.T)
+    return rows
+
+
+def _rate(file: str, content: Any) -> float | None:
+    """One number, whatever it is wrapped in."""
+    if content is None:
+        return None
+    numbers = np.asarray(content)
+    if numbers.dtype.kind not in "fiu" or numbers.size != 1:
+        raise ConfigError(f"{file}: {RATE_KEY} must be one number")
+    return float(numbers.ravel()[0])
