@@ -36,6 +36,20 @@ Without protocol: the test part of the network's own split on the data set it wa
 EVALUATE_EXAMPLE = """\
 example:
   diagnose evaluate data=runs/other model_dir=runs/report/models/by_unit-seed0"""
+PREDICT_HELP = """\
+Class probabilities of one recording, with a flag for what is unlike the training data.
+
+The recording is resampled to the model's rate; one with less bandwidth is refused. It is judged in windows of the
+model's length; order tracking is not there yet: take a constant speed."""
+PREDICT_EXAMPLE = """\
+exit status:
+  0    predicted, and like the training data (or the model is too old to tell)
+  2    a mistake: one line says which
+  3    predicted, but out of distribution: do not rely on the class
+
+example:
+  diagnose predict --model runs/report/models/by_unit-seed0 housing.wav --channels channel_1 --speed-rpm 1500"""
+OUT_OF_DISTRIBUTION = 3
 EVALUATE_KEYS = ("data", "model_dir", "out", "protocol", "subset")
 
 
@@ -47,7 +61,7 @@ class _Parser(argparse.ArgumentParser):
 
 
 def main(argv: Sequence[str] | None = None) -> int:
-    """Run the command; the exit status is 0, 2 for a user's mistake, 130 when interrupted."""
+    """Run the command; the exit status is 0, 2 for a user's mistake, 3 for `_predict`'s flag, 130 when interrupted."""
     words = list(sys.argv[1:] if argv is None else argv)
     try:
         return _dispatch(words)
@@ -69,16 +83,17 @@ def _dispatch(words: list[str]) -> int:
         description="Train and judge fault classifiers on gensig data sets.",
         epilog="Each command has its own --help with an example.",
     )
-    verbs = top.add_subparsers(dest="verb", metavar="train | evaluate", parser_class=_Parser)
+    verbs = top.add_subparsers(dest="verb", metavar="train | evaluate | predict", parser_class=_Parser)
     verbs.add_parser("train", help="train, judge and report", add_help=False)
     verbs.add_parser("evaluate", help="judge a trained network", add_help=False)
+    verbs.add_parser("predict", help="try a trained network on a recording", add_help=False)
     if not words:
         top.print_help(sys.stderr)
         return 2
     if words[0] in ("-h", "--help"):
         top.print_help()
         return 0
-    commands = {"train": _train, "evaluate": _evaluate}
+    commands = {"train": _train, "evaluate": _evaluate, "predict": _predict}
     if words[0] not in commands:
         raise ConfigError(f"no command '{words[0]}'; there is {', '.join(commands)}")
     return commands[words[0]](words[1:])
@@ -161,6 +176,45 @@ def _evaluate(words: list[str]) -> int:
         out.mkdir(parents=True, exist_ok=True)
         write_evaluation(out, result)
     return 0
+
+
+def _predict(words: list[str]) -> int:
+    parser = _Parser(
+        prog="diagnose predict",
+        description=PREDICT_HELP,
+        epilog=PREDICT_EXAMPLE,
+        formatter_class=argparse.RawDescriptionHelpFormatter,
+        allow_abbrev=False,
+    )
+    parser.add_argument("recording", metavar="RECORDING", help=".csv, .wav, .npy, .npz, .h5, .hdf5 or .mat")
+    parser.add_argument("--model", required=True, metavar="DIR", help="folder that diagnose train wrote below models/")
+    parser.add_argument("--sampling-rate", type=float, metavar="HZ", help="samples a second, where the file is silent")
+    parser.add_argument("--speed-rpm", type=float, metavar="RPM", help="of the driving shaft: was it trained at such?")
+    parser.add_argument("--channels", nargs="+", metavar="NAME", help="for the model's channels, in their order")
+    parser.add_argument("--unit", default="m/s2", help="m/s2 or g, where the column does not say (default: m/s2)")
+    parser.add_argument("--array", metavar="NAME", help="array of a .npz, .h5 or .mat file (default: acceleration)")
+    parser.add_argument("--json", action="store_true", help="print everything, window by window, as JSON")
+    arguments = parser.parse_args(words)
+    from diagnose.model_io import load_domain, load_model
+    from diagnose.predict import Source, predict_recording, summary
+
+    source = Source(
+        file=arguments.recording,
+        sampling_rate=arguments.sampling_rate,
+        speed_rpm=arguments.speed_rpm,
+        channels=None if arguments.channels is None else tuple(arguments.channels),
+        unit=arguments.unit,
+        array=arguments.array,
+    )
+    model, description = load_model(arguments.model)
+    result = predict_recording(model, description, load_domain(arguments.model, description), source)
+    if arguments.json:
+        import json
+
+        print(json.dumps({"model": arguments.model, **result}, indent=2, allow_nan=False))
+    else:
+        print(summary(result))
+    return OUT_OF_DISTRIBUTION if result["out_of_distribution"] else 0
 
 
 def _verb_parser(verb: str, description: str, epilog: str) -> _Parser:

@@ -18,6 +18,7 @@ import torch
 from numpy.typing import NDArray
 
 from diagnose.baselines import indicator_model, rms_threshold
+from diagnose.domain import Domain, fit_domain
 from diagnose.features import Cache, feature_table
 from diagnose.metrics import over_records
 from diagnose.settings import TrainSettings
@@ -48,6 +49,7 @@ class Prediction:
     predicted: NDArray[np.integer]
     detail: str
     weights: dict[str, NDArray[Any]] | None = None
+    domain: Domain | None = None
     best_epoch: int = 0
     validation_loss: tuple[float, ...] = ()
 
@@ -108,6 +110,7 @@ def _run_training(task: Task, settings: TrainSettings, protocol: str, seed: int,
         train, validation, model_config=settings.model, n_classes=n_classes, settings=settings, seed=seed
     )
     record, log_probability = over_records(predict_windows(training.model, test), test.record)
+    domain = None if shuffled else fit_domain(train, validation)
     return Prediction(
         protocol=protocol,
         method="label_shuffle" if shuffled else str(settings.model.get("name", "network")),
@@ -116,6 +119,7 @@ def _run_training(task: Task, settings: TrainSettings, protocol: str, seed: int,
         predicted=log_probability.argmax(axis=1),
         detail=f"best epoch {training.best_epoch} of {len(training.validation_loss)}",
         weights=None if shuffled else {key: value.numpy() for key, value in training.model.state_dict().items()},
+        domain=domain,
         best_epoch=training.best_epoch,
         validation_loss=training.validation_loss,
     )

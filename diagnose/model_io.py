@@ -12,22 +12,28 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from diagnose.settings import TrainSettings
-from diagnose.windows import Task
+from diagnose.windows import Task, subset_segments
 from gensig.errors import DatasetError
 
 if TYPE_CHECKING:
     from torch import nn
 
+    from diagnose.domain import Domain
     from diagnose.jobs import Prediction
     from gensig.dataset.reader import Dataset
 
-MODEL_SCHEMA_VERSION = 1
+MODEL_SCHEMA_VERSION = 2
+READABLE_VERSIONS = (1, MODEL_SCHEMA_VERSION)  # 1: without out_of_distribution and speed_rpm_range
 WEIGHTS, DESCRIPTION = "model.safetensors", "model.json"
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class ModelDescription:
-    """What a network was trained on and what it expects; the content of ``model.json``."""
+    """What a network was trained on and what it expects; the content of ``model.json``.
+
+    ``out_of_distribution`` is `diagnose.domain.Domain.facts`; it and ``speed_rpm_range``, least and greatest speed of
+    the training records in r/min, are None in older models.
+    """
 
     model_schema_version: int
     model: dict[str, Any]
@@ -43,10 +49,14 @@ class ModelDescription:
     seed: int
     best_epoch: int
     n_bootstrap: int
+    speed_rpm_range: tuple[float, float] | None = None
+    out_of_distribution: dict[str, Any] | None = None
 
 
 def model_description(task: Task, settings: TrainSettings, prediction: Prediction) -> ModelDescription:
     """Description of the network behind a prediction."""
+    trained_on = subset_segments(task, prediction.protocol, "train").record
+    speed = np.asarray(task.dataset.column("speed_rpm"), dtype=float)[trained_on]
     return ModelDescription(
         model_schema_version=MODEL_SCHEMA_VERSION,
         model=dict(settings.model),
@@ -62,6 +72,8 @@ def model_description(task: Task, settings: TrainSettings, prediction: Predictio
         seed=prediction.seed,
         best_epoch=prediction.best_epoch,
         n_bootstrap=settings.n_bootstrap,
+        speed_rpm_range=(float(speed.min()), float(speed.max())),
+        out_of_distribution=None if prediction.domain is None else prediction.domain.facts(),
     )
 
 
@@ -81,9 +93,9 @@ def load_model(folder: str | Path) -> tuple[nn.Module, ModelDescription]:
     ------
     DatasetError    for a folder without the two files, another schema, or weights that do not belong to the network
     """
-    from safetensors import SafetensorError
-    from safetensors.torch import load_file
+    import torch
 
+    from diagnose.domain import TENSOR
     from diagnose.models import build_model
 
     folder = Path(folder)
@@ -91,15 +103,42 @@ def load_model(folder: str | Path) -> tuple[nn.Module, ModelDescription]:
     model = build_model(
         description.model, n_channels=len(description.channel_names), n_classes=len(description.class_names)
     )
+    stored = {name: value for name, value in _tensors(folder).items() if name != TENSOR}
     try:
-        model.load_state_dict(load_file(folder / WEIGHTS))
-    except FileNotFoundError:
-        raise DatasetError(f"{folder} holds no {WEIGHTS}") from None
-    except (SafetensorError, OSError) as error:
-        raise DatasetError(f"{folder / WEIGHTS} is not a safetensors file: {_one_line(error)}") from None
-    except RuntimeError as error:
+        model.load_state_dict({name: torch.from_numpy(value) for name, value in stored.items()})
+    except (RuntimeError, TypeError) as error:
         raise DatasetError(f"{folder / WEIGHTS} does not fit {DESCRIPTION}: {_one_line(error)}") from None
     return model.eval(), description
+
+
+def load_domain(folder: str | Path, description: ModelDescription) -> Domain | None:
+    """What the network of a folder takes for known; None for a model that does not tell.
+
+    Raises
+    ------
+    DatasetError    for tensors that are no domain
+    """
+    from diagnose.domain import domain_from
+
+    if description.out_of_distribution is None:
+        return None
+    try:
+        return domain_from(description.out_of_distribution, _tensors(Path(folder)))
+    except DatasetError as error:
+        raise DatasetError(f"{folder}: {error}") from None
+
+
+def _tensors(folder: Path) -> dict[str, np.ndarray]:
+    """Everything in the file of weights."""
+    from safetensors import SafetensorError
+    from safetensors.numpy import load_file
+
+    try:
+        return load_file(folder / WEIGHTS)
+    except FileNotFoundError:
+        raise DatasetError(f"{folder} holds no {WEIGHTS}") from None
+    except (SafetensorError, OSError, KeyError) as error:
+        raise DatasetError(f"{folder / WEIGHTS} is not a safetensors file: {_one_line(error)}") from None
 
 
 def schema_version(dataset: Dataset) -> int | None:
@@ -122,10 +161,20 @@ def _read_description(folder: Path) -> ModelDescription:
     try:
         content = json.loads(path.read_text(encoding="utf-8"))
         version = content["model_schema_version"]
-        if version != MODEL_SCHEMA_VERSION:
-            raise DatasetError(f"{path}: model schema {version!r}, this program reads {MODEL_SCHEMA_VERSION}")
+        if version not in READABLE_VERSIONS:
+            known = " and ".join(map(str, READABLE_VERSIONS))
+            raise DatasetError(f"{path}: model schema {version!r}, this program reads {known}")
         for name in ("class_names", "channel_names"):
             content[name] = tuple(str(value) for value in content[name])
+        content["sampling_rate_hz"] = float(content["sampling_rate_hz"])
+        for name in ("window_samples", "stride_samples"):
+            if not isinstance(content[name], int) or content[name] < 1:
+                raise ValueError(f"{name} {content[name]!r} is no positive whole number")
+        if content.get("speed_rpm_range") is not None:
+            low, high = content["speed_rpm_range"]
+            content["speed_rpm_range"] = (float(low), float(high))
+        if content.get("out_of_distribution") is not None:
+            content["out_of_distribution"] = dict(content["out_of_distribution"])
         return ModelDescription(**content)
     except FileNotFoundError:
         inside = sorted(child.name for child in (folder / "models").glob("*") if (child / DESCRIPTION).is_file())

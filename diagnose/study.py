@@ -106,7 +106,8 @@ def run_study(
     for prediction in predictions:
         if prediction.weights is not None:
             target = folder / "models" / f"{prediction.protocol}-seed{prediction.seed}"
-            save_model(target, prediction.weights, model_description(task, settings, prediction))
+            known = {} if prediction.domain is None else prediction.domain.tensors()
+            save_model(target, prediction.weights | known, model_description(task, settings, prediction))
     results = {protocol: _protocol_result(task, settings, protocol, predictions) for protocol in protocols}
     return {
         "metrics_schema_version": METRICS_SCHEMA_VERSION,

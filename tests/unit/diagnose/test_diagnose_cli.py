@@ -148,7 +148,7 @@ def test_evaluate_refuses_damaged_models(trained, data, capsys, tmp_path):
     words = ["evaluate", "data=good", damaged(trained, tmp_path, model_json=b"{}")]
     fails(capsys, words, "does not describe a model")
     text = (trained / "models" / "by_unit-seed0" / "model.json").read_text()
-    later = text.replace('"model_schema_version": 1', '"model_schema_version": 9').encode()
+    later = text.replace('"model_schema_version": 2', '"model_schema_version": 9').encode()
     fails(capsys, ["evaluate", "data=good", damaged(trained, tmp_path, model_json=later)], "model schema 9")
     wider = json.loads(text)
     wider["model"]["widths"] = [8, 32]
