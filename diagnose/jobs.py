@@ -75,6 +75,7 @@ def run_jobs(
                 results.append(run_job(task, settings, job))
                 on_done(results[-1])
         _loaded.clear()
+        _domains.clear()
         return [prediction for result in results for prediction in result]
     context = multiprocessing.get_context("spawn")
     executor = ProcessPoolExecutor(min(n_workers, len(jobs)), context, _start_worker, (task, settings))
@@ -110,7 +111,7 @@ def _run_training(task: Task, settings: TrainSettings, protocol: str, seed: int,
         train, validation, model_config=settings.model, n_classes=n_classes, settings=settings, seed=seed
     )
     record, log_probability = over_records(predict_windows(training.model, test), test.record)
-    domain = None if shuffled else fit_domain(train, validation)
+    domain = None if shuffled else _domain(protocol, train, validation)
     return Prediction(
         protocol=protocol,
         method="label_shuffle" if shuffled else str(settings.model.get("name", "network")),
@@ -143,6 +144,7 @@ def _run_baselines(task: Task, protocol: str, cache: Cache) -> list[Prediction]:
 
 # Windows of the protocol a process works on; jobs come protocol by protocol.
 _loaded: dict[str, dict[str, WindowSet]] = {}
+_domains: dict[str, Domain] = {}
 _work: dict[str, Any] = {}
 
 
@@ -151,6 +153,14 @@ def _windows(task: Task, protocol: str) -> dict[str, WindowSet]:
         _loaded.clear()
         _loaded[protocol] = {name: load_windows(task, subset_segments(task, protocol, name)) for name in SUBSETS}
     return _loaded[protocol]
+
+
+def _domain(protocol: str, train: WindowSet, validation: WindowSet) -> Domain:
+    """The same for every seed."""
+    if protocol not in _domains:
+        _domains.clear()
+        _domains[protocol] = fit_domain(train, validation)
+    return _domains[protocol]
 
 
 def _start_worker(task: Task, settings: TrainSettings) -> None:
