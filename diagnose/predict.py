@@ -11,6 +11,7 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 from numpy.typing import NDArray
 
+from diagnose.calibration import probabilities
 from diagnose.windows import Segments, WindowSet, plan_windows
 from gensig.errors import ConfigError
 from gensig.signals.recording import Recording, RecordingFile, read_file, recording_of, without_unit
@@ -101,7 +102,9 @@ def predict_recording(
                 "distance": None if distance is None else float(distance[index]),
                 "beyond": None if beyond is None else bool(beyond[index]),
             }
-            for index, (start, row) in enumerate(zip(windows.start, probabilities(log_probability, description.temperature), strict=True))
+            for index, (start, row) in enumerate(
+                zip(windows.start, probabilities(log_probability, description.temperature), strict=True)
+            )
         ],
         "channels": dict(zip(description.channel_names, channels, strict=True)),
         "sampling_rate_hz": recording.sampling_rate,
