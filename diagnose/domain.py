@@ -91,10 +91,9 @@ def fit_domain(train: WindowSet, validation: WindowSet) -> Domain:
     section 3; threshold on held-out known data as in Sun, Ming, Zhu & Li (2022), "Out-of-distribution detection with
     deep nearest neighbors", ICML, section 3.
     """
-    every = window_levels(train)
-    kept = np.unique(np.linspace(0, len(every) - 1, min(len(every), MOST_WINDOWS)).round().astype(int))
-    levels = every[kept].astype(np.float32)
-    distance = _distance(window_levels(validation), levels)
+    kept = np.unique(np.linspace(0, len(train) - 1, min(len(train), MOST_WINDOWS)).round().astype(int))
+    levels = window_levels(train, kept).astype(np.float32)
+    distance = _distance(window_levels(validation, np.arange(len(validation))), levels)
     return Domain(
         levels=levels,
         threshold=float(np.quantile(distance, QUANTILE, method="higher")),
@@ -109,7 +108,7 @@ def distances(domain: Domain, windows: WindowSet) -> FloatArray:
     ------
     DatasetError    if the domain belongs to other channels
     """
-    levels = window_levels(windows)
+    levels = window_levels(windows, np.arange(len(windows)))
     if levels.shape[1] != domain.levels.shape[1]:
         raise DatasetError(
             f"the model's out-of-distribution flag has {domain.levels.shape[1]} levels, a window {levels.shape[1]}"
@@ -117,10 +116,9 @@ def distances(domain: Domain, windows: WindowSet) -> FloatArray:
     return _distance(levels, domain.levels)
 
 
-def window_levels(windows: WindowSet, *, batch_size: int = 64) -> FloatArray:
-    """(window, feature) `band_levels` of windows at their planned starts, channel after channel."""
-    every = np.arange(len(windows))
-    blocks = np.array_split(every, -(-every.size // batch_size))
+def window_levels(windows: WindowSet, chosen: NDArray[np.integer], *, batch_size: int = 64) -> FloatArray:
+    """(window, feature) `band_levels` of chosen windows at their planned starts, channel after channel."""
+    blocks = np.array_split(chosen, -(-chosen.size // batch_size))
     return np.concatenate([band_levels(windows.cut(block)).reshape(block.size, -1) for block in blocks])
 
 

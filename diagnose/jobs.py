@@ -85,6 +85,7 @@ def run_jobs(
                 results.append(run_job(task, settings, job))
                 on_done(results[-1])
         _loaded.clear()
+        _domains.clear()
         return [prediction for result in results for prediction in result]
     context = multiprocessing.get_context("spawn")
     executor = ProcessPoolExecutor(min(n_workers, len(jobs)), context, _start_worker, (task, settings))
@@ -120,7 +121,7 @@ def _run_training(task: Task, settings: TrainSettings, protocol: str, seed: int,
         train, validation, model_config=settings.model, n_classes=n_classes, settings=settings, seed=seed
     )
     record, log_probability = over_records(predict_windows(training.model, test), test.record)
-    domain = None if shuffled else fit_domain(train, validation)
+    domain = None if shuffled else _domain(protocol, train, validation)
     last = log_probability
     if training.last_model is not None and not shuffled:
         _, last = over_records(predict_windows(training.last_model, test), test.record)
@@ -172,6 +173,7 @@ def _fit_baseline(task: Task, settings: TrainSettings, protocol: str, method: st
 
 # Windows of the protocol a process works on; jobs come protocol by protocol.
 _loaded: dict[str, dict[str, WindowSet]] = {}
+_domains: dict[str, Domain] = {}
 _work: dict[str, Any] = {}
 
 
@@ -180,6 +182,14 @@ def _windows(task: Task, protocol: str) -> dict[str, WindowSet]:
         _loaded.clear()
         _loaded[protocol] = {name: load_windows(task, subset_segments(task, protocol, name)) for name in SUBSETS}
     return _loaded[protocol]
+
+
+def _domain(protocol: str, train: WindowSet, validation: WindowSet) -> Domain:
+    """The same for every seed."""
+    if protocol not in _domains:
+        _domains.clear()
+        _domains[protocol] = fit_domain(train, validation)
+    return _domains[protocol]
 
 
 def _start_worker(task: Task, settings: TrainSettings) -> None:

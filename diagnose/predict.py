@@ -11,6 +11,7 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 from numpy.typing import NDArray
 
+from diagnose.calibration import probabilities
 from diagnose.windows import Segments, WindowSet, plan_windows
 from gensig.errors import ConfigError
 from gensig.signals.recording import Recording, RecordingFile, read_file, recording_of, without_unit
@@ -78,7 +79,7 @@ def predict_recording(
     recording, channels = _read(description, source)
     windows = _windows(_resampled(recording, description, source.file), description, source.file)
     log_probability = predict_windows(model, windows)
-    overall = _probabilities(over_records(log_probability, windows.record)[1])[0]
+    overall = probabilities(over_records(log_probability, windows.record)[1], description.temperature)[0]
     distance = None if domain is None else distances(domain, windows)
     beyond = None if domain is None or distance is None else distance > domain.threshold
     reasons = _reasons(description, source, beyond)
@@ -101,7 +102,9 @@ def predict_recording(
                 "distance": None if distance is None else float(distance[index]),
                 "beyond": None if beyond is None else bool(beyond[index]),
             }
-            for index, (start, row) in enumerate(zip(windows.start, _probabilities(log_probability), strict=True))
+            for index, (start, row) in enumerate(
+                zip(windows.start, probabilities(log_probability, description.temperature), strict=True)
+            )
         ],
         "channels": dict(zip(description.channel_names, channels, strict=True)),
         "sampling_rate_hz": recording.sampling_rate,
@@ -196,9 +199,3 @@ def _windows(signal: NDArray[np.float32], description: ModelDescription, file: s
         window_samples=description.window_samples,
         normalise=description.normalise,
     )
-
-
-def _probabilities(log_probability: NDArray[np.floating]) -> NDArray[np.floating]:
-    """(row, class) that sum to 1: the mean of logarithms does not."""
-    raised = np.exp(log_probability - log_probability.max(axis=1, keepdims=True))
-    return raised / raised.sum(axis=1, keepdims=True)

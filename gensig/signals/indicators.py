@@ -90,7 +90,7 @@ def fm0(average: ArrayLike, n_teeth: int, *, n_harmonics: int | None = None) -> 
 
 
 def fm4(average: ArrayLike, n_teeth: int) -> FloatArray:
-    """Kurtosis of the difference signal: a fault of one or two teeth makes it peak, a healthy gear stays near 3.
+    """Kurtosis of the difference signal: a fault of one or two teeth makes it peak; 3 for Gaussian noise.
 
     Parameters
     ----------
