@@ -102,9 +102,7 @@ def predict_recording(
                 "distance": None if distance is None else float(distance[index]),
                 "beyond": None if beyond is None else bool(beyond[index]),
             }
-            for index, (start, row) in enumerate(
-                zip(windows.start, probabilities(log_probability, description.temperature), strict=True)
-            )
+            for index, (start, row) in enumerate(zip(windows.start, probabilities(log_probability), strict=True))
         ],
         "channels": dict(zip(description.channel_names, channels, strict=True)),
         "sampling_rate_hz": recording.sampling_rate,

@@ -121,7 +121,7 @@ def test_every_format_says_what_the_data_set_says(which, request, tmp_path, caps
             windows = [[row["probabilities"][name] for name in dataset.class_names] for row in result["windows"]]
             assert_allclose(windows, expected, rtol=0, atol=1e-4)
             assert status == (3 if result["out_of_distribution"] else 0)
-            overall = np.exp(np.log(expected).mean(axis=0))
+            overall = np.exp(np.log(expected).mean(axis=0) / description.temperature)
             assert_allclose(list(result["probabilities"].values()), overall / overall.sum(), rtol=0, atol=1e-4)
             assert result["class"] == dataset.class_names[int(overall.argmax())]
             assert result["windows"][1]["start_s"] == pytest.approx(1000 / RATE)
