@@ -165,7 +165,7 @@ def _table_rows(table: PairTable) -> tuple[Array, NDArray[np.int64], tuple[int, 
     themselves. The steps lead from one pinion tooth to the next and, where teeth stand by themselves, to the wheel's.
     """
     (pinion, pinion_row), (wheel, wheel_row) = _used(table.pinion), _used(table.wheel)
-    if len(pinion) * len(wheel) > 2 * (len(pinion) + len(wheel)):
+    if _are_many(table):
         everything = np.concatenate([_columns(table.pinion), _columns(table.wheel)])
         row = np.concatenate([_present(side, side.kind) for side in (table.pinion, table.wheel)])
         return everything, row, (1, len(table.pinion.compliance))
@@ -175,6 +175,12 @@ def _table_rows(table: PairTable) -> tuple[Array, NDArray[np.int64], tuple[int, 
         wheel_row = wheel_row + 1
     row = np.concatenate([_present(table.pinion, pinion_row), _present(table.wheel, wheel_row)])
     return pairs, row, (len(wheel), 0)
+
+
+def _are_many(table: PairTable) -> bool:
+    """Whether all pairs of distinct teeth would take much more memory than the teeth."""
+    n_pinion, n_wheel = (len(np.unique(side.kind)) for side in (table.pinion, table.wheel))
+    return n_pinion * n_wheel > 2 * (n_pinion + n_wheel)
 
 
 def _used(side: GearTable) -> tuple[Array, NDArray[np.int64]]:
