@@ -16,7 +16,7 @@ from gensig import generation, records
 from gensig.dataset.shard import ShardWriter
 from gensig.dynamics import _kernels, integrator
 from gensig.dynamics.decimation import Decimator, decimator
-from gensig.systems import spur_pair
+from gensig.systems import lead_in, spur_pair
 
 PLAN, TABLES, EQUATIONS = "machine and plan row", "mesh tables", "equations and packing"
 SETTLING, RECORDING, CHECKING = "integration: settling", "integration: recording", "integration: error check"
@@ -28,7 +28,7 @@ CLOCKED: tuple[tuple[Any, str, str], ...] = (
     (generation, "_folder_inputs", PLAN),
     (records, "record_system", PLAN),
     (records, "row_run", PLAN),
-    (records, "_twin_start", PLAN),
+    (records, "twin_start", PLAN),
     (spur_pair, "_mesh_table", TABLES),
     (spur_pair.Run, "dynamics", EQUATIONS),
     (spur_pair, "settling_oversampling", EQUATIONS),
@@ -81,7 +81,7 @@ class Stages:
         """Clock the product's functions; recordings of fewer samples than ``n_whole`` are those of the error check."""
         counted = self._counted(spur_pair.simulate_together)
         with ExitStack() as patches:
-            for owner in (spur_pair, records):
+            for owner in (spur_pair, lead_in):
                 patches.enter_context(mock.patch.object(owner, "simulate_together", counted))
             for owner, name, stage in CLOCKED:
                 clocked = self._clocked(getattr(owner, name), stage, n_whole)
