@@ -1,0 +1,74 @@
+"""``diagnose evaluate``."""
+
+from __future__ import annotations
+
+import difflib
+from collections.abc import Sequence
+from pathlib import Path
+
+from diagnose.commands.parser import refuse_existing, verb_parser
+from gensig.errors import ConfigError
+
+HELP = """\
+Evaluate a trained network on a data set.
+
+  data=DIR         data set made by gensig generate
+  model_dir=DIR    one of the folders that diagnose train wrote below models/
+  out=DIR          optional: receives metrics.json and confusion.png; must not exist or be empty
+  protocol=NAME    optional: judge on a part of this split of the data set
+  subset=NAME      optional: which part (train, validation, test); default test
+
+Without protocol: the test part of the network's own split on the data set it was trained on, all records elsewhere."""
+EXAMPLE = """\
+example:
+  diagnose evaluate data=runs/other model_dir=runs/report/models/by_unit-seed0"""
+KEYS = ("data", "model_dir", "out", "protocol", "subset")
+
+
+def run(words: Sequence[str]) -> int:
+    """Judge a trained network and print its scores."""
+    parser = verb_parser("evaluate", HELP, EXAMPLE)
+    parser.add_argument("overrides", nargs="*", metavar="key=value", help="see above")
+    arguments = parser.parse_intermixed_args(words)
+    values = _key_values(arguments.overrides)
+    out = Path(values["out"]) if "out" in values else None
+    if out is not None:
+        refuse_existing(out)
+    from diagnose.evaluate import evaluate_model, write_evaluation
+    from diagnose.model_io import load_model
+    from gensig.dataset.reader import open_dataset
+
+    model, description = load_model(values["model_dir"])
+    dataset = open_dataset(values["data"])
+    protocol, subset = values.get("protocol"), values.get("subset")
+    result = evaluate_model(model, description, dataset, protocol=protocol, subset=subset)
+    print(f"{result['n_records']} records of {result['n_units']} unit(s): {result['part']}")
+    for name in ("balanced_accuracy", "macro_f1"):
+        score = result[name]
+        print(f"{name} {score['mean']:.3f}, 95 % interval over units {score['low']:.3f} to {score['high']:.3f}")
+    for name, share in result["recall"].items():
+        print(f"recall {name} {share:.3f}")
+    if out is not None:
+        out.mkdir(parents=True, exist_ok=True)
+        write_evaluation(out, result)
+    return 0
+
+
+def _key_values(words: Sequence[str]) -> dict[str, str]:
+    """Words of the form key=value as a dictionary; refuses others, unknown keys and missing ones."""
+    values: dict[str, str] = {}
+    for word in words:
+        key, equals, value = word.partition("=")
+        if not equals or not value:
+            raise ConfigError(f"'{word}' is not of the form key=value")
+        if key not in KEYS:
+            close = difflib.get_close_matches(key, KEYS, n=1)
+            hint = f"did you mean {close[0]}?" if close else f"there is {', '.join(KEYS)}"
+            raise ConfigError(f"unknown key '{key}'; {hint}")
+        if key in values:
+            raise ConfigError(f"{key} is given twice")
+        values[key] = value
+    for key in ("data", "model_dir"):
+        if key not in values:
+            raise ConfigError(f"{key} is required: give {key}=DIR")
+    return values

@@ -1,0 +1,84 @@
+"""``diagnose train``."""
+
+from __future__ import annotations
+
+import sys
+from collections.abc import Sequence
+from pathlib import Path
+from typing import Any
+
+from diagnose.commands.parser import refuse_existing, verb_parser
+from gensig.errors import ConfigError
+
+HELP = """\
+Train a network and its baselines on splits of a data set and write a report. Default protocols: by_unit,
+cross_specimen and the leaky one, as far as the data set has them.
+
+  data=DIR    data set made by gensig generate
+  out=DIR     folder to write; must not exist or be empty. Receives report.md, metrics.json, figures, models/
+
+Every other key=value overrides configs/train.yaml, model=NAME chooses a file of configs/model."""
+EXAMPLE = """\
+examples:
+  diagnose train data=runs/quickstart out=runs/report
+  diagnose train data=runs/quickstart out=runs/report protocols=[by_unit] seeds=[0,1,2,3,4] epochs=30
+  diagnose train data=runs/quickstart out=runs/cross protocols=[cross_speed,cross_torque,unseen_severity_outer]
+  diagnose train -m data=runs/quickstart out=runs/levels normalise=rms,none"""
+
+
+def run(words: Sequence[str]) -> int:
+    """Train, judge, write the report."""
+    parser = verb_parser("train", HELP, EXAMPLE)
+    parser.add_argument("overrides", nargs="*", metavar="key=value", help="see above")
+    parser.add_argument("-m", "--multirun", action="store_true", help="one run for each combination of values a,b")
+    parser.add_argument("--config-dir", metavar="DIR", help="folder with groups and options of your own")
+    arguments = parser.parse_intermixed_args(words)
+    from gensig.compose import compose, override_keys
+
+    if not arguments.multirun:
+        override_keys(arguments.overrides)
+        _train_one(compose("train", arguments.overrides, config_dir=arguments.config_dir))
+        return 0
+    jobs = _expand(arguments.overrides, arguments.config_dir)
+    for number, config in enumerate(jobs, start=1):
+        print(f"run {number} of {len(jobs)}: {config['out']}", file=sys.stderr, flush=True)
+        _train_one(config)
+    return 0
+
+
+def _expand(overrides: Sequence[str], config_dir: str | None) -> list[dict[str, Any]]:
+    """Configurations of a multirun, each with its own ``out``; all composed before the first one runs."""
+    from gensig.compose import compose, job_folders, sweep
+
+    jobs = sweep(overrides)
+    configs = [compose("train", job, config_dir=config_dir) for job in jobs]
+    parents = {str(config["out"]) for config in configs}
+    if len(parents) > 1:
+        raise ConfigError("out must be one folder; with -m each run gets a folder below it")
+    parent = Path(parents.pop())
+    refuse_existing(parent)
+    return [{**config, "out": str(parent / name)} for config, name in zip(configs, job_folders(jobs), strict=True)]
+
+
+def _train_one(config: dict[str, Any]) -> None:
+    from diagnose.settings import settings_from
+
+    settings = settings_from(config)
+    out = Path(settings.out)
+    refuse_existing(out)
+    from diagnose.progress import progress
+    from diagnose.protocols import choose_protocols
+    from diagnose.report import result_table, write_report
+    from diagnose.study import plan_study, run_study, task_from
+    from gensig.dataset.reader import open_dataset
+
+    task = task_from(open_dataset(settings.data), settings)
+    protocols, jobs = plan_study(task, settings)
+    for name, reason in choose_protocols(task.dataset, settings.protocols)[1].items():
+        print(f"protocol {name} is left out: {reason}", file=sys.stderr, flush=True)
+    out.mkdir(parents=True, exist_ok=True)
+    with progress(len(jobs)) as on_done:
+        metrics = run_study(task, settings, out, protocols=protocols, jobs=jobs, on_done=on_done)
+    page = write_report(out, metrics)
+    print("\n".join(result_table(metrics)))
+    print(f"report: {page}")
