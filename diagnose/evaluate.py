@@ -8,7 +8,7 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from diagnose.model_io import ModelDescription, data_fingerprint, schema_version
-from diagnose.windows import Segments, Task, all_segments, load_windows, subset_segments, task_of
+from diagnose.windows import Segments, Task, all_segments, subset_segments, task_of
 from gensig.errors import ConfigError, DatasetError
 
 if TYPE_CHECKING:
@@ -49,10 +49,11 @@ def evaluate_model(
     from diagnose.metrics import over_records
     from diagnose.study import score_predictions
     from diagnose.train import predict_windows
+    from diagnose.turns import load_inputs
 
     task = _matching_task(description, dataset)
     segments, part = _segments(task, description, protocol, subset)
-    windows = load_windows(task, segments)
+    windows = load_inputs(task, segments, description.model)
     record, log_probability = over_records(predict_windows(model, windows), windows.record)
     scores = score_predictions(task, [(record, log_probability.argmax(axis=1))], description.n_bootstrap)
     return {

@@ -6,7 +6,7 @@ Each piece runs with one thread, in a spawned process or, when there is one core
 from __future__ import annotations
 
 import multiprocessing
-from collections.abc import Callable, Iterator, Sequence
+from collections.abc import Callable, Iterator, Mapping, Sequence
 from concurrent.futures import ProcessPoolExecutor, as_completed
 from concurrent.futures.process import BrokenProcessPool
 from contextlib import contextmanager
@@ -20,12 +20,14 @@ from diagnose.baselines import Prediction as BaselinePrediction
 from diagnose.baselines import indicator_model, nearest_spectrum, ridge_model, rms_threshold
 from diagnose.domain import Domain, fit_domain
 from diagnose.features import Cache, feature_table
+from diagnose.heads import predict_heads
 from diagnose.metrics import over_records
 from diagnose.predictions import Prediction
 from diagnose.settings import TrainSettings
 from diagnose.train import input_scale, predict_windows, train_network, with_shuffled_labels
+from diagnose.turns import load_inputs, wants_turns
 from diagnose.window_features import rocket_tables, spectrum_table
-from diagnose.windows import SUBSETS, Task, WindowSet, load_windows, subset_segments
+from diagnose.windows import SUBSETS, Task, WindowSet, subset_segments
 from gensig.errors import GensigError
 
 
@@ -86,7 +88,7 @@ def run_job(task: Task, settings: TrainSettings, job: Job) -> list[Prediction]:
 
 def _run_training(task: Task, settings: TrainSettings, protocol: str, seed: int, shuffled: bool) -> Prediction:
     n_classes = len(task.class_names)
-    train, validation, test = (_windows(task, protocol)[subset] for subset in SUBSETS)
+    train, validation, test = (_windows(task, protocol, settings.model)[subset] for subset in SUBSETS)
     if shuffled:
         rng = np.random.default_rng([seed, 2])
         train = with_shuffled_labels(train, n_classes, rng)
@@ -112,6 +114,7 @@ def _run_training(task: Task, settings: TrainSettings, protocol: str, seed: int,
         validation_loss=training.validation_loss,
         temperature=training.temperature,
         last_predicted=last.argmax(axis=1),
+        heads={} if shuffled else predict_heads(training.model, test),
     )
 
 
@@ -152,16 +155,22 @@ def _fit_baseline(task: Task, settings: TrainSettings, protocol: str, method: st
 
 
 # Windows of the protocol a process works on; jobs come protocol by protocol.
-_loaded: dict[str, dict[str, WindowSet]] = {}
+_loaded: dict[tuple[str, bool], dict[str, WindowSet]] = {}
 _domains: dict[str, Domain] = {}
 _work: dict[str, Any] = {}
 
 
-def _windows(task: Task, protocol: str) -> dict[str, WindowSet]:
-    if protocol not in _loaded:
+def _windows(task: Task, protocol: str, model_config: Mapping[str, Any] | None = None) -> dict[str, WindowSet]:
+    """Windows of time, or what a network of this configuration reads."""
+    config = model_config or {}
+    key = (protocol, wants_turns(config))
+    if key not in _loaded:
         _loaded.clear()
-        _loaded[protocol] = {name: load_windows(task, subset_segments(task, protocol, name)) for name in SUBSETS}
-    return _loaded[protocol]
+        _loaded[key] = {
+            name: load_inputs(task, subset_segments(task, protocol, name), config, training=name == "train")
+            for name in SUBSETS
+        }
+    return _loaded[key]
 
 
 def _domain(protocol: str, train: WindowSet, validation: WindowSet) -> Domain:

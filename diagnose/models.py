@@ -9,12 +9,14 @@ from typing import Any
 import torch
 from torch import nn
 
+from diagnose.network import Network
+from diagnose.order_cnn import OrderCnn
 from diagnose.spectrum import SpectrumCnn
 from diagnose.wdcnn import Wdcnn
 from gensig.errors import ConfigError
 
 
-class SmallCnn(nn.Module):
+class SmallCnn(Network):
     """One-dimensional convolutional network with a wide, strided first kernel.
 
     The first kernel spans a mesh period rather than a few samples, as in Zhang, Peng, Li, Chen & Zhang (2017), "A new
@@ -29,9 +31,8 @@ class SmallCnn(nn.Module):
     kernels : kernel of each block, in its input samples
     strides : stride of each block
     dropout : share of pooled features dropped in training
+    heads : see `diagnose.settings.HEADS`
     """
-
-    input_scale: torch.Tensor
 
     def __init__(
         self,
@@ -43,11 +44,11 @@ class SmallCnn(nn.Module):
         kernels: Sequence[int],
         strides: Sequence[int],
         dropout: float,
+        heads: Sequence[str] = (),
     ) -> None:
-        super().__init__()
+        super().__init__(input_scale)
         if not len(widths) == len(kernels) == len(strides) > 0:
             raise ConfigError("model: widths, kernels and strides must be lists of the same length, one entry a block")
-        self.register_buffer("input_scale", torch.tensor(list(input_scale), dtype=torch.float32)[:, None])
         blocks: list[nn.Module] = []
         for n_in, n_out, kernel, stride in zip((n_channels, *widths), widths, kernels, strides, strict=False):
             convolution = nn.Conv1d(n_in, n_out, kernel, stride=stride, padding=kernel // 2, bias=False)
@@ -56,11 +57,12 @@ class SmallCnn(nn.Module):
             blocks += [convolution, nn.BatchNorm1d(n_out), nn.ReLU()]
         self.blocks = nn.Sequential(*blocks)
         self.head = nn.Sequential(nn.Dropout(dropout), nn.Linear(2 * widths[-1], n_classes))
+        self.add_heads(heads, 2 * widths[-1])
 
-    def forward(self, windows: torch.Tensor) -> torch.Tensor:
-        """Unnormalised class scores (window, class) of windows (window, channel, sample)."""
-        features = self.blocks(windows / self.input_scale)
-        return self.head(torch.cat([features.mean(dim=-1), features.amax(dim=-1)], dim=1))
+    def look(self, windows: torch.Tensor) -> tuple[torch.Tensor, None]:
+        """Mean and maximum over the window of the last block."""
+        maps = self.blocks(windows)
+        return torch.cat([maps.mean(dim=-1), maps.amax(dim=-1)], dim=1), None
 
 
 def _start_as_band_passes(weight: torch.Tensor) -> None:
@@ -79,12 +81,17 @@ def _start_as_band_passes(weight: torch.Tensor) -> None:
         weight.copy_(2 * size * carrier * torch.hann_window(kernel, periodic=False))
 
 
-MODELS: dict[str, Callable[..., nn.Module]] = {"small_cnn": SmallCnn, "wdcnn": Wdcnn, "spectrum_cnn": SpectrumCnn}
+MODELS: dict[str, Callable[..., Network]] = {
+    "small_cnn": SmallCnn,
+    "wdcnn": Wdcnn,
+    "spectrum_cnn": SpectrumCnn,
+    "order_cnn": OrderCnn,
+}
 
 
 def build_model(
     config: Mapping[str, Any], *, n_channels: int, n_classes: int, input_scale: Sequence[float] | None = None
-) -> nn.Module:
+) -> Network:
     """Network of a configuration: ``kind`` names an entry of `MODELS`, ``name`` is only shown, the rest are parameters.
 
     Raises

@@ -3,8 +3,8 @@
 from __future__ import annotations
 
 import csv
-from collections.abc import Sequence
-from dataclasses import dataclass
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass, field
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
@@ -30,6 +30,7 @@ class Prediction:
     detail : what was fitted or trained, in words
     weights, domain, best_epoch, validation_loss, temperature, last_predicted : of networks only; `temperature` as in
         `diagnose.calibration`, `last_predicted` (record,) the labels that the weights of the last epoch give
+    heads : of a network that has them, `diagnose.heads.predict_heads`
     """
 
     protocol: str
@@ -44,6 +45,7 @@ class Prediction:
     validation_loss: tuple[float, ...] = ()
     temperature: float = 1.0
     last_predicted: NDArray[np.integer] | None = None
+    heads: Mapping[str, NDArray[np.floating]] = field(default_factory=dict)
 
     @property
     def predicted(self) -> NDArray[np.integer]:

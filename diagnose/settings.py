@@ -11,6 +11,7 @@ from gensig.errors import ConfigError
 
 BASELINES = ("indicators", "indicators_without_level", "rms_threshold", "nearest_spectrum", "minirocket")
 DEVICES = ("auto", "cpu", "cuda")
+HEADS = ("severity", "gear")
 LEAST_ROCKET_FEATURES = 84  # one for each of the kernels
 
 
@@ -34,6 +35,7 @@ class TrainSettings:
     learning_rate: float
     weight_decay: float
     epoch_fraction: float
+    heads: tuple[str, ...]
     shuffle_control: bool
     n_seeds_control: int
     baselines: tuple[str, ...]
@@ -72,6 +74,11 @@ class TrainSettings:
                 f"baselines must be false or a list of different names out of {', '.join(BASELINES)}, "
                 f"not {', '.join(str(name) for name in self.baselines)}"
             )
+        if len(set(self.heads)) < len(self.heads) or not set(self.heads) <= set(HEADS):
+            raise ConfigError(
+                f"heads must be false or a list of different names out of {', '.join(HEADS)}, "
+                f"not {', '.join(str(name) for name in self.heads)}"
+            )
         if self.features not in ("basic", "all"):
             raise ConfigError(f"features must be basic or all, not {self.features!r}")
         if self.device not in DEVICES:
@@ -94,6 +101,7 @@ def settings_from(config: Mapping[str, Any]) -> TrainSettings:
     if values["seeds"] is None:
         raise ConfigError("seeds must be a list of different values, at least one")
     values["baselines"] = () if values["baselines"] is False else _as_tuple("baselines", values["baselines"]) or ()
+    values["heads"] = () if values["heads"] is False else _as_tuple("heads", values["heads"]) or ()
     values["data"], values["out"] = str(values["data"]), str(values["out"])
     return TrainSettings(**values)
 

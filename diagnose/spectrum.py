@@ -8,6 +8,7 @@ from collections.abc import Sequence
 import torch
 from torch import nn
 
+from diagnose.network import Network
 from gensig.errors import ConfigError
 
 
@@ -29,7 +30,7 @@ def log_spectrum(windows: torch.Tensor, floor: float) -> torch.Tensor:
     return torch.log(magnitude + floor)
 
 
-class SpectrumCnn(nn.Module):
+class SpectrumCnn(Network):
     """Small convolutional network on the log-magnitude spectrum of the window: blind to phase and to where in time.
 
     The spectrum has the mean over its bins taken off, channel by channel, so that gain does not tell. The last map is
@@ -43,9 +44,8 @@ class SpectrumCnn(nn.Module):
     widths, kernels, strides : channels after each block, its kernel in its input's bins, its stride
     n_bands : equal parts of the frequency axis that the class scores tell apart
     dropout : share of pooled features dropped in training
+    heads : see `diagnose.settings.HEADS`
     """
-
-    input_scale: torch.Tensor
 
     def __init__(
         self,
@@ -59,13 +59,13 @@ class SpectrumCnn(nn.Module):
         strides: Sequence[int],
         n_bands: int,
         dropout: float,
+        heads: Sequence[str] = (),
     ) -> None:
-        super().__init__()
+        super().__init__(input_scale)
         if not len(widths) == len(kernels) == len(strides) > 0:
             raise ConfigError("model: widths, kernels and strides must be lists of the same length, one entry a block")
         if not floor > 0:
             raise ConfigError(f"model: floor must be greater than 0, not {floor!r}")
-        self.register_buffer("input_scale", torch.tensor(list(input_scale), dtype=torch.float32)[:, None])
         self.floor = float(floor)
         blocks: list[nn.Module] = []
         for n_in, n_out, kernel, stride in zip((n_channels, *widths), widths, kernels, strides, strict=False):
@@ -74,9 +74,10 @@ class SpectrumCnn(nn.Module):
         self.blocks = nn.Sequential(*blocks)
         self.mean, self.maximum = nn.AdaptiveAvgPool1d(n_bands), nn.AdaptiveMaxPool1d(n_bands)
         self.head = nn.Sequential(nn.Flatten(), nn.Dropout(dropout), nn.Linear(2 * widths[-1] * n_bands, n_classes))
+        self.add_heads(heads, 2 * widths[-1] * n_bands)
 
-    def forward(self, windows: torch.Tensor) -> torch.Tensor:
-        """Unnormalised class scores (window, class) of windows (window, channel, sample)."""
-        spectrum = log_spectrum(windows / self.input_scale, self.floor)
-        features = self.blocks(spectrum - spectrum.mean(dim=-1, keepdim=True))
-        return self.head(torch.cat([self.mean(features), self.maximum(features)], dim=1))
+    def look(self, windows: torch.Tensor) -> tuple[torch.Tensor, None]:
+        """Mean and maximum of every band of the last block."""
+        spectrum = log_spectrum(windows, self.floor)
+        maps = self.blocks(spectrum - spectrum.mean(dim=-1, keepdim=True))
+        return torch.cat([self.mean(maps), self.maximum(maps)], dim=1).flatten(start_dim=1), None

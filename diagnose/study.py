@@ -7,7 +7,7 @@ import platform
 import sys
 import time
 from collections.abc import Callable, Sequence
-from dataclasses import asdict
+from dataclasses import asdict, replace
 from pathlib import Path
 from typing import Any
 
@@ -15,6 +15,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from diagnose.calibration import calibration_scores
+from diagnose.heads import head_scores
 from diagnose.jobs import Job, run_jobs
 from diagnose.metrics import SCORES, confusion_by_unit, recall, score_with_interval
 from diagnose.model_io import data_fingerprint, model_description, save_model
@@ -23,6 +24,7 @@ from diagnose.predictions import Prediction, write_predictions
 from diagnose.protocols import choose_protocols
 from diagnose.settings import BASELINES, TrainSettings
 from diagnose.train import device_of
+from diagnose.turns import completed, n_points, wants_turns
 from diagnose.windows import SUBSETS, Task, plan_windows, subset_segments, task_of
 from gensig.errors import ConfigError
 from gensig.version import __version__
@@ -57,7 +59,8 @@ def plan_study(task: Task, settings: TrainSettings) -> tuple[tuple[str, ...], li
                 name = task.class_names[int(present[0])]
                 raise ConfigError(f"protocol {protocol}: one class only in its {subset} part ({name})")
     model = build_model(settings.model, n_channels=len(task.channel_names), n_classes=len(task.class_names))
-    check_window(model, len(task.channel_names), task.window_samples)
+    n_read = n_points(settings.model) if wants_turns(settings.model) else task.window_samples
+    check_window(model, len(task.channel_names), n_read)
     device_of(settings.device)
     jobs = [Job(protocols=protocols, seed=None)] if settings.baselines else []
     for protocol in protocols:
@@ -78,6 +81,11 @@ def task_from(dataset: Any, settings: TrainSettings) -> Task:
         classes=settings.classes,
         channels=settings.channels,
     )
+
+
+def settings_for(dataset: Any, settings: TrainSettings) -> TrainSettings:
+    """The settings with what the network must know of an open data set, see `diagnose.turns.completed`."""
+    return replace(settings, model=completed(settings.model, dataset.attributes, settings.heads))
 
 
 def run_study(
@@ -229,6 +237,7 @@ def _protocol_result(
         "best_epoch": [run.best_epoch for run in network],
         "last_epoch": _last_epoch(task, settings, network),
         "calibration": _calibration(task, network),
+        "heads": head_scores(task, parts["train"], network, n_bootstrap=settings.n_bootstrap),
     }
 
 

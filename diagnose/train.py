@@ -16,12 +16,16 @@ from torch.nn.functional import cross_entropy, log_softmax
 from diagnose.calibration import fit_temperature
 from diagnose.metrics import over_records
 from diagnose.models import build_model
+from diagnose.network import Network
 from diagnose.settings import TrainSettings
+from diagnose.targets import further_loss, place_loss
 from diagnose.windows import WindowSet
 from gensig.errors import ConfigError, SimulationError
 
 FloatArray = NDArray[np.floating]
 IntArray = NDArray[np.integer]
+
+HEADS_WEIGHT = 0.3  # of each further head against the classes; assumed
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -37,8 +41,8 @@ class Training:
     temperature : of the best epoch's record predictions, see `diagnose.calibration.fit_temperature`
     """
 
-    model: nn.Module
-    last_model: nn.Module | None
+    model: Network
+    last_model: Network | None
     best_epoch: int
     validation_loss: tuple[float, ...]
     temperature: float
@@ -92,9 +96,10 @@ def train_network(
             for batch in np.array_split(rng.permutation(len(train))[:n_drawn], n_batches):
                 windows = torch.from_numpy(train.cut(batch, rng)).to(device)
                 label = torch.from_numpy(train.label[batch]).to(device)
+                targets = {name: torch.from_numpy(of[batch]).to(device) for name, of in train.targets.items()}
                 optimizer.zero_grad()
                 with _mixed_precision(device):
-                    loss = cross_entropy(model(windows), label, weight=weight)
+                    loss = _loss(model, windows, label, weight, targets)
                 loss.backward()
                 optimizer.step()
                 schedule.step()
@@ -117,6 +122,23 @@ def train_network(
         validation_loss=tuple(losses),
         temperature=fit_temperature(*_over_labelled_records(best_log_probability, validation)),
     )
+
+
+def _loss(
+    model: Network,
+    windows: torch.Tensor,
+    label: torch.Tensor,
+    weight: torch.Tensor,
+    targets: Mapping[str, torch.Tensor],
+) -> torch.Tensor:
+    """Cross-entropy of the classes, and beside it what the targets say of the heads and of the place of the fault."""
+    answers = model.answers(windows)
+    loss = cross_entropy(answers["classes"], label, weight=weight)
+    if model.further:
+        loss = loss + HEADS_WEIGHT * further_loss(answers, targets)
+    if "places" in answers and "place" in targets:
+        loss = loss + place_loss(answers["places"], label, targets["gear"], targets["place"], model.turns)
+    return loss
 
 
 def device_of(name: str) -> torch.device:
@@ -169,7 +191,7 @@ def _over_labelled_records(log_probability: FloatArray, windows: WindowSet) -> t
 
 
 def with_shuffled_labels(windows: WindowSet, n_classes: int, rng: np.random.Generator) -> WindowSet:
-    """Give every record a label that tells nothing of its class, all windows of a record the same.
+    """Give every record a label that tells nothing of its class, all windows of a record the same; no other targets.
 
     Within each true class all labels are dealt in the same proportions, in random order. A plain permutation leaves
     every class a majority label by chance, and a network that finds the classes then scores 0, 1/4, 1/2, ... at random.
@@ -187,7 +209,7 @@ def with_shuffled_labels(windows: WindowSet, n_classes: int, rng: np.random.Gene
         extra = rng.permutation(left)[:n_missing] if n_missing <= left.size else rng.choice(left, n_missing)
         shuffled[members] = rng.permutation(np.concatenate([dealt, extra]))
     assert records.size == shuffled.size
-    return replace(windows, label=shuffled[position])
+    return replace(windows, label=shuffled[position], targets={})
 
 
 def input_scale(windows: WindowSet) -> list[float]:

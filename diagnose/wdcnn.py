@@ -7,10 +7,12 @@ from collections.abc import Sequence
 import torch
 from torch import nn
 
+from diagnose.network import Network
+
 FIRST_KERNEL, FIRST_STRIDE, FIRST_PADDING = 64, 16, 24
 
 
-class Wdcnn(nn.Module):
+class Wdcnn(Network):
     """Deep convolutional network with a wide first kernel, as published; several channels enter side by side.
 
     A first convolution of 64 samples with stride 16, then convolutions of 3 samples, the last one without padding. Each
@@ -28,12 +30,11 @@ class Wdcnn(nn.Module):
     widths : channels after each convolution, the first one included
     n_positions : of the last map that the hidden layer sees
     n_hidden : units of the hidden layer
+    heads : see `diagnose.settings.HEADS`
 
     Source: Zhang, Peng, Li, Chen & Zhang (2017), "A new deep learning model for fault diagnosis with good anti-noise
     and domain adaptation ability on raw vibration signals", Sensors 17 (2), 425, table 2.
     """
-
-    input_scale: torch.Tensor
 
     def __init__(
         self,
@@ -44,9 +45,9 @@ class Wdcnn(nn.Module):
         widths: Sequence[int],
         n_positions: int,
         n_hidden: int,
+        heads: Sequence[str] = (),
     ) -> None:
-        super().__init__()
-        self.register_buffer("input_scale", torch.tensor(list(input_scale), dtype=torch.float32)[:, None])
+        super().__init__(input_scale)
         layers: list[nn.Module] = []
         for index, (n_in, n_out) in enumerate(zip((n_channels, *widths), widths, strict=False)):
             if index == 0:
@@ -63,7 +64,8 @@ class Wdcnn(nn.Module):
             nn.ReLU(),
         )
         self.head = nn.Linear(n_hidden, n_classes)
+        self.add_heads(heads, n_hidden)
 
-    def forward(self, windows: torch.Tensor) -> torch.Tensor:
-        """Unnormalised class scores (window, class) of windows (window, channel, sample)."""
-        return self.head(self.hidden(self.blocks(windows / self.input_scale)))
+    def look(self, windows: torch.Tensor) -> tuple[torch.Tensor, None]:
+        """Units of the hidden layer."""
+        return self.hidden(self.blocks(windows)), None

@@ -3,8 +3,8 @@
 from __future__ import annotations
 
 import difflib
-from collections.abc import Sequence
-from dataclasses import dataclass
+from collections.abc import Callable, Mapping, Sequence
+from dataclasses import dataclass, field
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
@@ -158,6 +158,7 @@ class WindowSet:
     segment, start : (window,) segment of each window, and its first sample in that segment
     label, record : (window,)
     window_samples, normalise : as in `Task`
+    targets : what is known beside the label, one value a window; see `diagnose.targets`
     """
 
     signals: tuple[NDArray[np.float32], ...]
@@ -167,6 +168,7 @@ class WindowSet:
     record: IntArray
     window_samples: int
     normalise: str
+    targets: Mapping[str, NDArray[Any]] = field(default_factory=dict)
 
     def __len__(self) -> int:
         return int(self.segment.size)
@@ -187,8 +189,11 @@ class WindowSet:
         return normalised(chosen, self.normalise)
 
 
-def load_windows(task: Task, segments: Segments) -> WindowSet:
-    """Read the stretches into memory (4 bytes a sample) and plan their windows.
+Read = Callable[["Task", int, int, int], NDArray[np.float32]]
+
+
+def load_windows(task: Task, segments: Segments, *, read: Read | None = None) -> WindowSet:
+    """Read the stretches into memory (4 bytes a sample), by `read_signal` or ``read``, and plan their windows.
 
     Raises
     ------
@@ -199,7 +204,7 @@ def load_windows(task: Task, segments: Segments) -> WindowSet:
     rows = [(int(segments.record[i]), int(segments.start[i]), int(segments.stop[i])) for i in used]
     record = segments.record[used][segment]
     return WindowSet(
-        signals=tuple(read_signal(task, *row) for row in rows),
+        signals=tuple((read or read_signal)(task, *row) for row in rows),
         segment=segment,
         start=start - segments.start[used][segment],
         label=task.labels()[record],

@@ -69,10 +69,11 @@ def _train_one(config: dict[str, Any]) -> None:
     from diagnose.progress import progress
     from diagnose.protocols import choose_protocols
     from diagnose.report import result_table, write_report
-    from diagnose.study import plan_study, run_study, task_from
+    from diagnose.study import plan_study, run_study, settings_for, task_from
     from gensig.dataset.reader import open_dataset
 
     task = task_from(open_dataset(settings.data), settings)
+    settings = settings_for(task.dataset, settings)
     protocols, jobs = plan_study(task, settings)
     for name, reason in choose_protocols(task.dataset, settings.protocols)[1].items():
         print(f"protocol {name} is left out: {reason}", file=sys.stderr, flush=True)
