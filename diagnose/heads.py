@@ -29,7 +29,7 @@ def predict_heads(model: Network, windows: WindowSet, *, batch_size: int = 64) -
 
     Returns
     -------
-    severity : (record, 1) from 0 to 1, mean over the windows
+    severity : (record, class) from 0 to 1, mean over the windows: how severe, if it is of that class
     gear : (record, gear) mean log-probability of `diagnose.network.GEARS`
     """
     if not model.further:
@@ -59,8 +59,8 @@ def head_scores(task: Task, trained_on: IntArray, runs: Sequence[Prediction], *,
 
     Returns
     -------
-    severity_mae : class -> mean absolute error with its interval, and ``constant``, the error of saying for every record
-        the median severity of its class in the training; sound records do not count
+    severity_mae : class -> mean absolute error of what is said of the true class, with its interval, and ``constant``,
+        the error of the median severity of that class in the training; sound records do not count
     faulted_gear : balanced accuracy with its interval, and chance
     """
     rng = np.random.default_rng(BOOTSTRAP_SEED)
@@ -69,8 +69,8 @@ def head_scores(task: Task, trained_on: IntArray, runs: Sequence[Prediction], *,
     unit = np.asarray(task.dataset.column("unit_id"))[record]
     found: dict[str, Any] = {}
     if "severity" in truth and all("severity" in run.heads for run in runs):
-        said = np.stack([run.heads["severity"][:, 0] for run in runs])
         labels = task.labels()
+        said = np.stack([run.heads["severity"][np.arange(record.size), labels[record]] for run in runs])
         found["severity_mae"] = {
             name: _severity_error(
                 said[:, chosen],
@@ -119,27 +119,22 @@ def _severity_error(
     }
 
 
-def heads_table(results: Mapping[str, Any]) -> list[str]:
-    """Markdown lines on the further heads, by clean protocol; empty where there are none.
-
-    Parameters
-    ----------
-    results : ``protocols`` of ``metrics.json``
-    """
-    lines: list[str] = []
-    for name, result in results.items():
-        if result["leaky"] or not result["heads"]:
-            continue
-        parts = [
-            f"{kind} {row['mean']:.3f} [{row['low']:.3f}, {row['high']:.3f}]"
-            + ("" if row["constant"] is None else f" (constant {row['constant']:.3f})")
+def heads_notes(clean: Mapping[str, Any]) -> list[tuple[str, str]]:
+    """Title and sentence on the further heads, by clean protocol of ``metrics.json``; empty where there are none."""
+    notes = []
+    for name, result in clean.items():
+        said = [
+            f"severity of {kind} off by {_interval(row, '.3f')}"
+            + ("" if row["constant"] is None else f", by {row['constant']:.3f} if its usual one is said of all")
             for kind, row in result["heads"].get("severity_mae", {}).items()
         ]
-        text = f"- **{name}**: " + (f"severity off by {', '.join(parts)}" if parts else "")
         if "faulted_gear" in result["heads"]:
             gear = result["heads"]["faulted_gear"]
-            score = gear["balanced_accuracy"]
-            text += "; " if parts else ""
-            text += f"faulted gear {score['mean']:.2f} [{score['low']:.2f}, {score['high']:.2f}], {gear['chance']:.2f} by chance"
-        lines.append(text + ".")
-    return lines
+            said.append(f"faulted gear {_interval(gear['balanced_accuracy'], '.2f')}, {gear['chance']:.2f} by chance")
+        if said:
+            notes.append((f"{name}, severity and gear", "; ".join(said) + "."))
+    return notes
+
+
+def _interval(score: Mapping[str, Any], form: str) -> str:
+    return f"{score['mean']:{form}} [{score['low']:{form}}, {score['high']:{form}}]"

@@ -16,10 +16,9 @@ from diagnose.windows import Task, subset_segments
 from gensig.errors import DatasetError
 
 if TYPE_CHECKING:
-    from torch import nn
-
     from diagnose.domain import Domain
     from diagnose.jobs import Prediction
+    from diagnose.network import Network
     from gensig.dataset.reader import Dataset
 
 MODEL_SCHEMA_VERSION = 2
@@ -92,7 +91,7 @@ def save_model(folder: Path, weights: Mapping[str, np.ndarray], description: Mod
     (folder / DESCRIPTION).write_text(json.dumps(asdict(description), indent=2) + "\n", encoding="utf-8")
 
 
-def load_model(folder: str | Path) -> tuple[nn.Module, ModelDescription]:
+def load_model(folder: str | Path) -> tuple[Network, ModelDescription]:
     """Network in evaluation mode, and its description.
 
     Raises

@@ -11,7 +11,7 @@ from torch import nn
 from gensig.errors import ConfigError
 
 GEARS = ("none", "pinion", "wheel")
-N_OUTPUTS = {"severity": 1, "gear": len(GEARS)}  # of each further head, `diagnose.settings.HEADS`
+HEADS = ("severity", "gear")
 
 
 class Network(nn.Module, ABC):
@@ -47,21 +47,24 @@ class Network(nn.Module, ABC):
         Returns
         -------
         classes : (window, class)
-        severity, gear : (window, output) of the further heads that there are, see `N_OUTPUTS`
+        severity, gear : (window, output) of the further heads that there are, see `add_heads`
         places : (window, class, place) where the network sees a class, for one that looks at turns
         """
         features, maps = self.look(windows / self.input_scale)
         said = {"classes": self.head(features), **{name: head(features) for name, head in self.further.items()}}
         return said if maps is None or self.places is None else {**said, "places": self.places(maps)}
 
-    def add_heads(self, names: Sequence[str], n_features: int) -> None:
-        """Add linear heads of `N_OUTPUTS`; they are drawn last, so that the other weights are what they are without.
+    def add_heads(self, names: Sequence[str], n_features: int, n_classes: int) -> None:
+        """Add linear heads: a severity for each class, a score for each of `GEARS`.
+
+        They are drawn last, so that the other weights start as they do without.
 
         Raises
         ------
         ConfigError    for a head that does not exist
         """
+        n_outputs = dict(zip(HEADS, (n_classes, len(GEARS)), strict=True))
         for name in names:
-            if name not in N_OUTPUTS:
-                raise ConfigError(f"no head '{name}'; there is {', '.join(N_OUTPUTS)}")
-            self.further[name] = nn.Linear(n_features, N_OUTPUTS[name])
+            if name not in n_outputs:
+                raise ConfigError(f"no head '{name}'; there is {', '.join(HEADS)}")
+            self.further[name] = nn.Linear(n_features, n_outputs[name])

@@ -72,7 +72,7 @@ class OrderCnn(Network):
         n_features = len(gears) * widths[-1]
         self.head = nn.Sequential(nn.Dropout(dropout), nn.Linear(n_features, n_classes))
         self.places = nn.Conv1d(widths[-1], n_classes, 1)
-        self.add_heads(heads, n_features)
+        self.add_heads(heads, n_features, n_classes)
 
     def look(self, windows: torch.Tensor) -> tuple[torch.Tensor, torch.Tensor]:
         """Maximum over the places of each gear's turn, one gear after the other; the maps of all turns."""

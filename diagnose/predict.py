@@ -12,15 +12,15 @@ import numpy as np
 from numpy.typing import NDArray
 
 from diagnose.calibration import probabilities
+from diagnose.turns import packed_turns, turn_set, wants_turns
 from diagnose.windows import Segments, WindowSet, plan_windows
 from gensig.errors import ConfigError
 from gensig.signals.recording import Recording, RecordingFile, read_file, recording_of, without_unit
 
 if TYPE_CHECKING:
-    from torch import nn
-
     from diagnose.domain import Domain
     from diagnose.model_io import ModelDescription
+    from diagnose.network import Network
 
 RATE_OPTION = "--sampling-rate"
 RATE_TOLERANCE = 1e-3
@@ -57,7 +57,7 @@ class Source:
 
 
 def predict_recording(
-    model: nn.Module, description: ModelDescription, domain: Domain | None, source: Source
+    model: Network, description: ModelDescription, domain: Domain | None, source: Source
 ) -> dict[str, Any]:
     """Class probabilities of a recording and of its windows, and the out-of-distribution flag.
 
@@ -73,28 +73,33 @@ def predict_recording(
     ConfigError    for a recording that cannot be read, is too short or too slowly sampled, or whose channels do not fit
     """
     from diagnose.domain import distances
+    from diagnose.heads import predict_heads
     from diagnose.metrics import over_records
+    from diagnose.network import GEARS
     from diagnose.train import predict_windows
 
     recording, channels = _read(description, source)
-    windows = _windows(_resampled(recording, description, source.file), description, source.file)
+    windows = _windows(_resampled(recording, description, source.file), description, source)
     log_probability = predict_windows(model, windows)
     overall = probabilities(over_records(log_probability, windows.record)[1], description.temperature)[0]
     distance = None if domain is None else distances(domain, windows)
     beyond = None if domain is None or distance is None else distance > domain.threshold
     reasons = _reasons(description, source, beyond)
     names, rate = description.class_names, description.sampling_rate_hz
+    said = {name: values[0] for name, values in predict_heads(model, windows).items()}
     return {
         "recording": source.file,
         "class": names[int(overall.argmax())],
         "probability": float(overall.max()),
         "probabilities": dict(zip(names, overall.tolist(), strict=True)),
+        "severity": float(said["severity"][overall.argmax()]) if "severity" in said else None,
+        "gear": GEARS[int(said["gear"].argmax())] if "gear" in said else None,
         "out_of_distribution": None if beyond is None and not reasons else bool(reasons),
         "reasons": reasons,
         "n_windows": len(windows),
         "n_windows_beyond": None if beyond is None else int(beyond.sum()),
         "distance_threshold": None if domain is None else domain.threshold,
-        "window_duration_s": description.window_samples / rate,
+        "window_duration_s": _window_duration(description, recording),
         "windows": [
             {
                 "start_s": float(start / rate),
@@ -115,6 +120,8 @@ def predict_recording(
 def summary(result: dict[str, Any]) -> str:
     """One line for people."""
     said = f"{result['recording']}: {result['class']}, probability {result['probability']:.2f}"
+    if result["severity"] is not None and result["gear"] not in (None, "none"):
+        said += f", severity {result['severity']:.2f} on the {result['gear']}"
     n_windows, beyond = result["n_windows"], result["n_windows_beyond"]
     if result["out_of_distribution"]:
         return f"{said}; OUT OF DISTRIBUTION, do not rely on the class: {'; '.join(result['reasons'])}"
@@ -178,8 +185,11 @@ def _resampled(recording: Recording, description: ModelDescription, file: str) -
     return samples.astype(np.float32)
 
 
-def _windows(signal: NDArray[np.float32], description: ModelDescription, file: str) -> WindowSet:
-    """Windows as those of a record of a data set; the label is not used."""
+def _windows(signal: NDArray[np.float32], description: ModelDescription, source: Source) -> WindowSet:
+    """Windows, or turns, as those of a record of a data set; the label is not used."""
+    file = source.file
+    if wants_turns(description.model):
+        return _turns(signal, description, source)
     n_samples, rate = signal.shape[-1], description.sampling_rate_hz
     if n_samples < description.window_samples:
         raise ConfigError(
@@ -197,3 +207,22 @@ def _windows(signal: NDArray[np.float32], description: ModelDescription, file: s
         window_samples=description.window_samples,
         normalise=description.normalise,
     )
+
+
+def _window_duration(description: ModelDescription, recording: Recording) -> float:
+    """Seconds that one answer is about."""
+    if wants_turns(description.model):
+        return float(recording.acceleration.shape[-1] / recording.sampling_rate)
+    return description.window_samples / description.sampling_rate_hz
+
+
+def _turns(signal: NDArray[np.float32], description: ModelDescription, source: Source) -> WindowSet:
+    """The turns of the whole recording, for a network that reads them."""
+    if source.speed_rpm is None:
+        raise ConfigError(f"this model looks at turns and must know the speed: say --speed-rpm of {source.file}")
+    try:
+        turns = packed_turns(signal, description.sampling_rate_hz, source.speed_rpm, description.model)
+    except ValueError as error:
+        raise ConfigError(f"{source.file}: {error}") from None
+    nothing = np.zeros(1, dtype=np.int64)
+    return turn_set((turns,), nothing, nothing, description.normalise)

@@ -8,6 +8,7 @@ from pathlib import Path
 from typing import Any
 
 from diagnose.figures import confusion_figure, reliability_figure, scores_figure, severity_figure
+from diagnose.heads import heads_notes
 from diagnose.page import Section, Table, write_page
 from diagnose.protocols import MEANING
 from diagnose.report_text import (
@@ -130,7 +131,10 @@ def _fault_section(folder: Path, clean: Mapping[str, Any], metrics: Mapping[str,
         title="Which faults are found",
         text=[f"Share of the test records of each class that {model} recognises."],
         table=recall_table(clean, model, names),
-        notes=[(name, confusions(result["methods"][model]["confusion"], names)) for name, result in clean.items()],
+        notes=[
+            *((name, confusions(result["methods"][model]["confusion"], names)) for name, result in clean.items()),
+            *heads_notes(clean),
+        ],
     )
 
 

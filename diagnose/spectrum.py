@@ -74,7 +74,7 @@ class SpectrumCnn(Network):
         self.blocks = nn.Sequential(*blocks)
         self.mean, self.maximum = nn.AdaptiveAvgPool1d(n_bands), nn.AdaptiveMaxPool1d(n_bands)
         self.head = nn.Sequential(nn.Flatten(), nn.Dropout(dropout), nn.Linear(2 * widths[-1] * n_bands, n_classes))
-        self.add_heads(heads, 2 * widths[-1] * n_bands)
+        self.add_heads(heads, 2 * widths[-1] * n_bands, n_classes)
 
     def look(self, windows: torch.Tensor) -> tuple[torch.Tensor, None]:
         """Mean and maximum of every band of the last block."""

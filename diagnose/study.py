@@ -24,7 +24,7 @@ from diagnose.predictions import Prediction, write_predictions
 from diagnose.protocols import choose_protocols
 from diagnose.settings import BASELINES, TrainSettings
 from diagnose.train import device_of
-from diagnose.turns import completed, n_points, wants_turns
+from diagnose.turns import check_turns, completed, n_points, wants_turns
 from diagnose.windows import SUBSETS, Task, plan_windows, subset_segments, task_of
 from gensig.errors import ConfigError
 from gensig.version import __version__
@@ -53,7 +53,10 @@ def plan_study(task: Task, settings: TrainSettings) -> tuple[tuple[str, ...], li
     for protocol in protocols:
         for subset in SUBSETS:
             segments = subset_segments(task, protocol, subset)
-            plan_windows(segments, task.window_samples, task.stride_samples)
+            if wants_turns(settings.model):
+                check_turns(task, segments, str(settings.model.get("name", "network")))
+            else:
+                plan_windows(segments, task.window_samples, task.stride_samples)
             present = np.unique(labels[segments.record])
             if subset != "validation" and present.size < 2:
                 name = task.class_names[int(present[0])]

@@ -67,19 +67,22 @@ def fault_places(
     return place
 
 
-def further_loss(answers: Mapping[str, torch.Tensor], targets: Mapping[str, torch.Tensor]) -> torch.Tensor:
+def further_loss(
+    answers: Mapping[str, torch.Tensor], label: torch.Tensor, targets: Mapping[str, torch.Tensor]
+) -> torch.Tensor:
     """Loss of the severity and gear heads of a batch, those that there are, each weighing as much as the other.
 
     Parameters
     ----------
     answers : of `diagnose.network.Network.answers`
+    label : (window,) class, whose severity counts
     targets : of `record_targets`; a NaN severity does not count, and what is missing does not either
     """
     loss = next(iter(answers.values())).new_zeros(())
     if "severity" in answers and "severity" in targets:
         known = ~torch.isnan(targets["severity"])
         if known.any():
-            said = answers["severity"].squeeze(1)[known]
+            said = answers["severity"][known, label[known]]
             loss = loss + binary_cross_entropy_with_logits(said, targets["severity"][known])
     if "gear" in answers and "gear" in targets:
         loss = loss + cross_entropy(answers["gear"], targets["gear"])

@@ -135,7 +135,7 @@ def _loss(
     answers = model.answers(windows)
     loss = cross_entropy(answers["classes"], label, weight=weight)
     if model.further:
-        loss = loss + HEADS_WEIGHT * further_loss(answers, targets)
+        loss = loss + HEADS_WEIGHT * further_loss(answers, label, targets)
     if "places" in answers and "place" in targets:
         loss = loss + place_loss(answers["places"], label, targets["gear"], targets["place"], model.turns)
     return loss

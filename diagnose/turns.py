@@ -39,6 +39,22 @@ def completed(model_config: Mapping[str, Any], attributes: Mapping[str, Any], he
     return {**config, N_TEETH: teeth}
 
 
+def check_turns(task: Task, segments: Segments, name: str) -> None:
+    """Refuse stretches that hold no turn of the driving gear, before anything is read.
+
+    Raises
+    ------
+    ConfigError    with the shortest one
+    """
+    speed = np.asarray(task.dataset.column("speed_rpm"), dtype=float)[segments.record]
+    turns = (segments.stop - segments.start) / task.dataset.sampling_rate * speed / 60
+    if turns.min() < 1:
+        raise ConfigError(
+            f"a stretch holds {turns.min():.2g} turns of the pinion, and model {name} needs "
+            "a whole one: leave the protocol out, make longer records or choose another model"
+        )
+
+
 def load_inputs(
     task: Task,
     segments: Segments,

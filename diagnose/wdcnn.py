@@ -64,7 +64,7 @@ class Wdcnn(Network):
             nn.ReLU(),
         )
         self.head = nn.Linear(n_hidden, n_classes)
-        self.add_heads(heads, n_hidden)
+        self.add_heads(heads, n_hidden, n_classes)
 
     def look(self, windows: torch.Tensor) -> tuple[torch.Tensor, None]:
         """Units of the hidden layer."""

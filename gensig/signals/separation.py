@@ -60,7 +60,7 @@ def separate_gears(
     -----
     Passage n is mesh + driving[n mod z1] + driven[n mod z2] + rest, solved for by least squares over all passages. A
     time-synchronous average is the same without the other gear, whose teeth it takes for noise: in a second of 8 turns
-    they weigh as much as the noise. A tooth that never passes is 0.
+    they weigh as much as the noise. The teeth of either gear are 0 in the mean; one that never passes is 0.
 
     Two-way layout without interaction: H. Scheffe (1959), "The analysis of variance", chapter 4.
     """
@@ -77,6 +77,10 @@ def separate_gears(
     passages = np.moveaxis(interpolate(x, position), -2, 0)
     mesh = passages.mean(axis=0)
     teeth = _tooth_parts((passages - mesh).reshape(n_passages, -1), n_teeth).reshape(-1, *mesh.shape)
+    for first, last in ((0, n_teeth[0]), (n_teeth[0], min(sum(n_teeth), n_teeth[0] + n_passages))):
+        common = teeth[first:last].mean(axis=0)  # of the teeth that pass: it belongs to no tooth
+        teeth[first:last] -= common
+        mesh = mesh + common
 
     def turn(of_teeth: FloatArray) -> FloatArray:
         whole = np.moveaxis(of_teeth, 0, -2).reshape(*x.shape[:-1], -1)

@@ -1,0 +1,87 @@
+"""Taking a mesh apart by the teeth of both gears: each gear gets its own part, whatever the other does."""
+
+import numpy as np
+import pytest
+from numpy.testing import assert_allclose
+
+from gensig.signals.averaging import time_synchronous_average
+from gensig.signals.separation import separate_gears
+
+TEETH, RATE, SAMPLES = (5, 12), 6400.0, 32
+MESH_HZ = 100.0  # 64 samples a passage
+
+
+def a_pair(n_passages, *, teeth=TEETH, noise=0.0, seed=0):
+    """Signal (2, sample) and its parts: sines of three orders of the mesh, of another size on every tooth."""
+    rng = np.random.default_rng(seed)
+    sizes = [rng.standard_normal((z, 2, 3)) for z in teeth]
+    sizes = [size - size.mean(axis=0) for size in sizes]
+    mesh = rng.standard_normal((2, 3))
+
+    def shape(per_passage):
+        t = np.arange(per_passage) / per_passage
+        bump = np.sin(np.pi * t) ** 2
+        return np.stack([bump * np.sin(2 * np.pi * order * t) for order in (1, 2, 3)])
+
+    passage = np.arange(n_passages)
+    size = mesh + sizes[0][passage % teeth[0]] + sizes[1][passage % teeth[1]]
+    signal = np.einsum("pco,os->cps", size, shape(64)).reshape(2, -1)
+    signal = signal + noise * rng.standard_normal(signal.shape)
+    parts = [np.einsum("pco,os->cps", part, shape(SAMPLES)).reshape(2, -1) for part in (*sizes, mesh[None])]
+    return signal, parts
+
+
+def separate(signal, **changes):
+    return separate_gears(
+        signal, RATE, **{"mesh_frequency": MESH_HZ, "n_teeth": TEETH, **changes}, samples_per_tooth=32
+    )
+
+
+def test_every_part_comes_back():
+    signal, (driving, driven, mesh) = a_pair(130)
+    found = separate(signal + 7.0)
+    for ours, expected in ((found.driving, driving), (found.driven, driven), (found.mesh, mesh)):
+        assert ours.shape == expected.shape
+        assert_allclose(ours, expected, atol=0.03 * np.abs(signal).max())
+
+
+def test_neither_gear_leaks_into_the_other_as_it_does_into_an_average():
+    """In passages that are no whole number of the other's turns an average keeps a share of them."""
+    signal, (driving, _, _) = a_pair(44)
+    own = separate(signal).driving
+    averaged = time_synchronous_average(signal, RATE, MESH_HZ / TEETH[0], TEETH[0] * SAMPLES)
+    averaged = averaged - np.tile(averaged.reshape(2, TEETH[0], SAMPLES).mean(axis=1), (1, TEETH[0]))
+    scale = np.abs(driving).max()
+    assert np.abs(own - driving).max() < 0.03 * scale
+    assert np.abs(averaged - driving).max() > 0.1 * scale
+
+
+def test_it_is_linear_and_blind_to_what_is_constant():
+    (a, _), (b, _) = a_pair(100, seed=1), a_pair(100, seed=2)
+    both, apart = separate(a + 2 * b - 3.0), (separate(a), separate(b))
+    for name in ("driving", "driven", "mesh"):
+        expected = getattr(apart[0], name) + 2 * getattr(apart[1], name)
+        assert_allclose(getattr(both, name), expected, atol=1e-9)
+
+
+def test_noise_falls_with_the_passages_of_a_tooth():
+    errors = []
+    for n_passages in (60, 240):
+        clean, _ = a_pair(n_passages)
+        noisy, _ = a_pair(n_passages, noise=1.0)
+        errors.append(np.std(separate(noisy).driving - separate(clean).driving))
+    assert_allclose(errors[0] / errors[1], 2.0, rtol=0.15)
+
+
+def test_what_lies_above_half_the_samples_is_taken_away_and_does_not_alias():
+    t = np.arange(64 * 100)
+    high = np.sin(2 * np.pi * 24 * t / 64)[None] * np.where(t // 64 % TEETH[0] == 2, 1.0, 0.0)
+    found = separate(high)
+    assert np.sqrt(np.mean(np.square(found.driving))) < 0.1 * np.sqrt(np.mean(np.square(high)))
+
+
+def test_less_than_a_turn_and_odd_samples_are_refused():
+    with pytest.raises(ValueError, match="4 passages of a tooth, less than 5"):
+        separate(np.zeros((1, 64 * 4)))
+    with pytest.raises(ValueError, match="even and at least 2, not 31"):
+        separate_gears(np.zeros((1, 6400)), RATE, MESH_HZ, TEETH, samples_per_tooth=31)
