@@ -25,7 +25,13 @@ from diagnose.windows import subset_segments
 from gensig.compose import compose
 from gensig.errors import ConfigError, DatasetError
 
-SMALL = ["model=order", "model.samples_per_tooth=32", "model.widths=[12,16,24]", "model.kernels=[17,5,5]"]
+SMALL = [
+    "model=order",
+    "heads=[severity,gear]",
+    "model.samples_per_tooth=32",
+    "model.widths=[12,16,24]",
+    "model.kernels=[17,5,5]",
+]
 PER_TOOTH = 2  # places: 32 samples a tooth over strides 4, 2, 2
 
 
