@@ -97,11 +97,9 @@ def _large(figure: Any, maps: Maps, row: _Row) -> Any:
     for place in np.ndindex(values.shape):
         if not np.isfinite(values[place]):
             continue
-        text = (
-            short(float(values[place])) if row.texts is None else f"{values[place] + 0.0:.2f}".replace("-0.00", "0.00")
-        )
+        text = short(float(values[place]))
         if row.texts is not None:
-            text += f"\n({row.texts[:, :, channel, band][place]:.2f})"
+            text = f"{round(float(values[place]), 2) + 0.0:.2f}\n({row.texts[:, :, channel, band][place]:.2f})"
         color = "white" if row.norm(values[place]) < DARK else "black"
         weight = "bold" if place == (speed, torque) else "normal"
         axes.text(place[1], place[0], text, ha="center", va="center", color=color, fontsize=9.5, fontweight=weight)

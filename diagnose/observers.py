@@ -110,12 +110,12 @@ def band_indicators(
     return np.where(np.isfinite(logarithm), logarithm, np.nan)
 
 
-def _turns(x: FloatArray, angle: FloatArray) -> FloatArray | None:
-    """Average turn, (channel, sample); None where there is no whole one."""
+def _turns(x: FloatArray, angle: FloatArray) -> FloatArray:
+    """Average turn, (channel, sample); of one sample where there is no whole one."""
     try:
         return average_turn(resample_by_angle(x, angle), min_turns=1)
     except ValueError:
-        return None
+        return np.full((len(x), 1), np.nan)
 
 
 def _orders(angle: FloatArray) -> FloatArray | None:
@@ -136,16 +136,14 @@ def _envelope_turns(magnitude: FloatArray, orders: FloatArray | None) -> FloatAr
     return np.divide(np.sqrt(np.sum(lines**2, axis=-1)), mean, out=np.full(len(kept), np.nan), where=mean > 0.0)
 
 
-def _of_average(average: FloatArray | None, highest_order: int, n_teeth: int) -> list[FloatArray]:
+def _of_average(average: FloatArray, highest_order: int, n_teeth: int) -> list[FloatArray]:
     """The indicators of an average turn up to some order, (channel,) each."""
-    if average is None:
-        return [np.full(1, np.nan)] * (len(OF_GEAR) - 1)
     n_samples = average.shape[-1]
     highest = min(highest_order, (n_samples - 1) // 2)
+    if highest <= n_teeth + (n_teeth - 1) // 2:  # no room for the mesh and its sidebands
+        return [np.full(len(average), np.nan)] * (len(OF_GEAR) - 1)
     # fewer samples a turn: nothing is left above the highest order, not even rounding
     turn = np.fft.irfft(np.fft.rfft(average)[:, : highest + 1], 2 * highest + 1) * ((2 * highest + 1) / n_samples)
-    if highest <= n_teeth + (n_teeth - 1) // 2:
-        return [np.full(len(average), np.nan)] * (len(OF_GEAR) - 1)
     ratios = [fm4(turn, n_teeth), sideband_ratio(turn, n_teeth), energy_ratio(turn, n_teeth)]
     return [*ratios, rms(residual_signal(turn, n_teeth))]
 
@@ -171,8 +169,8 @@ NOTHING_SEEN = Seen(d_prime=math.nan, standard_error=math.nan, auroc=math.nan, i
 def seen_by_indicators(sound: FloatArray, faulty: FloatArray) -> Seen:
     """Choose the indicator that tells best on all machines but one, and judge it on that one; each in turn.
 
-    Each machine is compared with the sound ones among the others: how many of their standard deviations it lies off, in
-    the direction in which the faulty ones of the others do.
+    A machine's score is how many standard deviations of the sound ones it lies off their mean, in the direction in
+    which the faulty ones of the others do: what was chosen for different machines is then on one scale.
 
     Parameters
     ----------
@@ -184,11 +182,12 @@ def seen_by_indicators(sound: FloatArray, faulty: FloatArray) -> Seen:
 
     Notes
     -----
-    d' is the difference of the means over the root mean square of both standard deviations, times
-    1 - 3 / (8 n - 9), which takes the bias of few machines away; its standard error is that of independent groups.
-    Both hold for one indicator chosen beforehand: L. V. Hedges (1981), "Distribution theory for Glass's estimator of
-    effect size", J. Educational Statistics 6 (2), 107-128. Without a fault both groups are the same numbers: d' is 0
-    and the AUROC 0.5, however many indicators there are.
+    d' is the difference of the means over the root mean square s of both standard deviations, times 1 - 3 / (4 n - 5),
+    which takes the bias of few machines away. The groups are the same n machines, so that the square of its standard
+    error is the variance of their own differences over n s^2, plus d'^2 / (2 n - 2) for s. Both hold for one indicator:
+    S. B. Morris & R. P. DeShon (2002), "Combining effect size estimates in meta-analysis with repeated measures and
+    independent-groups designs", Psychological Methods 7 (1), 105-125. Without a fault both groups are the same numbers:
+    d' is 0 and the AUROC 0.5, however many indicators there are.
     """
     known = np.isfinite(sound).any(axis=1) & np.isfinite(faulty).any(axis=1)
     sound, faulty = sound[known], faulty[known]
@@ -197,16 +196,15 @@ def seen_by_indicators(sound: FloatArray, faulty: FloatArray) -> Seen:
     if n_units < FEWEST_UNITS or usable.size == 0:
         return NOTHING_SEEN
     groups = np.stack([sound[:, usable], faulty[:, usable]])
+    middle, scale = groups[0].mean(axis=0), np.maximum(groups[0].std(axis=0, ddof=1), LEAST_SPREAD)
     scores = np.empty((2, n_units))
     chosen = np.empty(n_units, dtype=np.intp)
     for unit in range(n_units):
         others = np.delete(groups, unit, axis=1)
         difference = others[1].mean(axis=0) - others[0].mean(axis=0)
         chosen[unit] = best = int(np.argmax(np.abs(difference) / _spread(others)))
-        own = groups[:, unit, best] - others[0, :, best].mean()
-        scores[:, unit] = own / max(float(others[0, :, best].std(ddof=1)), LEAST_SPREAD)
-        if difference[best] < 0.0:
-            scores[:, unit] *= -1.0
+        own = (groups[:, unit, best] - middle[best]) / scale[best]
+        scores[:, unit] = own if difference[best] >= 0.0 else -own
     most = int(np.argmax(np.bincount(chosen)))
     raises = groups[1, :, most].mean() >= groups[0, :, most].mean()
     return _judged(*scores, indicator=int(usable[most]), raises=bool(raises))
@@ -229,12 +227,13 @@ def confirmed(sound: FloatArray, faulty: FloatArray, *, indicator: int, raises: 
 def _judged(sound: FloatArray, faulty: FloatArray, *, indicator: int, raises: bool) -> Seen:
     """Scores of the same machines without and with the fault, (unit,) each."""
     n_units = len(sound)
-    bias = 1.0 - 3.0 / (8.0 * n_units - 9.0)
+    bias = 1.0 - 3.0 / (4.0 * n_units - 5.0)
     spread = float(_spread(np.stack([sound, faulty])[:, :, None])[0])
     d_prime = bias * float(faulty.mean() - sound.mean()) / spread
+    of_mean = bias**2 * float(np.var(faulty - sound, ddof=1)) / (n_units * spread**2)
     return Seen(
         d_prime=d_prime,
-        standard_error=math.sqrt(2.0 / n_units + d_prime**2 / (4.0 * n_units)),
+        standard_error=math.sqrt(of_mean + d_prime**2 / (2.0 * n_units - 2.0)),
         auroc=_auroc(sound, faulty),
         indicator=indicator,
         raises=raises,
