@@ -51,7 +51,7 @@ def detectability_figure(path: Path, maps: Maps) -> None:
 
 
 def fault_text(fault: dict[str, Any]) -> str:
-    """The fault with its sizes: 'crack on the pinion (crack_depth_mm 1, crack_angle_deg 45)'."""
+    """The fault with its sizes: 'crack on the pinion (crack depth 1 mm, crack angle 45 deg)'."""
     parts = fault.get("parts") or [fault]
     return " and ".join(_part_text(part) for part in parts)
 
@@ -73,14 +73,14 @@ def _rows(maps: Maps) -> list[_Row]:
     return [
         _Row(
             title="Physically there",
-            label="d' of a matched filter that knows what the fault adds",
+            label="d' of a filter that knows what the fault adds",
             values=maps.known,
             norm=LogNorm(low, max(high, 1.01 * low)),
             texts=None,
         ),
         _Row(
             title="Seen by indicators among machines",
-            label="d' of the best indicator on machines not used to choose it",
+            label="d' of the indicator chosen on other machines",
             values=maps.seen,
             norm=Normalize(0.0, top),
             texts=maps.auroc,
@@ -107,7 +107,7 @@ def _large(figure: Any, maps: Maps, row: _Row) -> Any:
     axes.set_yticks(range(len(maps.speeds_rpm)), [f"{one:g}" for one in maps.speeds_rpm])
     inside = "d'" if row.texts is None else "d' (AUROC)"
     axes.set(xlabel="torque of the pinion, N m", ylabel="speed of the pinion, r/min")
-    test = f"{maps.channels[channel]}, up to {maps.bandwidths[band] / 1e3:g} kHz"
+    test = f"{maps.channels[channel]}, up to {maps.bandwidths[band] / 1e3:.3g} kHz"
     axes.set_title(f"{row.title}\nbest: {test}; in the cells {inside}", fontsize=10.5)
     return image
 
@@ -122,7 +122,7 @@ def _many(figure: Any, maps: Maps, row: _Row) -> Any:
         panel.set_xticks([])
         panel.set_yticks([])
         if channel == 0:
-            panel.set_title(f"to {maps.bandwidths[band] / 1e3:g} kHz", fontsize=9)
+            panel.set_title(f"to {maps.bandwidths[band] / 1e3:.3g} kHz", fontsize=9)
         if band == 0:
             panel.set_ylabel(maps.channels[channel], fontsize=9)
         if (channel, band) == (best_channel, best_band):

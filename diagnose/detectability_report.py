@@ -38,34 +38,13 @@ def place_text(maps: Maps, place: Sequence[int]) -> str:
     speed, torque, channel, band = place
     return (
         f"{maps.speeds_rpm[speed]:g} r/min, {maps.torques_nm[torque]:g} N m, {maps.channels[channel]}, up to "
-        f"{maps.bandwidths[band] / 1e3:g} kHz"
+        f"{maps.bandwidths[band] / 1e3:.3g} kHz"
     )
 
 
 def content(maps: Maps, again: Seen) -> dict[str, Any]:
-    """The keys of ``diagnose detectability --json``; one row a speed, torque, channel and bandwidth."""
-    speed, torque, channel, band = best = best_and_worst(maps.seen)[0]
-    bands = [0.0, *maps.bandwidths]
-    rows = []
-    for place in np.ndindex(maps.known.shape):
-        speed, torque, channel, band = place
-        chosen = int(maps.indicator[place])
-        rows.append(
-            {
-                "speed_rpm": maps.speeds_rpm[speed],
-                "torque_nm": maps.torques_nm[torque],
-                "channel": maps.channels[channel],
-                "bandwidth_hz": maps.bandwidths[band],
-                "band_hz": bands[band : band + 2],
-                "d_prime_known": _plain(maps.known[place]),
-                "d_prime_known_band": _plain(maps.known_band[place]),
-                "d_prime_seen": _plain(maps.seen[place]),
-                "standard_error_seen": _plain(maps.standard_error[place]),
-                "auroc_seen": _plain(maps.auroc[place]),
-                "indicator": maps.indicators[chosen] if chosen >= 0 else None,
-                "noise_rms_m_per_s2": _plain(maps.noise_rms[place[:3]]),
-            }
-        )
+    """The keys of ``diagnose detectability --json``; ``tests`` has a row a speed, torque, channel and bandwidth."""
+    best = best_and_worst(maps.seen)[0]
     return {
         "fault": maps.fault,
         "n_units": maps.n_units,
@@ -74,17 +53,32 @@ def content(maps: Maps, again: Seen) -> dict[str, Any]:
         "indicators": list(maps.indicators),
         "summary": summary(maps, again),
         "best_seen": {
-            "speed_rpm": maps.speeds_rpm[speed],
-            "torque_nm": maps.torques_nm[torque],
-            "channel": maps.channels[channel],
-            "bandwidth_hz": maps.bandwidths[band],
-            "indicator": maps.indicators[int(maps.indicator[best])],
+            **_test(maps, best),
             "fault_raises_it": bool(maps.raises[best]),
             "d_prime_on_others": _plain(again.d_prime),
             "standard_error_on_others": _plain(again.standard_error),
             "auroc_on_others": _plain(again.auroc),
         },
-        "tests": rows,
+        "tests": [_test(maps, place) for place in np.ndindex(maps.known.shape)],
+    }
+
+
+def _test(maps: Maps, place: tuple[int, ...]) -> dict[str, Any]:
+    speed, torque, channel, band = place
+    chosen = int(maps.indicator[place])
+    return {
+        "speed_rpm": maps.speeds_rpm[speed],
+        "torque_nm": maps.torques_nm[torque],
+        "channel": maps.channels[channel],
+        "bandwidth_hz": maps.bandwidths[band],
+        "band_low_hz": maps.bandwidths[band - 1] if band else 0.0,
+        "d_prime_known": _plain(maps.known[place]),
+        "d_prime_known_band": _plain(maps.known_band[place]),
+        "d_prime_seen": _plain(maps.seen[place]),
+        "standard_error_seen": _plain(maps.standard_error[place]),
+        "auroc_seen": _plain(maps.auroc[place]),
+        "indicator": maps.indicators[chosen] if chosen >= 0 else None,
+        "noise_rms_m_per_s2": _plain(maps.noise_rms[place[:3]]),
     }
 
 

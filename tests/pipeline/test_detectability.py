@@ -10,6 +10,7 @@ from numpy.testing import assert_allclose
 import gensig
 from diagnose.cli import main
 from diagnose.detectability import best_and_worst, make_maps, read_bandwidths
+from diagnose.detectability_figure import detectability_figure, fault_text
 from gensig.config import read_request
 from gensig.errors import GensigError
 from gensig.pairs import make_pairs
@@ -37,11 +38,13 @@ def one():
 
 
 @pytest.mark.parametrize("control", [("fault=crack", "plan.sham=true"), ("fault=crack", "fault.crack_depth_mm=0")])
-def test_no_fault_is_not_there_and_not_seen(control: tuple[str, ...]) -> None:
+def test_no_fault_is_not_there_and_not_seen(control: tuple[str, ...], tmp_path: Path) -> None:
     maps = maps_of(*control)
     assert (maps.known == 0.0).all()
     assert (maps.seen == 0.0).all()
     assert (maps.auroc == 0.5).all()
+    detectability_figure(tmp_path / "nothing.svg", maps)
+    assert "Physically there" in (tmp_path / "nothing.svg").read_text()
 
 
 def test_less_noise_tells_more(one) -> None:
@@ -160,8 +163,17 @@ def test_the_command_writes_everything(tmp_path: Path, capsys: pytest.CaptureFix
     assert len(found["tests"]) == 2 * 1 * 1 * 2
     best = max(found["tests"], key=lambda test: test["d_prime_known"])
     assert f"best at {best['speed_rpm']:g} r/min, 20 N m, pinion_y, up to 20 kHz" in lines[1]
-    assert set(found["best_seen"]) > {"indicator", "d_prime_on_others"}
+    assert found["best_seen"]["d_prime_seen"] == max(test["d_prime_seen"] for test in found["tests"])
+    assert f"(on 4 others {found['best_seen']['d_prime_on_others']:.2f} +- " in lines[0]
     assert figure.read_bytes().startswith(b"\x89PNG")
+
+
+def test_a_fault_is_named_with_its_sizes() -> None:
+    crack = {"kind": "crack", "gear": "pinion", "tooth": 3, "crack_depth_mm": 1.5, "crack_start": "arc_mid"}
+    assert fault_text(crack) == "crack on the pinion (crack depth 1.5 mm)"
+    missing = {"kind": "missing_tooth", "gear": "wheel", "tooth": 0}
+    assert fault_text(missing) == "missing tooth on the wheel"
+    assert fault_text({"kind": "compound", "parts": [crack, missing]}).count(" and ") == 1
 
 
 def test_a_map_without_any_value_is_refused() -> None:
