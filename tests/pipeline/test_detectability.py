@@ -8,11 +8,12 @@ import pytest
 from numpy.testing import assert_allclose
 
 import gensig
+import gensig.pairs
 from diagnose.cli import main
 from diagnose.detectability import best_and_worst, make_maps, read_bandwidths
 from diagnose.detectability_figure import detectability_figure, fault_text
 from gensig.config import read_request
-from gensig.errors import GensigError
+from gensig.errors import GensigError, SimulationError
 from gensig.pairs import make_pairs
 from gensig.records import simulate_record
 from gensig.rows import record_system, row_values, twin_start
@@ -139,6 +140,25 @@ def test_without_numbers_the_map_is_about_the_set_point() -> None:
     assert pairs.speeds_rpm == (250.0, 500.0, 1000.0, 1500.0, 2000.0)
     assert pairs.torques_nm == (2.0, 4.0, 8.0, 16.0)
     assert read_bandwidths(None, pairs) == (1000.0, 2000.0, 5000.0, 10000.0, 20000.0)
+
+
+def test_a_motion_that_does_not_stay_finite_is_left_out_and_counted(monkeypatch: pytest.MonkeyPatch) -> None:
+    simulate = gensig.pairs.simulate_with_lead_in
+
+    def one_fails(runs):
+        results = simulate(runs)
+        results[len(runs) // 2 + 1] = SimulationError("it did not stay finite")  # the second machine with its fault
+        return results
+
+    monkeypatch.setattr(gensig.pairs, "simulate_with_lead_in", one_fails)
+    pairs = gensig.fault_pairs(*SMALL, "fault=crack", speeds_rpm=[1800], torques_nm=[20], n_units=5)
+    cell = pairs.cell(0)
+    assert np.isnan(cell.residual).all(axis=(1, 2)).tolist() == [False, True, False, False, False]
+    maps = make_maps(pairs, BANDS, n_workers=1, on_done=lambda _text: None)
+    assert maps.n_failed == 1
+    left = np.delete(np.sum(cell.residual**2, axis=-1) / cell.noise_power, 1, axis=0)
+    assert maps.known[0, 0, 0, -1] == pytest.approx(np.median(np.sqrt(left)))
+    assert np.isfinite(maps.seen).all()
 
 
 def test_turns_and_random_walks_follow_the_plan() -> None:
