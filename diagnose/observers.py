@@ -40,7 +40,8 @@ def residual_energy(
 
     Returns
     -------
-    (..., band)    independent bands, and records after one another, add up: d' grows with the root of the duration
+    (..., band)    independent bands, and records after one another, add up: d' grows with the root of the duration;
+                   NaN without noise
 
     Source: the matched filter of a known signal in Gaussian noise, whitened: Van Trees (1968), "Detection, estimation,
     and modulation theory", part I, section 4.3.
@@ -51,7 +52,8 @@ def residual_energy(
     sides[0] = 1.0
     if n_samples % 2 == 0:
         sides[-1] = 1.0
-    energy = sides * np.abs(np.fft.rfft(residual, axis=-1)) ** 2 / n_samples / noise_density
+    power = sides * np.abs(np.fft.rfft(residual, axis=-1)) ** 2 / n_samples
+    energy = np.divide(power, noise_density, out=np.full(power.shape, np.nan), where=noise_density > 0.0)
     places = np.searchsorted(frequency, bandwidths, side="right")
     return np.stack([energy[..., low:high].sum(axis=-1) for low, high in zip([0, *places], places, strict=False)], -1)
 

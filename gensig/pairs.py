@@ -182,13 +182,12 @@ def make_pairs(
         raise ConfigError(f"{len(speeds)} speeds x {len(torques)} torques are more than {MOST_CELLS} cells; give fewer")
     own |= {"fault": without_vary(fault), "classes": {fault["kind"]: without_vary(fault)}}
     own["dataset"] = {**own["dataset"], "store_mesh_state": False}
-    before = own
-    own, rows = _planned(before, speeds, torques, n_units)
-    system = read_system(own)
+    planned, rows = _planned(own, speeds, torques, n_units)
+    system = read_system(planned)
     teeth = {"pinion": system.pair.pinion.n_teeth, "wheel": system.pair.wheel.n_teeth}
     faulted = dict.fromkeys(str(part["gear"]) for part in fault_parts(fault))
     return FaultPairs(
-        config=own,
+        config=planned,
         speeds_rpm=speeds,
         torques_nm=torques,
         n_units=n_units,
@@ -198,8 +197,8 @@ def make_pairs(
         usable_frequency=usable_band(system.sensing.sampling_rate)[1],
         duration=system.operating.duration,
         rows=tuple(rows),
-        noise_shape=None if system.sensing.has_white_noise else _noise_shape(own, system, rows[:n_units]),
-        fixed_power=_power_at_set_point(before, n_units) if fixed_noise else None,
+        noise_shape=None if system.sensing.has_white_noise else _noise_shape(planned, system, rows[:n_units]),
+        fixed_power=_power_at_set_point(own, n_units) if fixed_noise else None,
     )
 
 

@@ -59,6 +59,12 @@ def test_four_times_the_record_doubles_it(residual) -> None:
     )
 
 
+def test_without_noise_there_is_no_answer(residual) -> None:
+    found = residual_energy(residual, np.array([[1.0], [0.0]]), RATE, BANDS)
+    assert np.isfinite(found[:, 0]).all()
+    assert np.isnan(found[:, 1]).all()
+
+
 def test_noise_elsewhere_does_not_hide_a_tone() -> None:
     """White noise of the same power does: the observer knows the spectrum."""
     tone = np.sin(2.0 * math.pi * 1000.0 * np.arange(1000) / RATE)
