@@ -19,7 +19,7 @@ RECORDS_A_GROUP = 20  # fewer say little of four classes
 MOST_GROUPS = 5
 MOST_NAMES = 12  # more gearboxes than this are units, not a condition to compare
 LEAST_A_CLASS = 5  # records of each class that balanced accuracy needs in each group
-LEAST_UNITS_TESTED = 5  # on both sides of a comparison; the spread of fewer is guesswork
+LEAST_UNITS_TESTED = 4  # on both sides of a comparison; the spread of fewer is guesswork
 
 
 def condition_columns(dataset: Dataset, record: NDArray[np.integer]) -> dict[str, NDArray[Any]]:
