@@ -1,4 +1,4 @@
-"""Share of faults found against their size: a curve of hits and misses, and the sizes at which it passes 50 and 90 %."""
+"""Share of faults found against their size: a curve through hits and misses, and where it passes 50 and 90 %."""
 
 from __future__ import annotations
 

@@ -10,7 +10,7 @@ from numpy.typing import NDArray
 
 from diagnose.detection_curve import LEAST_RECORDS, LEAST_SIZES, SHARES, curve_at, fit_curves, limits
 from diagnose.groups import groups_of
-from diagnose.judged import Interval, Judged, finite, interval_text, units_drawn, with_interval
+from diagnose.judged import Interval, Judged, interval_text, units_drawn, with_interval
 
 if TYPE_CHECKING:
     from gensig.dataset.reader import Dataset
@@ -32,7 +32,7 @@ def detection_score(log_probability: FloatArray, healthy: int) -> FloatArray:
     return logsumexp(faulty, axis=-1) - log_probability[..., healthy]
 
 
-def alarm_threshold(scores: FloatArray, weight: FloatArray, *, new: bool) -> FloatArray:
+def alarm_threshold(scores: FloatArray, weight: NDArray[np.int64], *, new: bool) -> FloatArray:
     """(resample,) score above which at most 5 % of healthy records lie.
 
     With `new`, of healthy records like these but not among them: the score of rank ceil(0.95 (n + 1)), for which n must
@@ -70,9 +70,9 @@ def size_columns(dataset: Dataset, record: IntArray, severity: FloatArray) -> di
         values = np.asarray(dataset.column(name))[record]
         if values.ndim != 1 or values.dtype.kind != "f" or not np.isfinite(values).all() or (values <= 0).any():
             continue
-        if np.unique(values).size >= LEAST_SIZES and np.unique(severity).size >= LEAST_SIZES:
-            if spearmanr(values, severity).statistic >= SIZE_FOLLOWS_SEVERITY:
-                found[name.removeprefix("params/fault.")] = values
+        enough = min(np.unique(values).size, np.unique(severity).size) >= LEAST_SIZES
+        if enough and spearmanr(values, severity).statistic >= SIZE_FOLLOWS_SEVERITY:
+            found[name.removeprefix("params/fault.")] = values
     return found
 
 

@@ -37,7 +37,7 @@ def compare(
     """
     drawn = units_drawn(network.n_units, n_bootstrap, rng)
     mine = resampled_score(network, "balanced_accuracy", drawn, rng)
-    rows = []
+    rows: list[dict[str, Any]] = []
     for other in others:
         difference = score(network, "balanced_accuracy") - score(other, "balanced_accuracy")
         resampled = mine - resampled_score(other, "balanced_accuracy", drawn, rng)

@@ -79,8 +79,8 @@ def _sentence(method: str, rows: Sequence[dict[str, Any]], gain: dict[str, float
     if len(rows) == 1:
         return f"Records hold one window of {first['seconds']:.3g} s: nothing to compare."
     text = (
-        f"{method} scores {interval_text(first['balanced_accuracy'])} on the first {first['seconds']:.3g} s of a record "
-        f"and {interval_text(last['balanced_accuracy'])} on {last['seconds']:.3g} s"
+        f"{method} scores {interval_text(first['balanced_accuracy'])} on the first {first['seconds']:.3g} s of a "
+        f"record and {interval_text(last['balanced_accuracy'])} on {last['seconds']:.3g} s"
     )
     if gain["low"] is None or gain["high"] is None:
         return text + "."
