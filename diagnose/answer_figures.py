@@ -7,6 +7,7 @@ from pathlib import Path
 from typing import Any
 
 import numpy as np
+from numpy.typing import NDArray
 
 from diagnose.figures import COLORS, MARKERS, save, subplots
 
@@ -30,13 +31,16 @@ def conditions_figure(path: Path, answers: Answers) -> None:
         mine = [row for row in rows if row["column"] == column]
         numbers = mine[0]["low"] is not None
         at = [(row["low"] + row["high"]) / 2 if numbers else place for place, row in enumerate(mine)]
+        aside = 0.0 if numbers else 0.15
         for index, method in enumerate(methods):
-            _line_with_band(panel, at, [row["scores"][method] for row in mine], index, method, joined=numbers)
+            places = np.asarray(at) + index * aside
+            _line_with_band(panel, places, [row["scores"][method] for row in mine], index, method, joined=numbers)
         weak = [place for place, row in enumerate(mine) if (row["difference_at_most"] or 0) < 0]
         values = [mine[place]["scores"][methods[0]]["mean"] for place in weak]
         panel.plot([at[place] for place in weak], values, "o", markersize=14, fillstyle="none", color="black")
         if not numbers:
-            panel.set_xticks(at, [row["group"] for row in mine], rotation=30, ha="right", fontsize=8)
+            panel.set_xticks(at, [row["group"] for row in mine], rotation=20, fontsize=7)
+            panel.set_xlim(-0.5, len(mine) - 0.5 + aside)
         panel.set(xlabel=column.removeprefix("params/"), ylim=(-0.03, 1.03))
         panel.set_title(mine[0]["measure"].replace("_", " "), fontsize=9)
         panel.grid(alpha=0.3)
@@ -61,15 +65,15 @@ def detection_figure(path: Path, answers: Answers) -> None:
         for index, method in enumerate(methods):
             found = detection[method]["classes"][name]
             rows = found["by_severity"]
-            at = [(row["severity_low"] + row["severity_high"]) / 2 for row in rows]
+            at = np.array([(row["severity_low"] + row["severity_high"]) / 2 for row in rows])
+            at = at + index * 0.01 * (at.max() - at.min())  # so that bars do not hide each other
             _line_with_band(panel, at, [row["share_found"] for row in rows], index, method, joined=False)
             panel.plot(found["curve"]["severity"], found["curve"]["share_found"], color=COLORS[index])
             alarms = detection[method]["false_alarms"]["mean"]
             if alarms is not None:
-                label = f"{method}: false alarms"
-                panel.axhline(alarms, color=COLORS[index], linestyle=":", linewidth=1, label=label)
+                panel.axhline(alarms, color=COLORS[index], linestyle=":", linewidth=1)
         _draw_limits(panel, detection[methods[0]]["classes"][name]["limits"])
-        panel.set(xlabel="severity (0 healthy, 1 most severe)", ylim=(-0.03, 1.03), title=name)
+        panel.set(xlabel="severity (dotted: false alarms)", ylim=(-0.03, 1.03), title=name)
         panel.grid(alpha=0.3)
     axes[0].set_ylabel("share of records found")
     axes[-1].legend(loc="best", fontsize=8)
@@ -107,7 +111,7 @@ def window_length_figure(path: Path, answers: Mapping[str, Answers]) -> None:
 
 def _line_with_band(
     panel: Any,
-    at: Sequence[float],
+    at: Sequence[float] | NDArray[np.floating],
     scores: Sequence[Mapping[str, float | None]],
     index: int,
     label: str,
@@ -121,10 +125,10 @@ def _line_with_band(
     )
     color, marker = COLORS[index], MARKERS[index]
     if joined:
-        panel.plot(at, mean, color=color, marker=marker, label=label)
+        panel.plot(at, mean, color=color, marker=marker, label=label.replace("_", " "))
         panel.fill_between(at, low, high, color=color, alpha=0.18, linewidth=0)
         return
-    panel.plot(at, mean, color=color, marker=marker, linestyle="none", label=label)
+    panel.plot(at, mean, color=color, marker=marker, linestyle="none", label=label.replace("_", " "))
     panel.vlines(at, low, high, color=color, linewidth=1.2, alpha=0.7)
 
 

@@ -10,7 +10,7 @@ from numpy.typing import NDArray
 
 from diagnose.detection_curve import LEAST_RECORDS, LEAST_SIZES, SHARES, curve_at, fit_curves, limits
 from diagnose.groups import groups_of
-from diagnose.judged import Interval, Judged, interval_text, units_drawn, with_interval
+from diagnose.judged import Interval, Judged, interval_text, share_with_interval, units_drawn, with_interval
 
 if TYPE_CHECKING:
     from gensig.dataset.reader import Dataset
@@ -19,6 +19,7 @@ IntArray = NDArray[np.integer]
 FloatArray = NDArray[np.floating]
 HEALTHY = "healthy"
 FALSE_ALARMS = 0.05
+RECORDS_A_GROUP = 8  # fewer say nothing of a share
 MOST_GROUPS = 5
 CURVE_POINTS = 41
 SIZE_FOLLOWS_SEVERITY = 0.95  # least rank correlation of a fault parameter that is called its size
@@ -114,7 +115,7 @@ def detection(
         values = np.divide(
             (inside * found[:, member]).sum(axis=1), total, out=np.full(total.shape, np.nan), where=total > 0
         )
-        return with_interval(values[0], values[1:], np.unique(judged.unit[member]).size)
+        return share_with_interval(float(values[0]), values[1:], np.unique(judged.unit[member]).size)
 
     false_alarms = share(judged.label == healthy)
     classes = {}
@@ -224,7 +225,7 @@ def _by_severity(
     rows = []
     place = np.flatnonzero(member)
     right = (judged.predicted == judged.label).mean(axis=0)
-    for group in groups_of(severity, most=MOST_GROUPS):
+    for group in groups_of(severity, most=int(np.clip(severity.size // RECORDS_A_GROUP, 2, MOST_GROUPS))):
         inside = np.zeros_like(member)
         inside[place[group.member]] = True
         rows.append(
@@ -288,7 +289,7 @@ def _sentence(name: str, found: Mapping[str, Any], false_alarms: Interval) -> st
     alarms = f"at {false_alarms['mean']:.0%} false alarms" if false_alarms["mean"] is not None else ""
     text = f"{name}: {interval_text(found['share_found'])} of the records found {alarms}"
     for row in rows:
-        text += f"; {row['share']:.0%} found {_limit_text(row)}"
+        text += f"; {row['share']:.0%} are found {_limit_text(row)}"
         others = [
             other
             for other in found["limits"]

@@ -122,6 +122,25 @@ def with_interval(value: float, resampled: FloatArray, n_units: int) -> Interval
     return {"mean": finite(value), "low": finite(low), "high": finite(high)}
 
 
+def share_with_interval(value: float, resampled: FloatArray, n_units: int) -> Interval:
+    """A share with its interval; none or all of few units do not show that it is 0 or 1.
+
+    As `with_interval`, and for a share of 0 or 1, which no resample can leave, also what so many units say if each of
+    them is one trial.
+
+    Source: Clopper & Pearson (1934), "The use of confidence or fiducial limits illustrated in the case of the
+    binomial", Biometrika 26 (4).
+    """
+    from scipy.stats import binomtest
+
+    interval = with_interval(value, resampled, n_units)
+    if value in (0.0, 1.0) and interval["low"] is not None and interval["high"] is not None:
+        exact = binomtest(round(value * n_units), n_units).proportion_ci(0.95, method="exact")
+        interval["low"] = min(interval["low"], float(exact.low))
+        interval["high"] = max(interval["high"], float(exact.high))
+    return interval
+
+
 def finite(value: float) -> float | None:
     """A number that JSON can hold; None for one that is not finite."""
     return float(value) if np.isfinite(value) else None
