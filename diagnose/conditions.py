@@ -75,8 +75,8 @@ def by_condition(
     right as all are: a group that is low by luck shows too small a spread of its own.
 
     Source: standard error of resampled units with Student's t of as many degrees of freedom as the group has units,
-    less one, as Cameron, Gelbach & Miller (2008), "Bootstrap-based improvements for inference with clustered errors", Review
-    of Economics and Statistics 90 (3), discuss for few clusters; Bonferroni's correction over the groups.
+    less one, as Cameron, Gelbach & Miller (2008), "Bootstrap-based improvements for inference with clustered errors",
+    Review of Economics and Statistics 90 (3), discuss for few clusters; Bonferroni's correction over the groups.
     """
     network = methods[0]
     drawn = units_drawn(network.n_units, n_bootstrap, rng)
