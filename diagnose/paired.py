@@ -105,8 +105,9 @@ def _sentence(row: dict[str, Any]) -> str:
     if difference["low"] is None:
         return f"{what}; one unit shows no spread, so that nothing can be said"
     sure = row["p_value_holm"] < 0.05 and not difference["low"] <= 0 <= difference["high"]
+    p_value = "p < 0.001" if row["p_value_holm"] < 0.001 else f"p = {row['p_value_holm']:.3f}"
     verdict = ("better" if difference["mean"] > 0 else "worse") if sure else "not told apart"
     return (
         f"{what} [{difference['low']:+.2f}, {difference['high']:+.2f}] balanced accuracy, "
-        f"p = {row['p_value_holm']:.3f} (permutation of {row['n_units']} units, Holm): {verdict}"
+        f"{p_value} (permutation of {row['n_units']} units, Holm): {verdict}"
     )
