@@ -14,6 +14,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
+from diagnose.answers import protocol_answers
 from diagnose.calibration import calibration_scores
 from diagnose.heads import head_scores
 from diagnose.jobs import Job, run_jobs
@@ -241,6 +242,7 @@ def _protocol_result(
         "last_epoch": _last_epoch(task, settings, network),
         "calibration": _calibration(task, network),
         "heads": head_scores(task, parts["train"], network, n_bootstrap=settings.n_bootstrap),
+        "answers": None if is_leaky(protocol) else protocol_answers(task, settings, mine),
     }
 
 
