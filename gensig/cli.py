@@ -176,6 +176,13 @@ VERBS: dict[str, Verb] = {
         "gensig.commands.export:export",
         _export,
     ),
+    "transmission-error": Verb(
+        "loaded flanks slice by slice: transmission error, line load, pressure",
+        "gensig transmission-error system=helical_pair modification=beihang_both --plot te.png\n"
+        "  gensig transmission-error gear=xiamen_23_84 operating.torque_nm=20 --json te.json",
+        "gensig.commands.flanks:transmission_error",
+        _stiffness,
+    ),
     "simulate": Verb(
         "one record: signal, spectrum, figure",
         "gensig simulate fault=missing_tooth operating.speed_rpm=1500 --plot missing.png --output missing.csv\n"

@@ -99,7 +99,7 @@ def sliced_mesh(
     deviation : (slice, node) m    how far both flanks together stand back of perfect ones at the table's positions
     """
     position = node_positions(pair, options)
-    place = (np.arange(slices.n_slices) + 0.5) * (pair.face_width / slices.n_slices)
+    place = slice_places(pair, slices)
     structure, shared = _structure(pair, material, options)
     law = contact_law(pair, np.clip(position, 0.0, pair.path_of_contact), material, options)
     corner = corner_gap_by_pinion(pair, position)
@@ -121,6 +121,12 @@ def sliced_mesh(
         shared_compliance=shared,
         slice_place=place,
     )
+
+
+def slice_places(pair: GearPair, slices: SliceOptions) -> Array:
+    """Middle of every slice from the end that enters first, (slice,) m."""
+    edges = np.linspace(0.0, pair.face_width, slices.n_slices + 1)
+    return 0.5 * (edges[1:] + edges[:-1])
 
 
 @lru_cache(maxsize=16)
@@ -171,7 +177,9 @@ def loaded_contact(mesh: SlicedMesh, roll: Array, force: float) -> LoadedContact
             f"the mesh force is {force:g} N and must be positive; give a torque that the pinion drives with"
         )
     position = pair_positions(mesh, roll)
-    position, share = _cut_by_field(mesh, position)
+    share = np.ones_like(position)
+    if mesh.options.law == "paper":  # elsewhere the corners' gaps tell where contact ends
+        position, share = _cut_by_field(mesh, position)
     structure = np.interp(position, mesh.position, mesh.structure)
     constant = np.interp(position, mesh.position, mesh.contact_constant)
     gap, width = _gaps(mesh, position), mesh.slice_width * share
@@ -200,14 +208,33 @@ def _gaps(mesh: SlicedMesh, position: Array) -> Array:
 
 
 def _cut_by_field(mesh: SlicedMesh, position: Array) -> tuple[Array, Array]:
-    """Slices that the edge of the field of action cuts, where no gap tells: the middle of what lies on the path, and
-    its share of the slice, (phase, pair, slice) both."""
+    """Slices that the edge of the field of action cuts: the middle of what lies on the path and its share of the slice,
+    of the shape of ``position`` both."""
     half = 0.5 * mesh.slice_width * math.tan(mesh.pair.base_helix_angle) * (not mesh.slices.slices_in_phase)
-    if mesh.options.law != "paper" or half == 0.0:
-        return position, np.ones_like(position)
-    low, high = np.maximum(position - half, 0.0), np.minimum(position + half, mesh.pair.path_of_contact)
+    path = mesh.pair.path_of_contact
+    if half == 0.0:
+        return position, ((position >= 0.0) & (position <= path)).astype(np.float64)
+    low, high = np.maximum(position - half, 0.0), np.minimum(position + half, path)
     share = np.clip((high - low) / (2.0 * half), 0.0, 1.0)
     return np.where(share > 0.0, 0.5 * (low + high), position), share
+
+
+def single_pair_stiffness(mesh: SlicedMesh, position: Array, force: float) -> Array:
+    """Stiffness of the slices of one pair that lie on the path, flanks taken as touching, (phase,) N/m.
+
+    Parameters
+    ----------
+    position : (phase,) m    of the first slice, from A
+    force : N                at whose even load per width a load-dependent contact term is taken
+
+    The slices bend by themselves here: the sum over the face of 1 / (structure + contact).
+    """
+    middle, share = _cut_by_field(mesh, position[:, None] - mesh.lag)
+    constant = np.interp(middle, mesh.position, mesh.contact_constant)
+    contact = mesh.contact_factor * (constant - mesh.log_weight * math.log(force / mesh.pair.face_width))
+    softness = np.interp(middle, mesh.position, mesh.structure) + contact
+    alone = mesh.slice_width * np.sum(share / softness, axis=1)
+    return alone / (1.0 + mesh.shared_compliance * alone)
 
 
 def contact_pressure(mesh: SlicedMesh, contact: LoadedContact, material: Material) -> Array:
