@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
+from dataclasses import replace
 from pathlib import Path
 from typing import Any
 
@@ -9,6 +11,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from gensig.commands.figures import COLOURS, GREY, SOUND, pyplot, save
+from gensig.systems.flank_optimum import Optimum
 from gensig.systems.sliced_pair import SlicedPair, TransmissionError
 
 Array = NDArray[np.float64]
@@ -21,6 +24,30 @@ def plot_transmission_error(system: SlicedPair, result: TransmissionError, path:
     _orders(axes[0, 1], result)
     _load_map(figure, axes[1, 0], system, result)
     _sharing(axes[1, 1], result)
+    figure.suptitle(_title(system))
+    save(figure, path)
+
+
+def plot_front(system: SlicedPair, before: Optimum, chosen: Optimum, front: Sequence[Optimum], path: Path) -> None:
+    """The front, and transmission error and load over the flank before and after."""
+    figure, axes = pyplot.subplots(2, 2, figsize=(11, 7.6), layout="constrained")
+    ripple = [one.ripple * 1e6 for one in front]
+    axes[0, 0].plot(ripple, [one.line_load * 1e-3 for one in front], "o-", color=SOUND, label="front")
+    for one, marker, colour, name in ((before, "s", GREY, "before"), (chosen, "D", COLOURS[1], "chosen")):
+        axes[0, 0].plot(one.ripple * 1e6, one.line_load * 1e-3, marker, color=colour, label=name)
+    axes[0, 0].set(
+        title="Worst of all cases", xlabel="transmission error, peak to peak, um", ylabel="largest line load, N/mm"
+    )
+    axes[0, 0].legend()
+    for place, one, colour, name in ((0, before, GREY, "before"), (1, chosen, COLOURS[1], "chosen")):
+        changed = replace(system, modification=one.modification)
+        result = changed.transmission_error()
+        phase = np.arange(2 * len(result.error)) / len(result.error)
+        axes[0, 1].plot(phase, np.tile(result.error - result.error.mean(), 2) * 1e6, color=colour, label=name)
+        _load_map(figure, axes[1, place], changed, result)
+        axes[1, place].set_title(f"Load over the flank, {name}")
+    axes[0, 1].set(title="Transmission error less its mean", xlabel="mesh periods", ylabel="um")
+    axes[0, 1].legend()
     figure.suptitle(_title(system))
     save(figure, path)
 

@@ -28,7 +28,7 @@ def transmission_error(arguments: Namespace) -> int:
         raise ConfigError(f"--plot {arguments.plot}: the name must end in {', '.join(FIGURE_TYPES)}")
     request = read_request(arguments.overrides, config_dir=arguments.config_dir)
     with one_line_warnings("gensig"):
-        system = _sound_pair(request.config)
+        system = sound_pair(request.config)
         result = system.transmission_error()
         _warn_of_lost_contact(system, result)
     content = transmission_error_content(system, result)
@@ -78,7 +78,7 @@ def transmission_error_content(system: SlicedPair, result: TransmissionError) ->
 def sliced_stiffness(config: Mapping[str, Any], arguments: Namespace) -> int:
     """``gensig stiffness`` of a pair cut into slices: curves to JSON, a figure, or a summary."""
     with one_line_warnings("gensig"):
-        system = _sound_pair(config)
+        system = sound_pair(config)
         result = system.transmission_error()
         position, single = system.single_pair()
     stiffness = result.contact.stiffness
@@ -109,7 +109,7 @@ def sliced_stiffness(config: Mapping[str, Any], arguments: Namespace) -> int:
     return 0
 
 
-def _sound_pair(config: Mapping[str, Any]) -> SlicedPair:
+def sound_pair(config: Mapping[str, Any]) -> SlicedPair:
     """The pair of a configuration; refuses faults, which slices do not know yet."""
     if read_faults(config["fault"]):
         raise ConfigError(
