@@ -10,6 +10,7 @@ from typing import Any
 import numpy as np
 
 from diagnose.figures import confusion_figure, reliability_figure, severity_figure
+from diagnose.novelty_report import novelty_caveats, novelty_section
 from diagnose.protocols import MEANING
 
 FEW_UNITS = 10
@@ -49,6 +50,8 @@ def result_table(metrics: Mapping[str, Any]) -> list[str]:
         "chance": "chance",
     }
     results = metrics["protocols"]
+    if not results:
+        return []
     shown = [key for key in columns if any(key in result["methods"] for result in results.values())]
     lines = [
         "| protocol | " + " | ".join(columns[key] for key in shown) + " |",
@@ -81,6 +84,10 @@ def _page(metrics: Mapping[str, Any], with_severity: Sequence[str]) -> list[str]
         f"channels {_list(metrics['channel_names'])} at {metrics['sampling_rate_hz']:g} Hz. "
         f"Network: {metrics['model']} on windows of {window_ms:.0f} ms, {level}, {len(settings['seeds'])} seed(s).",
         "",
+    ]
+    if not results:
+        return [*lines, *novelty_section(metrics["novelty"]), "## Caveats", "", *_caveats(metrics)]
+    lines += [
         *[f"- {_headline(name, result, metrics['model'])}" for name, result in results.items() if not result["leaky"]],
         "",
         "Balanced accuracy over test records, mean over seeds [95 % interval over units]:",
@@ -97,7 +104,7 @@ def _page(metrics: Mapping[str, Any], with_severity: Sequence[str]) -> list[str]
         "",
         "- **Balanced accuracy**: mean over the classes of the share of records recognised. A record's label is the "
         "class with the largest mean log-probability over its windows.",
-        *[f"- **{name}**: {MEANING[name]}." for name in results if name in MEANING],
+        *[f"- **{name}**: {MEANING[name]}{_sensors(result)}." for name, result in results.items() if name in MEANING],
         "- **LEAKY**: windows of one record on both sides of the split, as in many papers. It shows how much a "
         "careless split flatters; it is no measure of diagnosis.",
         "- **indicators**: logistic regression or gradient boosting (chosen on validation units) on RMS, kurtosis, "
@@ -116,7 +123,7 @@ def _page(metrics: Mapping[str, Any], with_severity: Sequence[str]) -> list[str]
     lines += ["", *[f"![confusion, {name}](confusion_{name}.png)" for name in results]]
     if with_severity:
         lines += ["", "## How severe a fault must be", "", "![recognised by severity](severity.png)"]
-    lines += ["", *_trust_section(metrics)]
+    lines += ["", *_trust_section(metrics), "", *novelty_section(metrics["novelty"])]
     lines += ["", "## Caveats", "", *_caveats(metrics), ""]
     lines.append("Everything in numbers, with macro-F1, recall and settings: `metrics.json`. Networks: `models/`.")
     return lines
@@ -232,6 +239,7 @@ def _caveats(metrics: Mapping[str, Any]) -> list[str]:
                 f"- {name}: only {n_units} test unit(s). The interval shows the spread of these units and is too "
                 f"narrow for new ones; at least {FEW_UNITS} are advisable."
             )
+    lines += novelty_caveats(metrics["novelty"], FEW_UNITS)
     if metrics["settings"]["normalise"] == "rms":
         lines.append(
             "- The network sees windows without their level, the indicators with it unless stated; "
@@ -242,6 +250,12 @@ def _caveats(metrics: Mapping[str, Any]) -> list[str]:
     if metrics["n_records_unusable"]:
         lines.append(f"- {metrics['n_records_unusable']} record(s) failed in simulation and are left out.")
     return lines
+
+
+def _sensors(result: Mapping[str, Any]) -> str:
+    """Which channels, where the test has others than the training."""
+    trained, tested = result["channels"]["train"], result["channels"]["test"]
+    return "" if trained == tested else f": trained on {_list(trained)}, tested on {_list(tested)}"
 
 
 def _list(names: Sequence[str]) -> str:

@@ -55,7 +55,7 @@ def deal_groups(plan: Plan, deal: Deal, rng: np.random.Generator) -> SplitTable 
     if lacking := [name for name, found in zip(SUBSETS, holds.any(axis=1) >= needed, strict=True) if not found.all()]:
         return f"a class has no record that may be used for {lacking[0]}"
     n_validation, n_test = (max(1, round(share * len(names))) for share in (VALIDATION_SHARE, deal.test_share))
-    if MIN_TESTED <= MAX_FOR_TESTS * len(names):
+    if MAX_FOR_TESTS * len(names) >= MIN_TESTED:
         n_test = max(n_test, MIN_TESTED)
     in_order = np.repeat(np.arange(len(SUBSETS)), [len(names) - n_validation - n_test, n_validation, n_test])
     worth = None if deal.for_test is None else np.bincount(group, weights=deal.for_test).astype(float)
