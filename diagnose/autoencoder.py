@@ -22,6 +22,7 @@ N_BANDS = 128
 N_FRAMES = 5
 N_HIDDEN, N_CODE = 128, 8
 N_EPOCHS, BATCH_SIZE, LEARNING_RATE = 100, 512, 1e-3
+PATIENCE = 10  # epochs without a smaller error on validation units before stopping; ours, like all choice of the epoch
 SHORTEST_FRAME = 16
 FLOOR = 1e-10  # of the mean power, 100 dB below it: what is silent has a level still
 MOST_WINDOWS = 2000  # evenly spaced over the training, so that memory is bounded
@@ -120,6 +121,8 @@ def fit_autoencoder(train: WindowSet, validation: WindowSet, *, device: torch.de
                 loss = float(torch.cat([model(rows.to(device)) for rows in held_out.split(BATCH_SIZE)]).mean())
             if loss < best:
                 best, best_weights, best_epoch = loss, copy.deepcopy(model.state_dict()), epoch
+            if epoch - best_epoch >= PATIENCE:
+                break
     if best_epoch == 0:
         raise SimulationError("the autoencoder diverged from its first epoch")
     model.load_state_dict(best_weights)

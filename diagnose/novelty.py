@@ -162,9 +162,9 @@ def _classifier_runs(
 
 def network_outputs(model: nn.Module, windows: WindowSet, chosen: IntArray) -> tuple[FloatArray, FloatArray]:
     """Features (window, feature) that the last layer of the class scores reads, and its output (window, class)."""
-    layer = [part for name, part in model.named_modules() if name.startswith("head") and isinstance(part, nn.Linear)][
-        -1
-    ]
+    heads = [part for name, part in model.named_modules() if name == "head" or name.startswith("head.")]
+    heads = [part for name, part in model.named_modules() if name == "head" or name.startswith("head.")]
+    layer = [part for part in heads if isinstance(part, nn.Linear)][-1]
     seen: list[tuple[torch.Tensor, torch.Tensor]] = []
     hook = layer.register_forward_hook(lambda _, inputs, output: seen.append((inputs[0], output)))
     try:
