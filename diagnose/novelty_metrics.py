@@ -2,8 +2,10 @@
 
 from __future__ import annotations
 
+import csv
 from collections.abc import Sequence
 from dataclasses import asdict
+from pathlib import Path
 from typing import Any
 
 import numpy as np
@@ -112,6 +114,20 @@ def _accuracy_on_known(
     confusion = np.stack([confusion_by_unit(label, given, unit, len(task.class_names)) for given in predicted])
     score = score_with_interval("balanced_accuracy", confusion, n_bootstrap=n_bootstrap, rng=rng)
     return {"balanced_accuracy": asdict(score), "chance": 1 / np.unique(label).size}
+
+
+def write_novelty(path: Path, task: Task, runs: Sequence[NoveltyRun]) -> None:
+    """Write one row a score: protocol, method, seed, record, its class and unit, the score and the threshold."""
+    labels = task.labels()
+    columns = [np.asarray(task.dataset.column(name)) for name in ("record_id", "unit_id")]
+    with path.open("w", newline="", encoding="utf-8") as file:
+        writer = csv.writer(file, lineterminator="\n")
+        writer.writerow(["protocol", "method", "seed", "record_id", "unit_id", "label", "score", "threshold"])
+        for run in runs:
+            threshold = f"{alarm_threshold(run.validation_score):.9g}"
+            for record, score in zip(run.record, run.score, strict=True):
+                truth = [*(column[record] for column in columns), task.class_names[labels[record]]]
+                writer.writerow([run.protocol, run.method, run.seed, *truth, f"{score:.9g}", threshold])
 
 
 def novelty_result(

@@ -2,10 +2,11 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Mapping
 from typing import Any
 
 from diagnose.novelty_metrics import FALSE_ALARMS, LEAST_VALIDATION, TRUE_POSITIVES
+from diagnose.page import Section, Table
 
 METHODS = {
     "nearest_indicators": "5th neighbour, indicators",
@@ -18,41 +19,33 @@ METHODS = {
     "energy": "energy",
     "nearest_features": "5th neighbour, network's features",
 }
+QUESTIONS = {
+    "healthy_only": "Is a fault noticed by who knows health alone",
+    "open_set": "Is a fault noticed that was never trained on",
+}
 
 
 def novelty_tables(novelty: Mapping[str, Any]) -> list[str]:
     """Markdown: for each protocol one line of what it knows, and the table of its scores."""
     lines: list[str] = []
     for name, result in novelty.items():
-        lines += ["", f"**{name}**: {_what_it_knows(result)}", "", *_table(result)]
+        table = _table(result)
+        lines += ["", f"**{name}**: {_what_it_knows(result)}", "", "| " + " | ".join(table.head) + " |"]
+        lines += ["|---" * len(table.head) + "|", *("| " + " | ".join(row) + " |" for row in table.rows)]
     return lines
 
 
-def novelty_section(novelty: Mapping[str, Any]) -> list[str]:
-    """Section of the report, empty without such a protocol; ends with an empty line."""
-    if not novelty:
-        return []
-    lines = ["## Is what was never trained on noticed", *novelty_tables(novelty), ""]
-    for name, result in novelty.items():
-        if "known" in result:
-            score, chance = result["known"]["balanced_accuracy"], result["known"]["chance"]
-            lines += [f"Balanced accuracy of {name} on the known classes: {_cell(score)}, chance {chance:.2f}.", ""]
-    lines += [
-        f"- **AUROC**: how often a new record has a larger score than a known one; chance is 0.5. **Found**: share of "
-        f"the records above the threshold, which is set on validation units for {FALSE_ALARMS:.0%} of false alarms. "
-        "**False alarms**: the share of known records of the test units that are above it; where it is larger than "
-        "meant, the found share flatters.",
-    ]
-    if any("known" in result for result in novelty.values()):
-        lines.append(
-            f"- **FPR95**: share of new records taken for known by the threshold that takes {TRUE_POSITIVES:.0%} of "
-            f"the known ones for known; chance is {TRUE_POSITIVES:.2f}, smaller is better."
+def novelty_sections(novelty: Mapping[str, Any]) -> list[Section]:
+    """A section of the report for each protocol."""
+    return [
+        Section(
+            title=f"{QUESTIONS[name]} ({name})",
+            text=[_what_it_knows(result), *_accuracy(result)],
+            table=_table(result),
+            notes=_notes(result),
         )
-    lines.append(
-        "- **band levels**: the flag of `diagnose predict`. It and the networks see windows as the classifier does. "
-        "How each score is made: docs/howto/novelty.md."
-    )
-    return [*lines, ""]
+        for name, result in novelty.items()
+    ]
 
 
 def novelty_caveats(novelty: Mapping[str, Any], few_units: int) -> list[str]:
@@ -60,10 +53,10 @@ def novelty_caveats(novelty: Mapping[str, Any], few_units: int) -> list[str]:
     lines = []
     for name, result in novelty.items():
         if (n_units := result["n_units"]["test"]) < few_units:
-            lines.append(f"- {name}: only {n_units} test unit(s); at least {few_units} are advisable.")
+            lines.append(f"{name}: only {n_units} test unit(s); at least {few_units} are advisable.")
         if (n_records := result["n_records"]["validation"]) < LEAST_VALIDATION:
             lines.append(
-                f"- {name}: {n_records} validation record(s); with fewer than {LEAST_VALIDATION} no threshold promises "
+                f"{name}: {n_records} validation record(s); with fewer than {LEAST_VALIDATION} no threshold promises "
                 f"{FALSE_ALARMS:.0%} of false alarms, the largest score is taken."
             )
     return lines
@@ -72,30 +65,57 @@ def novelty_caveats(novelty: Mapping[str, Any], few_units: int) -> list[str]:
 def _what_it_knows(result: Mapping[str, Any]) -> str:
     counts, units = result["n_records"], result["n_units"]
     return (
-        f"trained on {counts['train']} records ({_names(result['known_classes'])}) of {units['train']} units, "
-        f"threshold from {counts['validation']} of {units['validation']}, tested on {counts['test']} of {units['test']}"
-        f"; new there: {_names(result['novel_classes'])}."
+        f"Trained on {counts['train']} records ({', '.join(result['known_classes'])}) of {units['train']} units, "
+        f"threshold from {counts['validation']} of {units['validation']}, "
+        f"tested on {counts['test']} of {units['test']}; new there: {', '.join(result['novel_classes'])}."
     )
 
 
-def _table(result: Mapping[str, Any]) -> list[str]:
+def _accuracy(result: Mapping[str, Any]) -> list[str]:
+    if "known" not in result:
+        return []
+    score, chance = result["known"]["balanced_accuracy"], result["known"]["chance"]
+    return [f"Balanced accuracy of the network on the known classes: {_cell(score)}, chance {chance:.2f}."]
+
+
+def _notes(result: Mapping[str, Any]) -> list[tuple[str, str]]:
+    notes = [
+        ("AUROC", "how often a new record has a larger score than a known one; chance is 0.50."),
+        (
+            "Found",
+            f"share of records above a threshold set on validation units for {FALSE_ALARMS:.0%} false alarms.",
+        ),
+        (
+            "False alarms",
+            "share of the known records of the test units above it; where it is larger than meant, what is found "
+            "flatters.",
+        ),
+        ("Band levels", "the flag of diagnose predict. It and the networks see windows as the classifier does."),
+    ]
+    if "known" in result:
+        notes.append(
+            (
+                "FPR95",
+                f"share of new records taken for known by the threshold that takes {TRUE_POSITIVES:.0%} of the known "
+                f"ones for known; chance is {TRUE_POSITIVES:.2f}, smaller is better.",
+            )
+        )
+    return notes
+
+
+def _table(result: Mapping[str, Any]) -> Table:
     novel = result["novel_classes"]
-    with_rate = any("fpr95" in method for method in result["methods"].values())
-    columns = ["score", "AUROC", *(["FPR95"] if with_rate else []), "false alarms"]
-    columns += [f"{_names([name])} found" for name in novel]
-    lines = ["| " + " | ".join(columns) + " |", "|---" * len(columns) + "|"]
-    for key, method in result["methods"].items():
-        cells = [METHODS[key], _cell(method["auroc"])]
-        cells += [_cell(method.get("fpr95"))] if with_rate else []
-        cells += [_cell(method["false_alarms"]), *(_cell(method["found"][name]) for name in novel)]
-        lines.append("| " + " | ".join(cells) + " |")
-    return lines
+    rate = ["fpr95"] if "known" in result else []
+    keys = ["auroc", *rate, "false_alarms"]
+    heads = {"auroc": "AUROC", "fpr95": "FPR95", "false_alarms": "false alarms"}
+    return Table(
+        head=["score", *(heads[key] for key in keys), *(f"{name} found" for name in novel)],
+        rows=[
+            [METHODS[name], *(_cell(method.get(key)) for key in keys), *(_cell(method["found"][c]) for c in novel)]
+            for name, method in result["methods"].items()
+        ],
+    )
 
 
 def _cell(score: Mapping[str, Any] | None) -> str:
     return "-" if score is None else f"{score['mean']:.2f} [{score['low']:.2f}, {score['high']:.2f}]"
-
-
-def _names(names: Sequence[str]) -> str:
-    """Names from a file without what Markdown or HTML would act on."""
-    return ", ".join("".join(c if c.isalnum() or c in " _-." else "?" for c in name) for name in names)

@@ -8,7 +8,6 @@ import sys
 import time
 from collections.abc import Callable, Sequence
 from dataclasses import asdict, replace
-from importlib.metadata import version
 from pathlib import Path
 from typing import Any
 
@@ -17,17 +16,19 @@ from numpy.typing import NDArray
 
 from diagnose.autoencoder import frame_samples
 from diagnose.calibration import calibration_scores
-from diagnose.jobs import Job, Outcome, Prediction, run_jobs
+from diagnose.jobs import Job, Outcome, run_jobs
 from diagnose.metrics import SCORES, confusion_by_unit, recall, score_with_interval
 from diagnose.model_io import data_fingerprint, model_description, save_model
 from diagnose.models import build_model, check_window
 from diagnose.novelty import NoveltyRun
-from diagnose.novelty_metrics import check_open_protocol, novelty_protocol_result
+from diagnose.novelty_metrics import check_open_protocol, novelty_protocol_result, write_novelty
+from diagnose.predictions import Prediction, write_predictions
 from diagnose.protocols import OPEN_PROTOCOLS, channels_to_cross, choose_protocols
 from diagnose.settings import BASELINES, TrainSettings
 from diagnose.train import device_of
 from diagnose.windows import SUBSETS, Task, plan_windows, subset_segments, task_of
 from gensig.errors import ConfigError
+from gensig.version import __version__
 
 METRICS_SCHEMA_VERSION = 1
 BOOTSTRAP_SEED = 20240607
@@ -104,7 +105,7 @@ def run_study(
     Parameters
     ----------
     task, settings : what to learn and how
-    folder : exists; receives ``models/<protocol>-seed<k>``
+    folder : exists; receives ``models/<protocol>-seed<k>`` and ``predictions.csv``
     protocols, jobs : of `plan_study`
     on_done : told one line for each finished piece
     """
@@ -125,6 +126,9 @@ def run_study(
             target = folder / "models" / f"{prediction.protocol}-seed{prediction.seed}"
             known = {} if prediction.domain is None else prediction.domain.tensors()
             save_model(target, prediction.weights | known, model_description(task, settings, prediction))
+    write_predictions(folder / "predictions.csv", task, predictions)
+    if novelty:
+        write_novelty(folder / "novelty.csv", task, novelty)
     results = {
         name: _protocol_result(task, settings, name, predictions) for name in protocols if name not in OPEN_PROTOCOLS
     }
@@ -263,8 +267,7 @@ def _calibration(task: Task, network: Sequence[Prediction]) -> dict[str, Any]:
     """Calibration of the probabilities of test records, see `diagnose.calibration.calibration_scores`."""
     labels = task.labels()
     runs = [(run.log_probability, labels[run.record], run.temperature) for run in network]
-    known = [(values, truth, scale) for values, truth, scale in runs if values is not None]
-    return calibration_scores(*(list(column) for column in zip(*known, strict=True)))
+    return calibration_scores(*(list(column) for column in zip(*runs, strict=True)))
 
 
 def _n_cores() -> int:
@@ -279,7 +282,7 @@ def _environment() -> dict[str, str]:
     import torch
 
     return {
-        "gensig": version("gensig"),
+        "gensig": __version__,
         "python": platform.python_version(),
         "numpy": np.__version__,
         "torch": str(torch.__version__),

@@ -116,7 +116,7 @@ def test_train_and_evaluate_know_the_channels(data, tmp_path, capsys):
     assert main(["train", "data=four", f"out={out}", *FAST, *choice]) == 0
     metrics = json.loads((out / "metrics.json").read_text())["protocols"]["cross_sensor"]
     assert metrics["channels"] == {"train": ["channel_3"], "test": ["channel_1"]}
-    assert "never trained on: trained on channel_3, tested on channel_1." in (out / "report.md").read_text()
+    assert "never trained on: trained on channel_3, tested on channel_1." in (out / "report.html").read_text()
     model = out / "models" / "cross_sensor-seed0"
     description = json.loads((model / "model.json").read_text())
     assert (description["channel_names"], description["test_channel_names"]) == (["channel_3"], ["channel_1"])

@@ -242,18 +242,25 @@ def test_the_command_reports_novelty_alone(monkeypatch, tmp_path, capsys):
     monkeypatch.setattr(gensig.dataset.reader, "open_dataset", lambda path: OpenDataset())
     out = tmp_path / "out"
     assert main(["train", "data=x", f"out={out}", *FAST, "protocols=[healthy_only,open_set]"]) == 0
-    assert "**healthy_only**: trained on" in capsys.readouterr().out
+    assert "**healthy_only**: Trained on" in capsys.readouterr().out
     metrics = json.loads((out / "metrics.json").read_text())
     assert metrics["protocols"] == {}
     assert list(metrics["novelty"]) == ["healthy_only", "open_set"]
-    page = (out / "report.md").read_text()
+    page = (out / "report.html").read_text()
     for text in (
-        "## Is what was never trained on noticed", "| score | AUROC | FPR95 | false alarms | missing_tooth found |",
-        "Balanced accuracy of open_set on the known classes", "- healthy_only: only 3 test unit(s)", "## Caveats",
+        "noticed by who knows health alone (healthy_only)",
+        "<th>FPR95</th><th>false alarms</th><th>missing_tooth found",
+        "Balanced accuracy of the network on the known classes", "healthy_only: only 3 test unit(s)", "Caveats",
         "validation record(s); with fewer than 19",
     ):  # fmt: skip
         assert text in page, text
-    assert "nan" not in page
+    for text in ("LEAKY", "In short", "nan ["):
+        assert text not in page
+    rows = [line.split(",") for line in (out / "novelty.csv").read_text().splitlines()]
+    assert rows[0] == ["protocol", "method", "seed", "record_id", "unit_id", "label", "score", "threshold"]
+    mine = [row for row in rows if row[:2] == ["healthy_only", "autoencoder"] and row[5] == "missing_tooth"]
+    found = metrics["novelty"]["healthy_only"]["methods"]["autoencoder"]["found"]["missing_tooth"]["mean"]
+    assert np.mean([float(row[6]) > float(row[7]) for row in mine]) == pytest.approx(found)
 
 
 def test_null_runs_everything_and_both_kinds_share_a_report(monkeypatch, tmp_path):
@@ -264,7 +271,7 @@ def test_null_runs_everything_and_both_kinds_share_a_report(monkeypatch, tmp_pat
     metrics = json.loads((out / "metrics.json").read_text())
     assert list(metrics["protocols"]) == ["by_unit", "cross_sensor"]
     assert list(metrics["novelty"]) == ["healthy_only", "open_set"]
-    page = (out / "report.md").read_text()
-    assert "## Which faults are found" in page
-    assert "## Is what was never trained on noticed" in page
+    page = (out / "report.html").read_text()
+    assert "Which faults are found" in page
+    assert "never trained on (open_set)" in page
     assert "trained on channel_0, tested on channel_1" in page
