@@ -20,7 +20,7 @@ from diagnose.domain import MOST_WINDOWS, distances, fit_domain, neighbor_distan
 from diagnose.features import FeatureTable, feature_table
 from diagnose.metrics import over_records
 from diagnose.settings import TrainSettings
-from diagnose.train import device_of, predict_windows, train_network
+from diagnose.train import predict_windows, train_network
 from diagnose.windows import SUBSETS, Task, WindowSet, subset_segments
 
 FloatArray = NDArray[np.floating]
@@ -110,8 +110,7 @@ def trained_runs(settings: TrainSettings, protocol: str, seed: int, sets: Mappin
     """Scores of a network trained on the known classes: an autoencoder of healthy windows, else a classifier."""
     if protocol != "healthy_only":
         return _classifier_runs(settings, protocol, seed, sets)
-    device = device_of(settings.device)
-    model = fit_autoencoder(sets["train"], sets["validation"], device=device, seed=seed)
+    model = fit_autoencoder(sets["train"], sets["validation"], settings=settings, seed=seed)
     scores = {
         subset: over_records(reconstruction_error(model, sets[subset])[:, None], sets[subset].record)
         for subset in SCORED

@@ -14,7 +14,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from diagnose.autoencoder import frame_samples
+from diagnose.autoencoder import check_window_for_autoencoder
 from diagnose.calibration import calibration_scores
 from diagnose.jobs import Job, Outcome, run_jobs
 from diagnose.metrics import SCORES, confusion_by_unit, recall, score_with_interval
@@ -62,7 +62,7 @@ def plan_study(task: Task, settings: TrainSettings) -> tuple[tuple[str, ...], li
         if protocol in OPEN_PROTOCOLS:
             check_open_protocol(task, protocol)
     if "healthy_only" in protocols:
-        frame_samples(task.window_samples)
+        check_window_for_autoencoder(task.window_samples)
     model = build_model(settings.model, n_channels=len(task.channel_names), n_classes=len(task.class_names))
     check_window(model, len(task.channel_names), task.window_samples)
     device_of(settings.device)

@@ -1,5 +1,6 @@
 """Scores of novelty: nothing new is chance, something plain is found, alarms are as rare as promised."""
 
+import dataclasses
 import json
 
 import numpy as np
@@ -9,7 +10,7 @@ from novelty_sets import OpenDataset
 from scipy.stats import norm
 
 import gensig.dataset.reader
-from diagnose.autoencoder import fit_autoencoder, frame_rows, frame_samples, reconstruction_error
+from diagnose.autoencoder import WindowAutoencoder, fit_autoencoder, reconstruction_error
 from diagnose.cli import main
 from diagnose.jobs import Job, run_jobs
 from diagnose.novelty import NoveltyRun, network_outputs
@@ -171,43 +172,49 @@ def test_features_and_outputs_are_those_of_the_last_layer():
     np.testing.assert_allclose(predict_windows(model, validation), scaled, rtol=1e-4, atol=1e-5)
 
 
-def test_a_tone_is_heard_in_its_band_at_its_time():
-    assert frame_samples(6400) == 1024
-    time = np.arange(6400)
-    signal = np.where(time < 3200, np.sin(2 * np.pi * time * 102.5 / 1024), 0)
-    rows = frame_rows(torch.tensor(signal, dtype=torch.float32)[None, None])
-    assert rows.shape == (1, 7, 128 * 5)
-    levels = rows.reshape(7, 128, 5)
-    assert levels[0, :, 0].argmax() == 25  # bins 1 to 4 are the first band
-    assert levels[0, 25, 0] - levels[6, 25, 4] > 60
-    torch.testing.assert_close(levels[0, :, 1], levels[1, :, 0])
-    assert torch.isfinite(frame_rows(torch.zeros(2, 3, 1200))).all()
+def healthy_windows(task, subset):
+    return load_windows(task, subset_segments(task, "healthy_only", subset))
 
 
-@pytest.mark.parametrize("window", [48, 100, 1200, 3072, 3071])
-def test_five_frames_fit_into_every_window(window):
-    assert 3 * frame_samples(window) <= window
-    assert frame_rows(torch.ones(1, 1, window)).shape[1] >= 1
+@pytest.mark.parametrize("window", [128, 1200, 6400])
+def test_the_autoencoder_answers_for_every_whole_step(window):
+    model = WindowAutoencoder([1.0, 2.0]).eval()
+    windows = torch.randn(3, 2, window)
+    assert model(windows).shape == (3, window // 128 * 128)
+    assert torch.isfinite(model(torch.zeros(1, 2, window))).all()
+    doubled = WindowAutoencoder([2.0, 4.0]).eval()
+    doubled.load_state_dict({**model.state_dict(), "scale": 2 * model.scale})
+    torch.testing.assert_close(doubled(2 * windows), model(windows))
 
 
-def test_the_autoencoder_is_the_same_for_the_same_seed_and_knows_what_it_saw():
-    task = task_from(OpenDataset(), settings_of())
-    train, validation = (
-        load_windows(task, subset_segments(task, "healthy_only", part)) for part in ("train", "validation")
-    )
+def test_the_autoencoder_is_the_same_for_the_same_seed():
+    settings = settings_of()
+    task = task_from(OpenDataset(), settings)
+    train, validation = (healthy_windows(task, part) for part in ("train", "validation"))
     before = torch.random.get_rng_state()
-    first, again, other = (
-        fit_autoencoder(train, validation, device=torch.device("cpu"), seed=seed) for seed in (1, 1, 2)
-    )
+    first, again, other = (fit_autoencoder(train, validation, settings=settings, seed=seed) for seed in (1, 1, 2))
     assert torch.equal(before, torch.random.get_rng_state())
     error = reconstruction_error(first, validation)
     np.testing.assert_array_equal(error, reconstruction_error(again, validation))
+    few = reconstruction_error(first, validation, batch_size=3)
+    np.testing.assert_allclose(error, few, rtol=1e-4, atol=0)
     assert not np.array_equal(error, reconstruction_error(other, validation))
-    noise = OpenDataset(strength=0.0, noise=30.0)
-    strange = reconstruction_error(
-        first, load_windows(task_from(noise, settings_of()), subset_segments(task, "by_unit", "test"))
+
+
+def test_the_autoencoder_learns_and_a_moment_that_it_cannot_rebuild_is_seen():
+    task = task_from(OpenDataset(), settings_of())
+    train, validation = (healthy_windows(task, part) for part in ("train", "validation"))
+    short, long = (
+        fit_autoencoder(train, validation, settings=settings_of(f"epochs={n}", "patience=30"), seed=0) for n in (1, 30)
     )
-    assert strange.min() > np.median(error)
+    windows = torch.from_numpy(validation.cut(np.arange(9)))
+    mean = [part.model(windows).mean().item() for part in (short, long)]
+    assert mean[1] < 0.7 * mean[0]
+    burst = dataclasses.replace(validation, signals=tuple(signal.copy() for signal in validation.signals))
+    for signal in burst.signals:
+        signal[:, 1100:1164] += 3 * np.sin(np.arange(64))
+    seen = validation.start <= 1000  # the burst lies whole in these windows
+    assert (reconstruction_error(long, burst) > 1.5 * reconstruction_error(long, validation))[seen].all()
 
 
 def test_two_processes_give_what_one_gives():
@@ -225,7 +232,7 @@ def test_two_processes_give_what_one_gives():
 @pytest.mark.parametrize(
     ("changes", "overrides", "message"),
     [
-        ({}, ["protocols=[healthy_only]", "window_samples=40"], "at least 48"),
+        ({}, ["protocols=[healthy_only]", "window_samples=100"], "at least 128"),
         ({}, ["protocols=[open_set]", "classes=[healthy,crack,pitting]"], "it needs known and new ones"),
         ({}, ["protocols=[open_set]", "classes=[healthy,missing_tooth]"], "one known class only"),
         ({}, ["protocols=[healthy_only]", "classes=[crack,pitting]"], "its train part is empty"),
