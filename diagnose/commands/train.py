@@ -23,6 +23,7 @@ examples:
   diagnose train data=runs/quickstart out=runs/report
   diagnose train data=runs/quickstart out=runs/report protocols=[by_unit] seeds=[0,1,2,3,4] epochs=30
   diagnose train data=runs/quickstart out=runs/cross protocols=[cross_speed,cross_torque,unseen_severity_outer]
+  diagnose train data=runs/quickstart out=runs/novelty protocols=[healthy_only,open_set,cross_sensor]
   diagnose train -m data=runs/quickstart out=runs/levels normalise=rms,none"""
 
 
