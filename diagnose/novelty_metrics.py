@@ -145,7 +145,8 @@ def novelty_result(
 
     Returns
     -------
-    plain dictionary: ``auroc`` and ``auroc_by_class`` of novel against known records, ``false_alarms`` (share of known
+    plain dictionary: ``auroc`` of novel against known records, ``auroc_by_class`` of each novel class against all
+    known ones, ``auroc_by_known_class`` of all novel ones against each known class, ``false_alarms`` (share of known
     records above the threshold), ``found`` (share of each novel class above it), ``threshold`` a seed, and of networks
     that tell classes apart ``fpr95``
     """
@@ -159,6 +160,7 @@ def novelty_result(
     scores = np.stack([run.score for run in runs])
     threshold = np.array([alarm_threshold(run.validation_score) for run in runs])
     alarm = scores > threshold[:, None]
+    trained = [(index, task.class_names[index]) for index in np.unique(label[~novel])]
     classes = [(task.class_names[index], label == index) for index in np.unique(label[novel])]
 
     def area(chosen: Mask) -> dict[str, Any]:
@@ -167,6 +169,7 @@ def novelty_result(
     result = {
         "auroc": area(np.ones_like(novel)),
         "auroc_by_class": {name: area(chosen | ~novel) for name, chosen in classes},
+        "auroc_by_known_class": {name: area((label == index) | novel) for index, name in trained},
         "false_alarms": asdict(_share(alarm, ~novel, unit, drawn, seeds)),
         "found": {name: asdict(_share(alarm, chosen, unit, drawn, seeds)) for name, chosen in classes},
         "threshold": threshold.tolist(),

@@ -93,6 +93,9 @@ def _notes(result: Mapping[str, Any]) -> list[tuple[str, str]]:
         ("Band levels", "the flag of diagnose predict. It and the networks see windows as the classifier does."),
     ]
     if "known" in result:
+        for name, method in result["methods"].items():
+            areas = [f"against {known} {_cell(area)}" for known, area in method["auroc_by_known_class"].items()]
+            notes.append((f"AUROC of {METHODS[name]}", ", ".join(areas) + "."))
         notes.append(
             (
                 "FPR95",

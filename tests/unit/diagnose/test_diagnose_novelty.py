@@ -71,6 +71,10 @@ def test_a_plain_class_never_shown_is_noticed_and_the_known_ones_are_told_apart(
     for name in ("largest_probability", "energy", "nearest_features"):
         rate = result["methods"][name]["fpr95"]
         assert 0 <= rate["low"] <= rate["mean"] <= rate["high"] <= 1
+    for method in result["methods"].values():
+        parts = [area["mean"] for area in method["auroc_by_known_class"].values()]  # as many records of each class
+        assert len(parts) == 3
+        assert method["auroc"]["mean"] == pytest.approx(np.mean(parts))
     assert result["known"]["balanced_accuracy"]["mean"] > result["known"]["chance"] == pytest.approx(1 / 3)
 
 
@@ -258,6 +262,7 @@ def test_the_command_reports_novelty_alone(monkeypatch, tmp_path, capsys):
         "noticed by who knows health alone (healthy_only)",
         "<th>FPR95</th><th>false alarms</th><th>missing_tooth found",
         "Balanced accuracy of the network on the known classes", "healthy_only: only 3 test unit(s)", "Caveats",
+        "<b>AUROC of energy</b>: against healthy ",
         "validation record(s); with fewer than 19",
     ):  # fmt: skip
         assert text in page, text
