@@ -14,6 +14,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
+from diagnose.answers import protocol_answers
 from diagnose.autoencoder import check_window_for_autoencoder
 from diagnose.calibration import calibration_scores
 from diagnose.jobs import Job, Outcome, run_jobs
@@ -253,6 +254,7 @@ def _protocol_result(
         "best_epoch": [run.best_epoch for run in network],
         "last_epoch": _last_epoch(task, settings, network),
         "calibration": _calibration(task, network),
+        "answers": None if is_leaky(protocol) else protocol_answers(task, settings, mine),
     }
 
 
