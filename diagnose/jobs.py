@@ -21,7 +21,9 @@ from diagnose.baselines import indicator_model, nearest_spectrum, ridge_model, r
 from diagnose.domain import Domain, fit_domain
 from diagnose.features import Cache, FeatureTable, feature_table
 from diagnose.metrics import over_records
+from diagnose.novelty import NoveltyRun, fitted_runs, trained_runs
 from diagnose.predictions import Prediction, Rows
+from diagnose.protocols import OPEN_PROTOCOLS
 from diagnose.settings import TrainSettings
 from diagnose.train import input_scale, predict_windows, train_network, with_shuffled_labels
 from diagnose.window_features import rocket_tables, spectrum_table
@@ -31,11 +33,17 @@ from gensig.errors import GensigError
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Job:
-    """One training (with or without shuffled labels), or with seed None the baselines of all the protocols."""
+    """One training (with or without shuffled labels), or with seed None the baselines of all the protocols.
+
+    One of `OPEN_PROTOCOLS` is a job of its own: with seed None the scores that are fitted, else those of a network.
+    """
 
     protocols: tuple[str, ...]
     seed: int | None
     shuffled: bool = False
+
+
+Outcome = Prediction | NoveltyRun
 
 
 def run_jobs(
@@ -44,8 +52,8 @@ def run_jobs(
     jobs: Sequence[Job],
     *,
     n_workers: int,
-    on_done: Callable[[list[Prediction]], None],
-) -> list[Prediction]:
+    on_done: Callable[[list[Outcome]], None],
+) -> list[Outcome]:
     """Run all jobs and collect their predictions in the order of the jobs.
 
     Raises
@@ -76,8 +84,13 @@ def run_jobs(
         executor.shutdown(wait=True, cancel_futures=True)
 
 
-def run_job(task: Task, settings: TrainSettings, job: Job) -> list[Prediction]:
-    """Predictions on the test part of each of the job's protocols."""
+def run_job(task: Task, settings: TrainSettings, job: Job) -> list[Outcome]:
+    """Predictions, or scores of novelty, on the test part of each of the job's protocols."""
+    if job.protocols[0] in OPEN_PROTOCOLS:
+        name = job.protocols[0]
+        if job.seed is None:
+            return [*fitted_runs(task, settings, name, _windows(task, name))]
+        return [*trained_runs(settings, name, job.seed, _windows(task, name))]
     if job.seed is None:
         cache: Cache = {}
         return [prediction for name in job.protocols for prediction in _run_baselines(task, settings, name, cache)]
@@ -151,7 +164,12 @@ def _fit_baseline(task: Task, settings: TrainSettings, protocol: str, method: st
         train, validation, test = (spectrum_table(windows, scale) for windows in sets)
         return nearest_spectrum(train, _with_validation(validation, test), n_classes=n_classes)
     train, validation, test = (
-        feature_table(task, subset_segments(task, protocol, subset), features=settings.features, cache=cache)
+        feature_table(
+            task.part(protocol, subset),
+            subset_segments(task, protocol, subset),
+            features=settings.features,
+            cache=cache,
+        )
         for subset in SUBSETS
     )
     judged = _with_validation(validation, test)
@@ -181,8 +199,12 @@ _work: dict[str, Any] = {}
 def _windows(task: Task, protocol: str) -> dict[str, WindowSet]:
     if protocol not in _loaded:
         _loaded.clear()
-        _loaded[protocol] = {name: load_windows(task, subset_segments(task, protocol, name)) for name in SUBSETS}
+        _loaded[protocol] = {name: _load(task, protocol, name) for name in SUBSETS}
     return _loaded[protocol]
+
+
+def _load(task: Task, protocol: str, subset: str) -> WindowSet:
+    return load_windows(task.part(protocol, subset), subset_segments(task, protocol, subset))
 
 
 def _domain(protocol: str, train: WindowSet, validation: WindowSet) -> Domain:
@@ -201,7 +223,7 @@ def _start_worker(task: Task, settings: TrainSettings) -> None:
     _work.update(task=task, settings=settings)
 
 
-def _run_in_worker(job: Job) -> list[Prediction]:
+def _run_in_worker(job: Job) -> list[Outcome]:
     return run_job(_work["task"], _work["settings"], job)
 
 

@@ -52,6 +52,7 @@ class ModelDescription:
     speed_rpm_range: tuple[float, float] | None = None
     out_of_distribution: dict[str, Any] | None = None
     temperature: float = 1.0  # see `diagnose.calibration`; models of before have none
+    test_channel_names: tuple[str, ...] | None = None  # of protocol cross_sensor
 
     def __post_init__(self) -> None:
         if not 0 < self.temperature < float("inf"):
@@ -61,12 +62,13 @@ class ModelDescription:
 def model_description(task: Task, settings: TrainSettings, prediction: Prediction) -> ModelDescription:
     """Description of the network behind a prediction."""
     trained_on = subset_segments(task, prediction.protocol, "train").record
+    channels, tested = (task.part(prediction.protocol, subset).channel_names for subset in ("train", "test"))
     speed = np.asarray(task.dataset.column("speed_rpm"), dtype=float)[trained_on]
     return ModelDescription(
         model_schema_version=MODEL_SCHEMA_VERSION,
         model=dict(settings.model),
         class_names=task.class_names,
-        channel_names=task.channel_names,
+        channel_names=channels,
         sampling_rate_hz=float(task.dataset.sampling_rate),
         window_samples=task.window_samples,
         stride_samples=task.stride_samples,
@@ -80,6 +82,7 @@ def model_description(task: Task, settings: TrainSettings, prediction: Predictio
         speed_rpm_range=(float(speed.min()), float(speed.max())),
         out_of_distribution=None if prediction.domain is None else prediction.domain.facts(),
         temperature=prediction.temperature,
+        test_channel_names=None if tested == channels else tested,
     )
 
 
@@ -172,6 +175,8 @@ def _read_description(folder: Path) -> ModelDescription:
             raise DatasetError(f"{path}: model schema {version!r}, this program reads {known}")
         for name in ("class_names", "channel_names"):
             content[name] = tuple(str(value) for value in content[name])
+        if content.get("test_channel_names") is not None:
+            content["test_channel_names"] = tuple(str(value) for value in content["test_channel_names"])
         content["sampling_rate_hz"] = float(content["sampling_rate_hz"])
         for name in ("window_samples", "stride_samples"):
             if not isinstance(content[name], int) or content[name] < 1:

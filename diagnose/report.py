@@ -10,6 +10,7 @@ from typing import Any
 from diagnose.answer_sections import answer_sections
 from diagnose.answer_tables import write_tables
 from diagnose.figures import confusion_figure, reliability_figure, scores_figure, severity_figure
+from diagnose.novelty_report import novelty_sections
 from diagnose.page import Section, Table, write_page
 from diagnose.protocols import MEANING
 from diagnose.report_text import (
@@ -40,6 +41,8 @@ def write_report(folder: Path, metrics: Mapping[str, Any]) -> Path:
 
 def result_table(metrics: Mapping[str, Any]) -> list[str]:
     """Markdown table of protocol x method: balanced accuracy with its 95 % interval, leaky protocols last."""
+    if not metrics["protocols"]:
+        return []
     table = _score_table(metrics)
     lines = ["| " + " | ".join(table.head) + " |", "|---" * len(table.head) + "|"]
     for number, (name, *cells) in enumerate(table.rows):
@@ -72,10 +75,41 @@ def _lead(metrics: Mapping[str, Any]) -> list[str]:
 
 
 def _sections(folder: Path, metrics: Mapping[str, Any]) -> list[Section]:
-    model = metrics["model"]
     ordered = sorted(metrics["protocols"].items(), key=lambda item: item[1]["leaky"])
     clean = {name: result for name, result in ordered if not result["leaky"]}
-    sections = [
+    sections = []
+    if ordered:
+        sections += _score_sections(folder, metrics, ordered)
+    if clean:
+        sections.append(_fault_section(folder, clean, metrics))
+        sections.append(_severity_section(folder, clean))
+        sections += answer_sections(folder, clean)
+    sections += novelty_sections(metrics["novelty"])
+    sections.append(Section(title="Caveats", notes=[("", line) for line in caveats(metrics)]))
+    if ordered:
+        sections.append(_meaning_section(metrics, clean))
+    if clean:
+        sections.append(_trust_section(folder, clean))
+    sections.append(_confusion_section(folder, metrics, ordered))
+    sections.append(
+        Section(
+            title="Files beside this page",
+            notes=[
+                ("metrics.json", "everything in numbers, with macro-F1, recall, calibration, settings and versions."),
+                ("predictions.csv", "what each method said of each test record."),
+                ("scores.csv and more", "the same numbers as tables, explained in docs/howto/report.md."),
+                *([("novelty.csv", "each score of novelty of each test record.")] if metrics["novelty"] else []),
+                ("models/", "the networks, one folder each, for diagnose evaluate and diagnose predict."),
+            ],
+            folded=True,
+        )
+    )
+    return [section for section in sections if section.text or section.table or section.notes or section.figures]
+
+
+def _score_sections(folder: Path, metrics: Mapping[str, Any], ordered: Sequence[tuple[str, Any]]) -> list[Section]:
+    model = metrics["model"]
+    return [
         Section(
             title="In short",
             text=["Balanced accuracy of the network over test records: the mean share recognised of each class."],
@@ -91,42 +125,22 @@ def _sections(folder: Path, metrics: Mapping[str, Any]) -> list[Section]:
             figures=_figures(folder, "scores.png", "scores and intervals; dotted: chance", scores_figure, metrics),
         ),
     ]
-    if clean:
-        sections.append(_fault_section(folder, clean, metrics))
-        sections.append(_severity_section(folder, clean))
-        sections += answer_sections(folder, clean)
-    sections.append(Section(title="Caveats", notes=[("", line) for line in caveats(metrics)]))
-    sections.append(
-        Section(
-            title="What the numbers mean",
-            notes=[
-                (
-                    "A record's label",
-                    "the class with the largest mean log-probability over its windows.",
-                ),
-                *[(name, f"{MEANING[name]}.") for name in clean],
-                ("LEAKY", f"{LEAKY_MEANING}."),
-                *[(METHODS[name], text) for name, text in METHOD_MEANING.items() if _has(metrics, name)],
-            ],
-            folded=True,
-        )
+
+
+def _meaning_section(metrics: Mapping[str, Any], clean: Mapping[str, Any]) -> Section:
+    return Section(
+        title="What the numbers mean",
+        notes=[
+            (
+                "A record's label",
+                "the class with the largest mean log-probability over its windows.",
+            ),
+            *[(name, f"{MEANING[name]}{_sensors(result)}.") for name, result in clean.items()],
+            ("LEAKY", f"{LEAKY_MEANING}."),
+            *[(METHODS[name], text) for name, text in METHOD_MEANING.items() if _has(metrics, name)],
+        ],
+        folded=True,
     )
-    if clean:
-        sections.append(_trust_section(folder, clean))
-    sections.append(_confusion_section(folder, metrics, ordered))
-    sections.append(
-        Section(
-            title="Files beside this page",
-            notes=[
-                ("metrics.json", "everything in numbers, with macro-F1, recall, calibration, settings and versions."),
-                ("predictions.csv", "what each method said of each test record."),
-                ("scores.csv and more", "the same numbers as tables, explained in docs/howto/report.md."),
-                ("models/", "the networks, one folder each, for diagnose evaluate and diagnose predict."),
-            ],
-            folded=True,
-        )
-    )
-    return [section for section in sections if section.text or section.table or section.notes or section.figures]
 
 
 def _fault_section(folder: Path, clean: Mapping[str, Any], metrics: Mapping[str, Any]) -> Section:
@@ -180,6 +194,12 @@ def _figures(folder: Path, name: str, caption: str, draw: Any, content: Any) -> 
     """Draw one figure into the folder, for the page to show."""
     draw(folder / name, content)
     return [(name, caption)]
+
+
+def _sensors(result: Mapping[str, Any]) -> str:
+    """Which channels, where the test has others than the training."""
+    trained, tested = (", ".join(result["channels"][subset]) for subset in ("train", "test"))
+    return "" if trained == tested else f": trained on {trained}, tested on {tested}"
 
 
 def _has(metrics: Mapping[str, Any], method: str) -> bool:

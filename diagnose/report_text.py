@@ -7,6 +7,7 @@ from typing import Any
 
 import numpy as np
 
+from diagnose.novelty_report import novelty_caveats
 from diagnose.page import Card, Table
 
 FEW_UNITS = 10
@@ -146,6 +147,7 @@ def caveats(metrics: Mapping[str, Any]) -> list[str]:
                 f"{name}: only {n_units} test unit(s). The interval shows the spread of these units and is too "
                 f"narrow for new ones; at least {FEW_UNITS} are advisable."
             )
+    lines += novelty_caveats(metrics["novelty"], FEW_UNITS)
     if metrics["settings"]["normalise"] == "rms":
         lines.append(
             "The network sees windows without their level, the indicators with it unless stated; "

@@ -24,6 +24,7 @@ class TrainSettings:
     protocols: tuple[str, ...] | None
     classes: tuple[str, ...] | None
     channels: tuple[str, ...] | None
+    test_channels: tuple[str, ...] | None
     seeds: tuple[int, ...]
     window_samples: int
     stride_samples: int
@@ -59,7 +60,7 @@ class TrainSettings:
             _check_whole("n_threads", self.n_threads, least=1)
         for name in ("learning_rate", "weight_decay", "epoch_fraction"):
             _check_number(name, getattr(self, name))
-        for name in ("protocols", "classes", "channels", "seeds"):
+        for name in ("protocols", "classes", "channels", "test_channels", "seeds"):
             values = getattr(self, name)
             if values is not None and (not values or len(set(values)) < len(values)):
                 raise ConfigError(f"{name} must be a list of different values, at least one")
@@ -89,7 +90,7 @@ def settings_from(config: Mapping[str, Any]) -> TrainSettings:
     if unknown := sorted(set(config) - known):
         raise ConfigError(f"diagnose train knows no key '{unknown[0]}'")
     values = dict(config)
-    for name in ("protocols", "classes", "channels", "seeds"):
+    for name in ("protocols", "classes", "channels", "test_channels", "seeds"):
         values[name] = _as_tuple(name, values[name])
     if values["seeds"] is None:
         raise ConfigError("seeds must be a list of different values, at least one")

@@ -7,7 +7,7 @@ import platform
 import sys
 import time
 from collections.abc import Callable, Sequence
-from dataclasses import asdict
+from dataclasses import asdict, replace
 from pathlib import Path
 from typing import Any
 
@@ -15,13 +15,16 @@ import numpy as np
 from numpy.typing import NDArray
 
 from diagnose.answers import protocol_answers
+from diagnose.autoencoder import check_window_for_autoencoder
 from diagnose.calibration import calibration_scores
-from diagnose.jobs import Job, run_jobs
+from diagnose.jobs import Job, Outcome, run_jobs
 from diagnose.metrics import SCORES, confusion_by_unit, recall, score_with_interval
 from diagnose.model_io import data_fingerprint, model_description, save_model
 from diagnose.models import build_model, check_window
+from diagnose.novelty import NoveltyRun
+from diagnose.novelty_metrics import check_open_protocol, novelty_protocol_result, write_novelty
 from diagnose.predictions import Prediction, write_predictions
-from diagnose.protocols import choose_protocols
+from diagnose.protocols import OPEN_PROTOCOLS, channels_to_cross, choose_protocols
 from diagnose.settings import BASELINES, TrainSettings
 from diagnose.train import device_of
 from diagnose.windows import SUBSETS, Task, plan_windows, subset_segments, task_of
@@ -46,7 +49,7 @@ def plan_study(task: Task, settings: TrainSettings) -> tuple[tuple[str, ...], li
     ConfigError    for a protocol that does not exist or cannot be trained on, a device that does not exist, an empty
         subset or a window that does not fit
     """
-    wanted, _ = choose_protocols(task.dataset, settings.protocols)
+    wanted, _ = choose_protocols(task, settings.protocols)
     protocols = tuple(sorted(wanted, key=lambda name: (is_leaky(name), wanted.index(name))))
     labels = task.labels()
     for protocol in protocols:
@@ -54,16 +57,22 @@ def plan_study(task: Task, settings: TrainSettings) -> tuple[tuple[str, ...], li
             segments = subset_segments(task, protocol, subset)
             plan_windows(segments, task.window_samples, task.stride_samples)
             present = np.unique(labels[segments.record])
-            if subset != "validation" and present.size < 2:
+            if protocol not in OPEN_PROTOCOLS and subset != "validation" and present.size < 2:
                 name = task.class_names[int(present[0])]
                 raise ConfigError(f"protocol {protocol}: one class only in its {subset} part ({name})")
+        if protocol in OPEN_PROTOCOLS:
+            check_open_protocol(task, protocol)
+    if "healthy_only" in protocols:
+        check_window_for_autoencoder(task.window_samples)
     model = build_model(settings.model, n_channels=len(task.channel_names), n_classes=len(task.class_names))
     check_window(model, len(task.channel_names), task.window_samples)
     device_of(settings.device)
-    jobs = [Job(protocols=protocols, seed=None)] if settings.baselines else []
+    closed = tuple(name for name in protocols if name not in OPEN_PROTOCOLS)
+    jobs = [Job(protocols=closed, seed=None)] if settings.baselines and closed else []
     for protocol in protocols:
+        jobs += [Job(protocols=(protocol,), seed=None)] if protocol not in closed else []
         jobs += [Job(protocols=(protocol,), seed=seed) for seed in settings.seeds]
-        if settings.shuffle_control:
+        if settings.shuffle_control and protocol in closed:
             first = min(settings.seeds)
             jobs += [Job(protocols=(protocol,), seed=first + k, shuffled=True) for k in range(settings.n_seeds_control)]
     return protocols, jobs
@@ -71,7 +80,7 @@ def plan_study(task: Task, settings: TrainSettings) -> tuple[tuple[str, ...], li
 
 def task_from(dataset: Any, settings: TrainSettings) -> Task:
     """Task that the settings describe on an open data set."""
-    return task_of(
+    task = task_of(
         dataset,
         window_samples=settings.window_samples,
         stride_samples=settings.stride_samples,
@@ -79,6 +88,8 @@ def task_from(dataset: Any, settings: TrainSettings) -> Task:
         classes=settings.classes,
         channels=settings.channels,
     )
+    crossed = channels_to_cross(dataset.channel_names, settings.channels, settings.test_channels)
+    return replace(task, cross_channels=crossed)
 
 
 def run_study(
@@ -101,21 +112,32 @@ def run_study(
     """
     started = time.perf_counter()
 
-    def report(predictions: list[Prediction]) -> None:
+    def report(predictions: list[Outcome]) -> None:
         last = predictions[-1]
         baselines = last.method in BASELINES
         name = "baselines" if baselines else f"{last.protocol}, {last.method}, seed {last.seed}: {last.detail}"
         on_done(name)
 
     n_workers = settings.n_threads or _n_cores()
-    predictions = run_jobs(task, settings, jobs, n_workers=n_workers, on_done=report)
+    outcomes = run_jobs(task, settings, jobs, n_workers=n_workers, on_done=report)
+    predictions = [outcome for outcome in outcomes if isinstance(outcome, Prediction)]
+    novelty = [outcome for outcome in outcomes if isinstance(outcome, NoveltyRun)]
     for prediction in predictions:
         if prediction.weights is not None:
             target = folder / "models" / f"{prediction.protocol}-seed{prediction.seed}"
             known = {} if prediction.domain is None else prediction.domain.tensors()
             save_model(target, prediction.weights | known, model_description(task, settings, prediction))
     write_predictions(folder / "predictions.csv", task, predictions)
-    results = {protocol: _protocol_result(task, settings, protocol, predictions) for protocol in protocols}
+    if novelty:
+        write_novelty(folder / "novelty.csv", task, novelty)
+    results = {
+        name: _protocol_result(task, settings, name, predictions) for name in protocols if name not in OPEN_PROTOCOLS
+    }
+    novelty_results = {
+        name: novelty_protocol_result(task, name, novelty, n_bootstrap=settings.n_bootstrap, seed=BOOTSTRAP_SEED)
+        for name in protocols
+        if name in OPEN_PROTOCOLS
+    }
     return {
         "metrics_schema_version": METRICS_SCHEMA_VERSION,
         "data": str(task.dataset.folder),
@@ -128,7 +150,8 @@ def run_study(
         "model": str(settings.model.get("name", "network")),
         "settings": {**asdict(settings), "model": dict(settings.model)},
         "protocols": results,
-        "protocols_left_out": choose_protocols(task.dataset, settings.protocols)[1],
+        "novelty": novelty_results,
+        "protocols_left_out": choose_protocols(task, settings.protocols)[1],
         "duration_s": round(time.perf_counter() - started, 1),
         "environment": _environment(),
     }
@@ -222,6 +245,7 @@ def _protocol_result(
     parts = {subset: np.unique(subset_segments(task, protocol, subset).record) for subset in SUBSETS}
     return {
         "leaky": is_leaky(protocol),
+        "channels": {subset: list(task.part(protocol, subset).channel_names) for subset in ("train", "test")},
         "n_records": {subset: int(record.size) for subset, record in parts.items()},
         "n_units": {subset: int(np.unique(unit[record]).size) for subset, record in parts.items()},
         "methods": methods,
