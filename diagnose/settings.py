@@ -25,6 +25,7 @@ class TrainSettings:
     classes: tuple[str, ...] | None
     channels: tuple[str, ...] | None
     seeds: tuple[int, ...]
+    sampling_rate_hz: float | None
     window_samples: int
     stride_samples: int
     normalise: str
@@ -57,6 +58,8 @@ class TrainSettings:
         _check_whole("minirocket_features", self.minirocket_features, least=LEAST_ROCKET_FEATURES)
         if self.n_threads is not None:
             _check_whole("n_threads", self.n_threads, least=1)
+        if self.sampling_rate_hz is not None:
+            _check_rate("sampling_rate_hz", self.sampling_rate_hz)
         for name in ("learning_rate", "weight_decay", "epoch_fraction"):
             _check_number(name, getattr(self, name))
         for name in ("protocols", "classes", "channels", "seeds"):
@@ -110,6 +113,11 @@ def _as_tuple(name: str, value: Any) -> tuple[Any, ...] | None:
 def _check_whole(name: str, value: Any, *, least: int) -> None:
     if isinstance(value, bool) or not isinstance(value, int) or value < least:
         raise ConfigError(f"{name} must be a whole number of at least {least}, not {value!r}")
+
+
+def _check_rate(name: str, value: Any) -> None:
+    if isinstance(value, bool) or not isinstance(value, int | float) or not 0 < value < float("inf"):
+        raise ConfigError(f"{name} must be null or a number of samples a second, not {value!r}")
 
 
 def _check_number(name: str, value: Any) -> None:

@@ -15,6 +15,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
+from diagnose.at_rate import at_rate
 from diagnose.calibration import calibration_scores
 from diagnose.jobs import Job, Prediction, run_jobs
 from diagnose.metrics import SCORES, confusion_by_unit, recall, score_with_interval
@@ -70,7 +71,7 @@ def plan_study(task: Task, settings: TrainSettings) -> tuple[tuple[str, ...], li
 def task_from(dataset: Any, settings: TrainSettings) -> Task:
     """Task that the settings describe on an open data set."""
     return task_of(
-        dataset,
+        at_rate(dataset, settings.sampling_rate_hz),
         window_samples=settings.window_samples,
         stride_samples=settings.stride_samples,
         normalise=settings.normalise,
