@@ -43,6 +43,7 @@ class TrainSettings:
     n_bootstrap: int
     n_threads: int | None
     device: str
+    tensorboard: bool
 
     def __post_init__(self) -> None:
         for name in (
@@ -68,8 +69,9 @@ class TrainSettings:
                 raise ConfigError(f"{name} must be a list of different values, at least one")
         for seed in self.seeds:
             _check_whole("seeds", seed, least=0)
-        if not isinstance(self.shuffle_control, bool):
-            raise ConfigError(f"shuffle_control must be true or false, not {self.shuffle_control!r}")
+        for name in ("shuffle_control", "tensorboard"):
+            if not isinstance(getattr(self, name), bool):
+                raise ConfigError(f"{name} must be true or false, not {getattr(self, name)!r}")
         if len(set(self.baselines)) < len(self.baselines) or not set(self.baselines) <= set(BASELINES):
             raise ConfigError(
                 f"baselines must be false or a list of different names out of {', '.join(BASELINES)}, "

@@ -23,6 +23,7 @@ from diagnose.models import build_model, check_window
 from diagnose.predictions import Prediction, write_predictions
 from diagnose.protocols import choose_protocols
 from diagnose.settings import BASELINES, TrainSettings
+from diagnose.tensorboard import need_tensorboard, write_scores
 from diagnose.train import device_of
 from diagnose.windows import SUBSETS, Task, plan_windows, subset_segments, task_of
 from gensig.errors import ConfigError
@@ -60,6 +61,8 @@ def plan_study(task: Task, settings: TrainSettings) -> tuple[tuple[str, ...], li
     model = build_model(settings.model, n_channels=len(task.channel_names), n_classes=len(task.class_names))
     check_window(model, len(task.channel_names), task.window_samples)
     device_of(settings.device)
+    if settings.tensorboard:
+        need_tensorboard()
     jobs = [Job(protocols=protocols, seed=None)] if settings.baselines else []
     for protocol in protocols:
         jobs += [Job(protocols=(protocol,), seed=seed) for seed in settings.seeds]
@@ -116,6 +119,8 @@ def run_study(
             save_model(target, prediction.weights | known, model_description(task, settings, prediction))
     write_predictions(folder / "predictions.csv", task, predictions)
     results = {protocol: _protocol_result(task, settings, protocol, predictions) for protocol in protocols}
+    if settings.tensorboard:
+        write_scores(folder, results)
     return {
         "metrics_schema_version": METRICS_SCHEMA_VERSION,
         "data": str(task.dataset.folder),
