@@ -84,7 +84,7 @@ def export_onnx(model: nn.Module, description: ModelDescription, file: Path) -> 
     """
     need_packages()
     whole = RawWindows(_with_fixed_pooling(model, description), description.normalise).eval()
-    examples = _examples(description)
+    examples = _examples(model, description)
     try:
         _write(whole, torch.from_numpy(examples[:2]), file)
         _describe(file, description)
@@ -108,7 +108,7 @@ def largest_difference(model: nn.Module, description: ModelDescription, file: Pa
     """
     import onnxruntime
 
-    examples = _examples(description)
+    examples = _examples(model, description)
     with torch.inference_mode():
         windows = torch.from_numpy(normalised(examples, description.normalise))
         expected = log_softmax(model.eval()(windows), dim=1).numpy().astype(float)
@@ -177,13 +177,17 @@ def _describe(file: Path, description: ModelDescription) -> None:
     onnx.save(content, file)
 
 
-def _examples(description: ModelDescription) -> NDArray[np.float32]:
-    """(window, channel, sample) m/s2: noise and tones of many levels beside an offset, and a silent channel."""
+def _examples(model: nn.Module, description: ModelDescription) -> NDArray[np.float32]:
+    """(window, channel, sample) m/s2: noise and tones beside an offset, and a silent channel.
+
+    Levels go from a tenth to ten times what the network divides its input by, the RMS of its training.
+    """
     rng = np.random.default_rng(0)
     shape = (N_CHECKED, len(description.channel_names), description.window_samples)
     time = np.arange(description.window_samples)
     tones = np.sin(2 * np.pi * rng.uniform(0.001, 0.4, shape[:2])[..., None] * time)
-    level = np.geomspace(0.1, 100.0, N_CHECKED)[:, None, None]
+    typical = model.get_buffer("input_scale").numpy()  # (channel, 1)
+    level = np.geomspace(0.1, 10.0, N_CHECKED)[:, None, None] * typical
     windows = level * (rng.standard_normal(shape) + 2.0 * tones + 0.5)
     windows[-1, 0] = 0.0
     return windows.astype(np.float32)

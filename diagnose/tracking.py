@@ -97,7 +97,7 @@ def track_by_mesh(recording: Recording, teeth: Teeth, speed_rpm: float) -> Track
     fine = np.interp(np.arange(FINER * (turned.size - 1) + 1) / FINER, np.arange(turned.size), turned)
     turns = resample_by_angle(_finer(recording)[:, : fine.size], 2.0 * np.pi * fine)
     passed = np.interp(np.arange(turns.shape[-2] + 1), turned, np.arange(turned.size) / rate)
-    return _tracked("mesh", turns, 60.0 * turned[-1] / (turned.size - 1) * rate, 60.0 / np.diff(passed))
+    return _tracked("mesh", turns, float(60.0 * turned[-1] / (turned.size - 1) * rate), 60.0 / np.diff(passed))
 
 
 def at_constant_speed(tracked: Tracked, sampling_rate: float, speed_rpm: float) -> FloatArray:
