@@ -9,6 +9,7 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
+from diagnose.at_rate import at_rate
 from diagnose.model_io import ModelDescription, data_fingerprint, schema_version
 from diagnose.windows import Segments, Task, all_segments, load_windows, subset_segments, task_of
 from gensig.errors import ConfigError, DatasetError
@@ -82,7 +83,7 @@ def _matching_task(description: ModelDescription, dataset: Dataset, channels: Se
         raise DatasetError(
             f"{where}: data schema {schema_version(dataset)}, trained on schema {description.data_schema_version}"
         )
-    if not np.isclose(dataset.sampling_rate, description.sampling_rate_hz, rtol=1e-9):
+    if dataset.sampling_rate < description.sampling_rate_hz * (1 - 1e-9):
         raise DatasetError(
             f"{where}: sampled at {dataset.sampling_rate:g} Hz, trained at {description.sampling_rate_hz:g} Hz"
         )
@@ -101,7 +102,7 @@ def _matching_task(description: ModelDescription, dataset: Dataset, channels: Se
     if set(known) - set(offered) or (set(offered) - set(known) and not own):
         raise DatasetError(f"{where}: its classes are {', '.join(offered)}, the model knows {', '.join(known)}")
     task = task_of(
-        dataset,
+        at_rate(dataset, description.sampling_rate_hz),
         window_samples=description.window_samples,
         stride_samples=description.stride_samples,
         normalise=description.normalise,

@@ -25,6 +25,7 @@ from diagnose.novelty import NoveltyRun, fitted_runs, trained_runs
 from diagnose.predictions import Prediction, Rows
 from diagnose.protocols import OPEN_PROTOCOLS
 from diagnose.settings import TrainSettings
+from diagnose.tensorboard import epoch_log
 from diagnose.train import input_scale, predict_windows, train_network, with_shuffled_labels
 from diagnose.window_features import rocket_tables, spectrum_table
 from diagnose.windows import SUBSETS, Task, WindowSet, load_windows, subset_segments
@@ -104,9 +105,17 @@ def _run_training(task: Task, settings: TrainSettings, protocol: str, seed: int,
         rng = np.random.default_rng([seed, 2])
         train = with_shuffled_labels(train, n_classes, rng)
         validation = with_shuffled_labels(validation, n_classes, rng)
-    training = train_network(
-        train, validation, model_config=settings.model, n_classes=n_classes, settings=settings, seed=seed
-    )
+    run = f"{protocol}-{'label_shuffle-' if shuffled else ''}seed{seed}"
+    with epoch_log(settings.out, run, wanted=settings.tensorboard) as on_epoch:
+        training = train_network(
+            train,
+            validation,
+            model_config=settings.model,
+            n_classes=n_classes,
+            settings=settings,
+            seed=seed,
+            on_epoch=on_epoch,
+        )
     by_window = predict_windows(training.model, test)
     record, log_probability = over_records(by_window, test.record)
     held_out, held_out_scores = over_records(predict_windows(training.model, validation), validation.record)

@@ -51,6 +51,7 @@ class ModelDescription:
     n_bootstrap: int
     speed_rpm_range: tuple[float, float] | None = None
     out_of_distribution: dict[str, Any] | None = None
+    n_teeth: tuple[int, int] | None = None  # of the driving and the driven gear; None where not told or not the same
     temperature: float = 1.0  # see `diagnose.calibration`; models of before have none
     test_channel_names: tuple[str, ...] | None = None  # of protocol cross_sensor
 
@@ -80,10 +81,19 @@ def model_description(task: Task, settings: TrainSettings, prediction: Predictio
         best_epoch=prediction.best_epoch,
         n_bootstrap=settings.n_bootstrap,
         speed_rpm_range=(float(speed.min()), float(speed.max())),
+        n_teeth=_n_teeth(task.dataset),
         out_of_distribution=None if prediction.domain is None else prediction.domain.facts(),
         temperature=prediction.temperature,
         test_channel_names=None if tested == channels else tested,
     )
+
+
+def _n_teeth(dataset: Dataset) -> tuple[int, int] | None:
+    """Teeth of the data set's pinion, which drives, and of its wheel."""
+    names = ("n_teeth_pinion", "n_teeth_wheel")
+    if any(dataset.attributes.get(name) is None for name in names):
+        return None
+    return int(dataset.attributes[names[0]]), int(dataset.attributes[names[1]])
 
 
 def save_model(folder: Path, weights: Mapping[str, np.ndarray], description: ModelDescription) -> None:
@@ -184,6 +194,9 @@ def _read_description(folder: Path) -> ModelDescription:
         if content.get("speed_rpm_range") is not None:
             low, high = content["speed_rpm_range"]
             content["speed_rpm_range"] = (float(low), float(high))
+        if content.get("n_teeth") is not None:
+            driving, driven = content["n_teeth"]
+            content["n_teeth"] = (int(driving), int(driven))
         if content.get("out_of_distribution") is not None:
             content["out_of_distribution"] = dict(content["out_of_distribution"])
         return ModelDescription(**content)

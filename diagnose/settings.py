@@ -26,6 +26,7 @@ class TrainSettings:
     channels: tuple[str, ...] | None
     test_channels: tuple[str, ...] | None
     seeds: tuple[int, ...]
+    sampling_rate_hz: float | None
     window_samples: int
     stride_samples: int
     normalise: str
@@ -43,6 +44,7 @@ class TrainSettings:
     n_bootstrap: int
     n_threads: int | None
     device: str
+    tensorboard: bool
 
     def __post_init__(self) -> None:
         for name in (
@@ -58,6 +60,8 @@ class TrainSettings:
         _check_whole("minirocket_features", self.minirocket_features, least=LEAST_ROCKET_FEATURES)
         if self.n_threads is not None:
             _check_whole("n_threads", self.n_threads, least=1)
+        if self.sampling_rate_hz is not None:
+            _check_rate("sampling_rate_hz", self.sampling_rate_hz)
         for name in ("learning_rate", "weight_decay", "epoch_fraction"):
             _check_number(name, getattr(self, name))
         for name in ("protocols", "classes", "channels", "test_channels", "seeds"):
@@ -66,8 +70,9 @@ class TrainSettings:
                 raise ConfigError(f"{name} must be a list of different values, at least one")
         for seed in self.seeds:
             _check_whole("seeds", seed, least=0)
-        if not isinstance(self.shuffle_control, bool):
-            raise ConfigError(f"shuffle_control must be true or false, not {self.shuffle_control!r}")
+        for name in ("shuffle_control", "tensorboard"):
+            if not isinstance(getattr(self, name), bool):
+                raise ConfigError(f"{name} must be true or false, not {getattr(self, name)!r}")
         if len(set(self.baselines)) < len(self.baselines) or not set(self.baselines) <= set(BASELINES):
             raise ConfigError(
                 f"baselines must be false or a list of different names out of {', '.join(BASELINES)}, "
@@ -111,6 +116,11 @@ def _as_tuple(name: str, value: Any) -> tuple[Any, ...] | None:
 def _check_whole(name: str, value: Any, *, least: int) -> None:
     if isinstance(value, bool) or not isinstance(value, int) or value < least:
         raise ConfigError(f"{name} must be a whole number of at least {least}, not {value!r}")
+
+
+def _check_rate(name: str, value: Any) -> None:
+    if isinstance(value, bool) or not isinstance(value, int | float) or not 0 < value < float("inf"):
+        raise ConfigError(f"{name} must be null or a number of samples a second, not {value!r}")
 
 
 def _check_number(name: str, value: Any) -> None:

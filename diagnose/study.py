@@ -16,6 +16,7 @@ from numpy.typing import NDArray
 
 from diagnose.answers import protocol_answers
 from diagnose.autoencoder import check_window_for_autoencoder
+from diagnose.at_rate import at_rate
 from diagnose.calibration import calibration_scores
 from diagnose.jobs import Job, Outcome, run_jobs
 from diagnose.metrics import SCORES, confusion_by_unit, recall, score_with_interval
@@ -26,6 +27,7 @@ from diagnose.novelty_metrics import check_open_protocol, novelty_protocol_resul
 from diagnose.predictions import Prediction, write_predictions
 from diagnose.protocols import OPEN_PROTOCOLS, channels_to_cross, choose_protocols
 from diagnose.settings import BASELINES, TrainSettings
+from diagnose.tensorboard import need_tensorboard, write_scores
 from diagnose.train import device_of
 from diagnose.windows import SUBSETS, Task, plan_windows, subset_segments, task_of
 from gensig.errors import ConfigError
@@ -67,6 +69,8 @@ def plan_study(task: Task, settings: TrainSettings) -> tuple[tuple[str, ...], li
     model = build_model(settings.model, n_channels=len(task.channel_names), n_classes=len(task.class_names))
     check_window(model, len(task.channel_names), task.window_samples)
     device_of(settings.device)
+    if settings.tensorboard:
+        need_tensorboard()
     closed = tuple(name for name in protocols if name not in OPEN_PROTOCOLS)
     jobs = [Job(protocols=closed, seed=None)] if settings.baselines and closed else []
     for protocol in protocols:
@@ -81,7 +85,7 @@ def plan_study(task: Task, settings: TrainSettings) -> tuple[tuple[str, ...], li
 def task_from(dataset: Any, settings: TrainSettings) -> Task:
     """Task that the settings describe on an open data set."""
     task = task_of(
-        dataset,
+        at_rate(dataset, settings.sampling_rate_hz),
         window_samples=settings.window_samples,
         stride_samples=settings.stride_samples,
         normalise=settings.normalise,
@@ -138,6 +142,8 @@ def run_study(
         for name in protocols
         if name in OPEN_PROTOCOLS
     }
+    if settings.tensorboard:
+        write_scores(folder, results)
     return {
         "metrics_schema_version": METRICS_SCHEMA_VERSION,
         "data": str(task.dataset.folder),

@@ -14,10 +14,10 @@ from gensig.planning import make_plan
 from gensig.records import simulate_records
 from gensig.sensing.agreement import third_octave_bands, third_octave_power
 from gensig.signals.indicators import crest_factor, kurtosis, rms
+from gensig.signals.mesh_motion import Motion, Teeth
 from gensig.signals.recording import Recording
 from gensig.twin.grade import sideband_ratios
 from gensig.twin.lines import find_lines
-from gensig.twin.speed import Motion, Teeth
 
 Array = NDArray[np.float64]
 

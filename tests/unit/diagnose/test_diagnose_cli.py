@@ -175,7 +175,7 @@ def test_evaluate_on_another_data_set_takes_all_records(trained, data, capsys):
 @pytest.mark.parametrize(
     ("changes", "attributes", "message"),
     [
-        ({"sampling_rate": 25600.0}, {}, "sampled at 25600 Hz, trained at 12800 Hz"),
+        ({"sampling_rate": 6400.0}, {}, "sampled at 6400 Hz, trained at 12800 Hz"),
         ({"classes": ("healthy", "crack", "pitting", "broken")}, {}, "its classes are healthy, crack, pitting, broken"),
         ({"classes": ("healthy", "crack")}, {}, "its classes are healthy, crack, the model knows"),
         ({}, {"schema_version": 2}, "data schema 2, trained on schema 1"),
