@@ -118,7 +118,10 @@ def _page(metrics: Mapping[str, Any], with_severity: Sequence[str]) -> list[str]
         lines += ["", "## How severe a fault must be", "", "![recognised by severity](severity.png)"]
     lines += ["", *_trust_section(metrics)]
     lines += ["", "## Caveats", "", *_caveats(metrics), ""]
-    lines.append("Everything in numbers, with macro-F1, recall and settings: `metrics.json`. Networks: `models/`.")
+    lines.append(
+        "Everything in numbers, with macro-F1, recall and settings: `metrics.json`. What each method said of each test "
+        "record: `predictions.csv`. Networks: `models/`."
+    )
     return lines
 
 

@@ -16,10 +16,11 @@ import numpy as np
 from numpy.typing import NDArray
 
 from diagnose.calibration import calibration_scores
-from diagnose.jobs import Job, Prediction, run_jobs
+from diagnose.jobs import Job, run_jobs
 from diagnose.metrics import SCORES, confusion_by_unit, recall, score_with_interval
 from diagnose.model_io import data_fingerprint, model_description, save_model
 from diagnose.models import build_model, check_window
+from diagnose.predictions import Prediction, write_predictions
 from diagnose.protocols import choose_protocols
 from diagnose.settings import BASELINES, TrainSettings
 from diagnose.train import device_of
@@ -93,7 +94,7 @@ def run_study(
     Parameters
     ----------
     task, settings : what to learn and how
-    folder : exists; receives ``models/<protocol>-seed<k>``
+    folder : exists; receives ``models/<protocol>-seed<k>`` and ``predictions.csv``
     protocols, jobs : of `plan_study`
     on_done : told one line for each finished piece
     """
@@ -112,6 +113,7 @@ def run_study(
             target = folder / "models" / f"{prediction.protocol}-seed{prediction.seed}"
             known = {} if prediction.domain is None else prediction.domain.tensors()
             save_model(target, prediction.weights | known, model_description(task, settings, prediction))
+    write_predictions(folder / "predictions.csv", task, predictions)
     results = {protocol: _protocol_result(task, settings, protocol, predictions) for protocol in protocols}
     return {
         "metrics_schema_version": METRICS_SCHEMA_VERSION,
@@ -241,8 +243,7 @@ def _calibration(task: Task, network: Sequence[Prediction]) -> dict[str, Any]:
     """Calibration of the probabilities of test records, see `diagnose.calibration.calibration_scores`."""
     labels = task.labels()
     runs = [(run.log_probability, labels[run.record], run.temperature) for run in network]
-    known = [(values, truth, scale) for values, truth, scale in runs if values is not None]
-    return calibration_scores(*(list(column) for column in zip(*known, strict=True)))
+    return calibration_scores(*(list(column) for column in zip(*runs, strict=True)))
 
 
 def _n_cores() -> int:

@@ -1,5 +1,6 @@
 """The command from data to report, and one line for every mistake."""
 
+import csv
 import json
 import subprocess
 import sys
@@ -58,8 +59,8 @@ def fails(capsys, words, message):
 def test_train_writes_what_it_promises(trained):
     names = {path.name for path in trained.iterdir()}
     assert names == {
-        "metrics.json", "report.md", "models", "severity.png", "reliability.png", "confusion_by_unit.png",
-        "confusion_random_window_leaky.png",
+        "metrics.json", "predictions.csv", "report.md", "models",
+        "severity.png", "reliability.png", "confusion_by_unit.png", "confusion_random_window_leaky.png",
     }  # fmt: skip
     metrics = json.loads((trained / "metrics.json").read_text())
     assert list(metrics["protocols"]) == ["by_unit", "random_window_leaky"]
@@ -79,6 +80,23 @@ def test_train_writes_what_it_promises(trained):
         stored = json.loads((trained / "models" / f"by_unit-seed{seed}" / "model.json").read_text())
         assert stored["temperature"] == metrics["protocols"]["by_unit"]["calibration"]["temperature"][seed]
     assert not list(trained.rglob("*.pkl")) + list(trained.rglob("*.pt"))
+
+
+def test_predictions_hold_what_the_scores_are_made_of(trained):
+    metrics = json.loads((trained / "metrics.json").read_text())
+    with (trained / "predictions.csv").open(encoding="utf-8") as file:
+        rows = list(csv.DictReader(file))
+    mine = [row for row in rows if (row["protocol"], row["method"]) == ("by_unit", "indicators")]
+    shares = []
+    for name in metrics["class_names"]:
+        guesses = [row["predicted"] for row in mine if row["label"] == name]
+        shares.append(sum(guess == name for guess in guesses) / len(guesses))
+    score = metrics["protocols"]["by_unit"]["methods"]["indicators"]["balanced_accuracy"]["mean"]
+    assert sum(shares) / len(shares) == pytest.approx(score, abs=1e-12)
+    for row in mine:
+        largest = max(metrics["class_names"], key=lambda name: float(row[f"log_probability_{name}"]))
+        assert largest == row["predicted"]
+    assert {row["method"] for row in rows} >= {"cnn", "indicators", "label_shuffle"}
 
 
 def test_report_shows_the_leaky_protocol_last_and_says_so(trained):
