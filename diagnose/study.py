@@ -8,7 +8,6 @@ import sys
 import time
 from collections.abc import Callable, Sequence
 from dataclasses import asdict
-from importlib.metadata import version
 from pathlib import Path
 from typing import Any
 
@@ -26,6 +25,7 @@ from diagnose.settings import BASELINES, TrainSettings
 from diagnose.train import device_of
 from diagnose.windows import SUBSETS, Task, plan_windows, subset_segments, task_of
 from gensig.errors import ConfigError
+from gensig.version import __version__
 
 METRICS_SCHEMA_VERSION = 1
 BOOTSTRAP_SEED = 20240607
@@ -258,7 +258,7 @@ def _environment() -> dict[str, str]:
     import torch
 
     return {
-        "gensig": version("gensig"),
+        "gensig": __version__,
         "python": platform.python_version(),
         "numpy": np.__version__,
         "torch": str(torch.__version__),
