@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Callable
+from dataclasses import replace
 from typing import Any
 
 import numpy as np
@@ -10,6 +11,7 @@ from numpy.typing import NDArray
 
 from diagnose.features import FeatureTable
 from diagnose.metrics import balanced_accuracy, confusion_by_unit, over_records
+from diagnose.windows import WindowSet
 
 FloatArray = NDArray[np.floating]
 IntArray = NDArray[np.integer]
@@ -48,14 +50,33 @@ def indicator_model(
     """
     known = np.flatnonzero(np.isfinite(train.values).any(axis=0)).tolist()  # the boosting's bins need a value
     kept = [index for index in known if with_level or not train.names[index].endswith("log_rms")]
+    train, validation, test = (replace(table, values=table.values[:, kept]) for table in (train, validation, test))
+    _, name, model = best_candidate(train, validation, n_classes=n_classes)
+    return (name, *judged(model, test, n_classes))
+
+
+def best_candidate(train: FeatureTable, validation: FeatureTable, *, n_classes: int) -> tuple[float, str, Any]:
+    """Logistic regression or gradient boosting, the better one on the validation units.
+
+    Returns
+    -------
+    its balanced accuracy there, its name, the fitted model
+    """
     scored = []
     for name, make in _candidates().items():
-        model = make()
-        model.fit(train.values[:, kept], train.label)
-        judged = over_records(_log_probability(model, validation.values[:, kept], n_classes), validation.record)
-        scored.append((_accuracy(*judged, validation, n_classes), name, model))
-    _, name, model = max(scored, key=lambda row: row[0])
-    return (name, *over_records(_log_probability(model, test.values[:, kept], n_classes), test.record))
+        model = make().fit(train.values, train.label)
+        scored.append((balanced_score(*judged(model, validation, n_classes), validation, n_classes), name, model))
+    return max(scored, key=lambda row: row[0])
+
+
+def gradient_boosting(train: FeatureTable) -> Any:
+    """Fitted gradient boosting."""
+    return _candidates()["gradient boosting"]().fit(train.values, train.label)
+
+
+def judged(model: Any, table: FeatureTable, n_classes: int) -> tuple[IntArray, FloatArray]:
+    """Records (record,) of a table and their log-probabilities (record, class)."""
+    return over_records(_log_probability(model, table.values, n_classes), table.record)
 
 
 def nearest_spectrum(train: FeatureTable, test: FeatureTable, *, n_classes: int) -> Prediction:
@@ -89,8 +110,8 @@ def ridge_model(train: FeatureTable, validation: FeatureTable, test: FeatureTabl
     for penalty in np.logspace(5, -1, 7):
         model = make_pipeline(StandardScaler(), RidgeClassifier(alpha=penalty, class_weight="balanced"))
         model.fit(train.values, train.label)
-        judged = over_records(_soft_score(model, validation.values, n_classes), validation.record)
-        scored.append((_accuracy(*judged, validation, n_classes), f"ridge, penalty {penalty:g}", model))
+        found = over_records(_soft_score(model, validation.values, n_classes), validation.record)
+        scored.append((balanced_score(*found, validation, n_classes), f"ridge, penalty {penalty:g}", model))
     _, name, model = max(scored, key=lambda row: row[0])
     return (name, *over_records(_soft_score(model, test.values, n_classes), test.record))
 
@@ -145,8 +166,10 @@ def _soft_score(model: Any, values: FloatArray, n_classes: int) -> FloatArray:
     return by_class
 
 
-def _accuracy(records: IntArray, log_probability: FloatArray, table: FeatureTable, n_classes: int) -> float:
-    """Balanced accuracy over the records of a table."""
+def balanced_score(
+    records: IntArray, log_probability: FloatArray, table: FeatureTable | WindowSet, n_classes: int
+) -> float:
+    """Balanced accuracy over the records of a table or of windows."""
     label_of = dict(zip(table.record.tolist(), table.label.tolist(), strict=True))
     label = np.array([label_of[record] for record in records.tolist()], dtype=np.int64)
     confusion = confusion_by_unit(label, log_probability.argmax(axis=1), np.zeros_like(label), n_classes)

@@ -30,6 +30,7 @@ class Prediction:
     detail : what was fitted or trained, in words
     weights, domain, best_epoch, validation_loss, temperature, last_predicted : of networks only; `temperature` as in
         `diagnose.calibration`, `last_predicted` (record,) the labels that the weights of the last epoch give
+    validation_score : balanced accuracy over the validation records, where one of several is chosen by it
     """
 
     protocol: str
@@ -44,6 +45,7 @@ class Prediction:
     validation_loss: tuple[float, ...] = ()
     temperature: float = 1.0
     last_predicted: NDArray[np.integer] | None = None
+    validation_score: float | None = None
 
     @property
     def predicted(self) -> NDArray[np.integer]:

@@ -7,6 +7,7 @@ from collections.abc import Mapping, Sequence
 from pathlib import Path
 from typing import Any
 
+from diagnose.controls_text import controls_section
 from diagnose.figures import confusion_figure, reliability_figure, scores_figure, severity_figure
 from diagnose.page import Section, Table, write_page
 from diagnose.protocols import MEANING
@@ -59,7 +60,7 @@ def _score_table(metrics: Mapping[str, Any]) -> Table:
 def _lead(metrics: Mapping[str, Any]) -> list[str]:
     settings = metrics["settings"]
     window_ms = 1e3 * settings["window_samples"] / metrics["sampling_rate_hz"]
-    level = "level removed (RMS-normalised)" if settings["normalise"] == "rms" else "level kept"
+    level = "level kept" if settings["normalise"] == "none" else "level removed (RMS-normalised)"
     return [
         f"Data: {metrics['data']}, {metrics['n_records']} records, classes {', '.join(metrics['class_names'])}; "
         f"channels {', '.join(metrics['channel_names'])} at {metrics['sampling_rate_hz']:g} Hz.",
@@ -91,6 +92,7 @@ def _sections(folder: Path, metrics: Mapping[str, Any]) -> list[Section]:
     if clean:
         sections.append(_fault_section(folder, clean, metrics))
         sections.append(_severity_section(folder, clean))
+    sections.append(controls_section(metrics))
     sections.append(Section(title="Caveats", notes=[("", line) for line in caveats(metrics)]))
     sections.append(
         Section(
