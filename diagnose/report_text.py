@@ -35,6 +35,9 @@ METHOD_MEANING = {
     "windows.",
     "minirocket": "ridge regression on the shares of positive values of fixed convolutions (Dempster et al. 2021), "
     "mean over the windows; the penalty is chosen on validation units.",
+    "level_kept": "the same network on windows in m/s^2, their level not removed.",
+    "oracle": "the better of two models that are given each record's healthy twin; see Controls.",
+    "sham": "the same training on a data set of severity zero whose labels were kept; see Controls.",
     "label_shuffle": "the same training on shuffled labels. Chance must lie in its interval, which covers the units "
     "and the luck of the shuffle; if it lies below, something leaks.",
 }
