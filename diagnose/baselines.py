@@ -11,7 +11,6 @@ from numpy.typing import NDArray
 
 from diagnose.features import FeatureTable
 from diagnose.metrics import balanced_accuracy, confusion_by_unit, over_records
-from diagnose.windows import WindowSet
 
 FloatArray = NDArray[np.floating]
 IntArray = NDArray[np.integer]
@@ -51,22 +50,18 @@ def indicator_model(
     known = np.flatnonzero(np.isfinite(train.values).any(axis=0)).tolist()  # the boosting's bins need a value
     kept = [index for index in known if with_level or not train.names[index].endswith("log_rms")]
     train, validation, test = (replace(table, values=table.values[:, kept]) for table in (train, validation, test))
-    _, name, model = best_candidate(train, validation, n_classes=n_classes)
+    name, model = best_candidate(train, validation, n_classes=n_classes)
     return (name, *judged(model, test, n_classes))
 
 
-def best_candidate(train: FeatureTable, validation: FeatureTable, *, n_classes: int) -> tuple[float, str, Any]:
-    """Logistic regression or gradient boosting, the better one on the validation units.
-
-    Returns
-    -------
-    its balanced accuracy there, its name, the fitted model
-    """
+def best_candidate(train: FeatureTable, validation: FeatureTable, *, n_classes: int) -> tuple[str, Any]:
+    """Name and fitted model of logistic regression or gradient boosting, the better one on the validation units."""
     scored = []
     for name, make in _candidates().items():
         model = make().fit(train.values, train.label)
-        scored.append((balanced_score(*judged(model, validation, n_classes), validation, n_classes), name, model))
-    return max(scored, key=lambda row: row[0])
+        scored.append((_accuracy(*judged(model, validation, n_classes), validation, n_classes), name, model))
+    _, name, model = max(scored, key=lambda row: row[0])
+    return name, model
 
 
 def gradient_boosting(train: FeatureTable) -> Any:
@@ -111,7 +106,7 @@ def ridge_model(train: FeatureTable, validation: FeatureTable, test: FeatureTabl
         model = make_pipeline(StandardScaler(), RidgeClassifier(alpha=penalty, class_weight="balanced"))
         model.fit(train.values, train.label)
         found = over_records(_soft_score(model, validation.values, n_classes), validation.record)
-        scored.append((balanced_score(*found, validation, n_classes), f"ridge, penalty {penalty:g}", model))
+        scored.append((_accuracy(*found, validation, n_classes), f"ridge, penalty {penalty:g}", model))
     _, name, model = max(scored, key=lambda row: row[0])
     return (name, *over_records(_soft_score(model, test.values, n_classes), test.record))
 
@@ -166,10 +161,8 @@ def _soft_score(model: Any, values: FloatArray, n_classes: int) -> FloatArray:
     return by_class
 
 
-def balanced_score(
-    records: IntArray, log_probability: FloatArray, table: FeatureTable | WindowSet, n_classes: int
-) -> float:
-    """Balanced accuracy over the records of a table or of windows."""
+def _accuracy(records: IntArray, log_probability: FloatArray, table: FeatureTable, n_classes: int) -> float:
+    """Balanced accuracy over the records of a table."""
     label_of = dict(zip(table.record.tolist(), table.label.tolist(), strict=True))
     label = np.array([label_of[record] for record in records.tolist()], dtype=np.int64)
     confusion = confusion_by_unit(label, log_probability.argmax(axis=1), np.zeros_like(label), n_classes)

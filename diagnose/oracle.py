@@ -12,7 +12,8 @@ from numpy.typing import NDArray
 from diagnose.baselines import best_candidate, judged
 from diagnose.domain import band_levels
 from diagnose.features import INDICATORS, FeatureTable, indicators, known_rotation
-from diagnose.predictions import Prediction
+from diagnose.metrics import balanced_accuracy, confusion_by_unit
+from diagnose.predictions import Prediction, Rows
 from diagnose.windows import SUBSETS, Segments, Task, WindowSet, load_windows, read_signal, subset_segments
 
 if TYPE_CHECKING:
@@ -79,8 +80,9 @@ def fit_oracle_indicators(task: Task, protocol: str, cache: Cache) -> Prediction
     """Logistic regression or gradient boosting on `oracle_table`, the better one on the validation units."""
     n_classes = len(task.class_names)
     train, validation, test = (oracle_table(task, subset_segments(task, protocol, subset), cache) for subset in SUBSETS)
-    score, name, model = best_candidate(train, validation, n_classes=n_classes)
+    name, model = best_candidate(train, validation, n_classes=n_classes)
     record, log_probability = judged(model, test, n_classes)
+    held_out, held_out_scores = judged(model, validation, n_classes)
     return Prediction(
         protocol=protocol,
         method=ON_INDICATORS,
@@ -88,14 +90,17 @@ def fit_oracle_indicators(task: Task, protocol: str, cache: Cache) -> Prediction
         record=record,
         log_probability=log_probability,
         detail=name,
-        validation_score=score,
+        validation=Rows(record=held_out, log_probability=held_out_scores),
     )
 
 
-def chosen_oracle(runs: Sequence[Prediction]) -> str | None:
+def chosen_oracle(task: Task, runs: Sequence[Prediction]) -> str | None:
     """Name of the better of the two on the validation units, mean over its seeds; None where neither ran."""
+    labels, n_classes = task.labels(), len(task.class_names)
     scores: dict[str, list[float]] = {}
     for run in runs:
-        if run.method in (NETWORK, ON_INDICATORS) and run.validation_score is not None:
-            scores.setdefault(run.method, []).append(run.validation_score)
+        if run.method in (NETWORK, ON_INDICATORS) and run.validation is not None:
+            label, guess = labels[run.validation.record], run.validation.log_probability.argmax(axis=1)
+            confusion = confusion_by_unit(label, guess, np.zeros_like(label), n_classes)[0]
+            scores.setdefault(run.method, []).append(float(balanced_accuracy(confusion)))
     return max(scores, key=lambda name: float(np.mean(scores[name])), default=None)

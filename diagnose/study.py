@@ -15,6 +15,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
+from diagnose.answers import protocol_answers
 from diagnose.calibration import calibration_scores
 from diagnose.controls import control_jobs, sham_methods, without_sham
 from diagnose.jobs import Job, run_jobs
@@ -233,7 +234,7 @@ def _protocol_result(
         "majority_accuracy": float(counts.max() / counts.sum()),
     }
     parts = {subset: np.unique(subset_segments(task, protocol, subset).record) for subset in SUBSETS}
-    oracle = chosen_oracle(mine)
+    oracle = chosen_oracle(task, mine)
     over_oracle: dict[str, Any] = {}
     if oracle is not None:
         methods["oracle"] = {**methods[oracle], "chosen": oracle}
@@ -255,6 +256,7 @@ def _protocol_result(
         "best_epoch": [run.best_epoch for run in network],
         "last_epoch": _last_epoch(task, settings, network),
         "calibration": _calibration(task, network),
+        "answers": None if is_leaky(protocol) else protocol_answers(task, settings, mine),
     }
 
 

@@ -13,7 +13,7 @@ from diagnose.controls import control_jobs
 from diagnose.controls_text import controls_section, oracle_verdict, verdict
 from diagnose.metrics import ratio_with_interval
 from diagnose.oracle import chosen_oracle, oracle_table, oracle_windows
-from diagnose.predictions import Prediction
+from diagnose.predictions import Prediction, Rows
 from diagnose.probe import EXCLUDED, LABELS, METADATA, RESULTS, fit_probe, probe_values, probed_columns
 from diagnose.settings import settings_from
 from diagnose.study import task_from
@@ -81,16 +81,21 @@ def test_the_table_has_finite_named_columns_and_shares_its_cache():
 
 
 def test_the_better_one_on_validation_units_is_the_oracle():
-    def run(method, score, seed=0):
+    task = make_task(FakeDataset(**SMALL))
+    labels = task.labels()
+
+    def run(method, n_right, seed=0):
+        guess = np.where(np.arange(8) < n_right, labels[:8], (labels[:8] + 1) % 4)
+        validation = Rows(record=np.arange(8), log_probability=np.eye(4)[guess])
         return Prediction(
-            protocol="by_unit", method=method, seed=seed, record=np.arange(2), log_probability=np.zeros((2, 2)),
-            detail="", validation_score=score,
+            protocol="by_unit", method=method, seed=seed, record=np.arange(2), log_probability=np.zeros((2, 4)),
+            detail="", validation=validation,
         )  # fmt: skip
 
-    assert chosen_oracle([run("cnn", None)]) is None
-    assert chosen_oracle([run("oracle_network", 0.6), run("oracle_indicators", 0.7)]) == "oracle_indicators"
-    two = [run("oracle_network", 0.9), run("oracle_network", 0.6, 1), run("oracle_indicators", 0.7)]
-    assert chosen_oracle(two) == "oracle_network"
+    assert chosen_oracle(task, [run("cnn", 8)]) is None
+    assert chosen_oracle(task, [run("oracle_network", 5), run("oracle_indicators", 6)]) == "oracle_indicators"
+    two = [run("oracle_network", 8), run("oracle_network", 5, 1), run("oracle_indicators", 6)]
+    assert chosen_oracle(task, two) == "oracle_network"
 
 
 def test_a_method_over_itself_is_one_and_the_interval_grows_with_the_units_spread():
