@@ -134,7 +134,7 @@ def _run_training(
         detail=f"best epoch {training.best_epoch} of {len(training.validation_loss)}",
         validation=Rows(record=held_out, log_probability=held_out_scores),
         windows=Rows(record=test.record, log_probability=by_window),
-        weights=None if shuffled else {key: value.numpy() for key, value in training.model.state_dict().items()},
+        weights={key: value.numpy() for key, value in training.model.state_dict().items()} if is_model else None,
         domain=domain,
         best_epoch=training.best_epoch,
         validation_loss=training.validation_loss,
