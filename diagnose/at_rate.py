@@ -59,6 +59,11 @@ def at_rate(dataset: Dataset, sampling_rate: float | None) -> Dataset:
     return cast("Dataset", _Slower(dataset, change))
 
 
+def at_rate_of(dataset: Dataset, other: Dataset) -> Dataset:
+    """A data set read at a lower rate where the other one is; else as it is."""
+    return at_rate(dataset, other.sampling_rate) if isinstance(other, _Slower) else dataset
+
+
 class _Slower:
     """A data set whose accelerations are read at another rate."""
 

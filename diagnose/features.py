@@ -139,13 +139,11 @@ def feature_table(
     n_threads : stretches computed at once; the values do not depend on it
     """
     known: Cache = {} if cache is None else cache
-    speed_rpm = np.asarray(task.dataset.column("speed_rpm"), dtype=float)
-    n_teeth = {gear: _n_teeth(task.dataset.attributes, gear) for gear in GEARS}
+    speed, n_teeth = known_rotation(task)
     keys = list(zip(segments.record.tolist(), segments.start.tolist(), segments.stop.tolist(), strict=True))
 
     def compute(key: tuple[int, int, int]) -> FloatArray:
-        pinion = speed_rpm[key[0]] / 60
-        frequency = {"pinion": pinion, "wheel": pinion * n_teeth["pinion"] / n_teeth["wheel"]}
+        frequency = {gear: values[key[0]] for gear, values in speed.items()}
         return indicators(signals[key], task.dataset.sampling_rate, frequency, n_teeth, features=features).ravel()
 
     missing = [key for key in keys if (task.channel_names, *key) not in known]
@@ -161,6 +159,13 @@ def feature_table(
         label=task.labels()[segments.record],
         record=segments.record,
     )
+
+
+def known_rotation(task: Task) -> tuple[dict[str, FloatArray], dict[str, int]]:
+    """Rotation frequency in Hz, (record,), and number of teeth of each of `GEARS`."""
+    pinion = np.asarray(task.dataset.column("speed_rpm"), dtype=float) / 60
+    n_teeth = {gear: _n_teeth(task.dataset.attributes, gear) for gear in GEARS}
+    return {"pinion": pinion, "wheel": pinion * n_teeth["pinion"] / n_teeth["wheel"]}, n_teeth
 
 
 def _n_teeth(attributes: Mapping[str, Any], gear: str) -> int:

@@ -10,7 +10,7 @@ from collections.abc import Callable, Iterator, Sequence
 from concurrent.futures import ProcessPoolExecutor, as_completed
 from concurrent.futures.process import BrokenProcessPool
 from contextlib import contextmanager
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from typing import Any
 
 import numpy as np
@@ -22,14 +22,21 @@ from diagnose.domain import Domain, fit_domain
 from diagnose.features import Cache, FeatureTable, feature_table
 from diagnose.metrics import over_records
 from diagnose.novelty import NoveltyRun, fitted_runs, trained_runs
+from diagnose.oracle import NETWORK as ORACLE_NETWORK
+from diagnose.oracle import fit_oracle_indicators, oracle_windows
 from diagnose.predictions import Prediction, Rows
+from diagnose.probe import fit_probe
 from diagnose.protocols import OPEN_PROTOCOLS
 from diagnose.settings import TrainSettings
+from diagnose.sham import sham_method, sham_task
 from diagnose.tensorboard import epoch_log
 from diagnose.train import input_scale, predict_windows, train_network, with_shuffled_labels
 from diagnose.window_features import rocket_tables, spectrum_table
 from diagnose.windows import SUBSETS, Task, WindowSet, load_windows, subset_segments
 from gensig.errors import GensigError
+
+# Controls beside the label shuffle, of `diagnose.probe`, `.oracle` and `.sham`, and the network that sees the level.
+PROBE, ORACLE, SHAM, LEVEL_KEPT = "probe", "oracle", "sham", "level_kept"
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -37,11 +44,13 @@ class Job:
     """One training (with or without shuffled labels), or with seed None the baselines of all the protocols.
 
     One of `OPEN_PROTOCOLS` is a job of its own: with seed None the scores that are fitted, else those of a network.
+    ``control`` is "" or one of the controls, which then takes the place of the training or of the baselines.
     """
 
     protocols: tuple[str, ...]
     seed: int | None
     shuffled: bool = False
+    control: str = ""
 
 
 Outcome = Prediction | NoveltyRun
@@ -69,6 +78,7 @@ def run_jobs(
                 on_done(results[-1])
         _loaded.clear()
         _domains.clear()
+        _shams.clear()
         return [prediction for result in results for prediction in result]
     context = multiprocessing.get_context("spawn")
     executor = ProcessPoolExecutor(min(n_workers, len(jobs)), context, _start_worker, (task, settings))
@@ -92,15 +102,24 @@ def run_job(task: Task, settings: TrainSettings, job: Job) -> list[Outcome]:
         if job.seed is None:
             return [*fitted_runs(task, settings, name, _windows(task, name))]
         return [*trained_runs(settings, name, job.seed, _windows(task, name))]
-    if job.seed is None:
-        cache: Cache = {}
-        return [prediction for name in job.protocols for prediction in _run_baselines(task, settings, name, cache)]
-    return [_run_training(task, settings, name, job.seed, job.shuffled) for name in job.protocols]
+    if job.control == SHAM:
+        task = _sham(task, settings)
+    if job.seed is not None:
+        return [_run_training(task, settings, name, job.seed, job.shuffled, job.control) for name in job.protocols]
+    cache: Cache = {}
+    if job.control == PROBE:
+        return [fit_probe(task, name, results=results) for name in job.protocols for results in (False, True)]
+    if job.control == ORACLE:
+        return [fit_oracle_indicators(task, name, cache) for name in job.protocols]
+    found = [prediction for name in job.protocols for prediction in _run_baselines(task, settings, name, cache)]
+    return [replace(one, method=sham_method(one.method, "")) for one in found] if job.control == SHAM else [*found]
 
 
-def _run_training(task: Task, settings: TrainSettings, protocol: str, seed: int, shuffled: bool) -> Prediction:
+def _run_training(
+    task: Task, settings: TrainSettings, protocol: str, seed: int, shuffled: bool, control: str
+) -> Prediction:
     n_classes = len(task.class_names)
-    train, validation, test = (_windows(task, protocol)[subset] for subset in SUBSETS)
+    train, validation, test = (_windows(task, protocol, control)[subset] for subset in SUBSETS)
     if shuffled:
         rng = np.random.default_rng([seed, 2])
         train = with_shuffled_labels(train, n_classes, rng)
@@ -119,20 +138,23 @@ def _run_training(task: Task, settings: TrainSettings, protocol: str, seed: int,
     by_window = predict_windows(training.model, test)
     record, log_probability = over_records(by_window, test.record)
     held_out, held_out_scores = over_records(predict_windows(training.model, validation), validation.record)
-    domain = None if shuffled else _domain(protocol, train, validation)
+    is_model = not shuffled and not control
+    domain = _domain(protocol, train, validation) if is_model else None
+    network = str(settings.model.get("name", "network"))
+    names = {ORACLE: ORACLE_NETWORK, SHAM: sham_method(network, network), LEVEL_KEPT: LEVEL_KEPT}
     last = log_probability
     if training.last_model is not None and not shuffled:
         _, last = over_records(predict_windows(training.last_model, test), test.record)
     return Prediction(
         protocol=protocol,
-        method="label_shuffle" if shuffled else str(settings.model.get("name", "network")),
+        method="label_shuffle" if shuffled else names.get(control, network),
         seed=seed,
         record=record,
         log_probability=log_probability,
         detail=f"best epoch {training.best_epoch} of {len(training.validation_loss)}",
         validation=Rows(record=held_out, log_probability=held_out_scores),
         windows=Rows(record=test.record, log_probability=by_window),
-        weights=None if shuffled else {key: value.numpy() for key, value in training.model.state_dict().items()},
+        weights={key: value.numpy() for key, value in training.model.state_dict().items()} if is_model else None,
         domain=domain,
         best_epoch=training.best_epoch,
         validation_loss=training.validation_loss,
@@ -200,20 +222,31 @@ def _with_validation(validation: FeatureTable, test: FeatureTable) -> FeatureTab
 
 
 # Windows of the protocol a process works on; jobs come protocol by protocol.
-_loaded: dict[str, dict[str, WindowSet]] = {}
+_loaded: dict[tuple[str, str, bool], dict[str, WindowSet]] = {}
 _domains: dict[str, Domain] = {}
+_shams: dict[str, Task] = {}
 _work: dict[str, Any] = {}
 
 
-def _windows(task: Task, protocol: str) -> dict[str, WindowSet]:
-    if protocol not in _loaded:
+def _windows(task: Task, protocol: str, control: str = "") -> dict[str, WindowSet]:
+    key = (str(task.dataset.folder), protocol, control == ORACLE)
+    if key not in _loaded:
         _loaded.clear()
-        _loaded[protocol] = {name: _load(task, protocol, name) for name in SUBSETS}
-    return _loaded[protocol]
+        load = oracle_windows if control == ORACLE else load_windows
+        _loaded[key] = {
+            name: load(task.part(protocol, name), subset_segments(task, protocol, name)) for name in SUBSETS
+        }
+    if control == LEVEL_KEPT:
+        return {name: replace(windows, normalise="none") for name, windows in _loaded[key].items()}
+    return _loaded[key]
 
 
-def _load(task: Task, protocol: str, subset: str) -> WindowSet:
-    return load_windows(task.part(protocol, subset), subset_segments(task, protocol, subset))
+def _sham(task: Task, settings: TrainSettings) -> Task:
+    """The task on the sham data set, opened once a process."""
+    folder = str(settings.sham)
+    if folder not in _shams:
+        _shams[folder] = sham_task(task, folder)
+    return _shams[folder]
 
 
 def _domain(protocol: str, train: WindowSet, validation: WindowSet) -> Domain:

@@ -9,6 +9,7 @@ from typing import Any
 
 from diagnose.answer_sections import answer_sections
 from diagnose.answer_tables import write_tables
+from diagnose.controls_text import controls_section
 from diagnose.figures import confusion_figure, reliability_figure, scores_figure, severity_figure
 from diagnose.novelty_report import novelty_sections
 from diagnose.page import Section, Table, write_page
@@ -65,7 +66,7 @@ def _score_table(metrics: Mapping[str, Any]) -> Table:
 def _lead(metrics: Mapping[str, Any]) -> list[str]:
     settings = metrics["settings"]
     window_ms = 1e3 * settings["window_samples"] / metrics["sampling_rate_hz"]
-    level = "level removed (RMS-normalised)" if settings["normalise"] == "rms" else "level kept"
+    level = "level kept" if settings["normalise"] == "none" else "level removed (RMS-normalised)"
     return [
         f"Data: {metrics['data']}, {metrics['n_records']} records, classes {', '.join(metrics['class_names'])}; "
         f"channels {', '.join(metrics['channel_names'])} at {metrics['sampling_rate_hz']:g} Hz.",
@@ -85,6 +86,8 @@ def _sections(folder: Path, metrics: Mapping[str, Any]) -> list[Section]:
         sections.append(_severity_section(folder, clean))
         sections += answer_sections(folder, clean)
     sections += novelty_sections(metrics["novelty"])
+    if ordered:
+        sections.append(controls_section(metrics))
     sections.append(Section(title="Caveats", notes=[("", line) for line in caveats(metrics)]))
     if ordered:
         sections.append(_meaning_section(metrics, clean))

@@ -11,6 +11,7 @@ from gensig.errors import ConfigError
 
 BASELINES = ("indicators", "indicators_without_level", "rms_threshold", "nearest_spectrum", "minirocket")
 DEVICES = ("auto", "cpu", "cuda")
+BOTH = "both"  # of normalise: without the level, and beside it a second training with it
 LEAST_ROCKET_FEATURES = 84  # one for each of the kernels
 
 
@@ -38,6 +39,9 @@ class TrainSettings:
     epoch_fraction: float
     shuffle_control: bool
     n_seeds_control: int
+    metadata_probe: bool
+    oracle: str | bool
+    sham: str | None
     baselines: tuple[str, ...]
     features: str
     minirocket_features: int
@@ -70,9 +74,13 @@ class TrainSettings:
                 raise ConfigError(f"{name} must be a list of different values, at least one")
         for seed in self.seeds:
             _check_whole("seeds", seed, least=0)
-        for name in ("shuffle_control", "tensorboard"):
+        for name in ("shuffle_control", "tensorboard", "metadata_probe"):
             if not isinstance(getattr(self, name), bool):
                 raise ConfigError(f"{name} must be true or false, not {getattr(self, name)!r}")
+        if self.oracle not in ("auto", False):
+            raise ConfigError(f"oracle must be auto or false, not {self.oracle!r}")
+        if self.sham is not None and (not isinstance(self.sham, str) or not self.sham):
+            raise ConfigError(f"sham must be the folder of a data set made with plan.sham=true, not {self.sham!r}")
         if len(set(self.baselines)) < len(self.baselines) or not set(self.baselines) <= set(BASELINES):
             raise ConfigError(
                 f"baselines must be false or a list of different names out of {', '.join(BASELINES)}, "

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import functools
 import os
 import platform
 import sys
@@ -15,21 +16,23 @@ import numpy as np
 from numpy.typing import NDArray
 
 from diagnose.answers import protocol_answers
-from diagnose.autoencoder import check_window_for_autoencoder
 from diagnose.at_rate import at_rate
+from diagnose.autoencoder import check_window_for_autoencoder
 from diagnose.calibration import calibration_scores
+from diagnose.controls import control_jobs, sham_methods, without_sham
 from diagnose.jobs import Job, Outcome, run_jobs
-from diagnose.metrics import SCORES, confusion_by_unit, recall, score_with_interval
+from diagnose.metrics import SCORES, confusion_by_unit, ratio_with_interval, recall, score_with_interval
 from diagnose.model_io import data_fingerprint, model_description, save_model
 from diagnose.models import build_model, check_window
 from diagnose.novelty import NoveltyRun
 from diagnose.novelty_metrics import check_open_protocol, novelty_protocol_result, write_novelty
+from diagnose.oracle import chosen_oracle
 from diagnose.predictions import Prediction, write_predictions
 from diagnose.protocols import OPEN_PROTOCOLS, channels_to_cross, choose_protocols
-from diagnose.settings import BASELINES, TrainSettings
+from diagnose.settings import BOTH, TrainSettings
 from diagnose.tensorboard import need_tensorboard, write_scores
 from diagnose.train import device_of
-from diagnose.windows import SUBSETS, Task, plan_windows, subset_segments, task_of
+from diagnose.windows import NORMALISATIONS, SUBSETS, Task, check_names, plan_windows, subset_segments, task_of
 from gensig.errors import ConfigError
 from gensig.version import __version__
 
@@ -79,16 +82,17 @@ def plan_study(task: Task, settings: TrainSettings) -> tuple[tuple[str, ...], li
         if settings.shuffle_control and protocol in closed:
             first = min(settings.seeds)
             jobs += [Job(protocols=(protocol,), seed=first + k, shuffled=True) for k in range(settings.n_seeds_control)]
-    return protocols, jobs
+    return protocols, jobs + control_jobs(task, settings, [name for name in closed if not is_leaky(name)])
 
 
 def task_from(dataset: Any, settings: TrainSettings) -> Task:
     """Task that the settings describe on an open data set."""
+    check_names("normalisation", (settings.normalise,), (*NORMALISATIONS, BOTH))
     task = task_of(
         at_rate(dataset, settings.sampling_rate_hz),
         window_samples=settings.window_samples,
         stride_samples=settings.stride_samples,
-        normalise=settings.normalise,
+        normalise="rms" if settings.normalise == BOTH else settings.normalise,
         classes=settings.classes,
         channels=settings.channels,
     )
@@ -118,9 +122,8 @@ def run_study(
 
     def report(predictions: list[Outcome]) -> None:
         last = predictions[-1]
-        baselines = last.method in BASELINES
-        name = "baselines" if baselines else f"{last.protocol}, {last.method}, seed {last.seed}: {last.detail}"
-        on_done(name)
+        trained = f"{last.protocol}, {last.method}, seed {last.seed}: {last.detail}"
+        on_done(trained if last.best_epoch else ", ".join(dict.fromkeys(one.method for one in predictions)))
 
     n_workers = settings.n_threads or _n_cores()
     outcomes = run_jobs(task, settings, jobs, n_workers=n_workers, on_done=report)
@@ -131,12 +134,16 @@ def run_study(
             target = folder / "models" / f"{prediction.protocol}-seed{prediction.seed}"
             known = {} if prediction.domain is None else prediction.domain.tensors()
             save_model(target, prediction.weights | known, model_description(task, settings, prediction))
-    write_predictions(folder / "predictions.csv", task, predictions)
+    own = without_sham(predictions)
+    write_predictions(folder / "predictions.csv", task, own)
     if novelty:
         write_novelty(folder / "novelty.csv", task, novelty)
-    results = {
-        name: _protocol_result(task, settings, name, predictions) for name in protocols if name not in OPEN_PROTOCOLS
-    }
+    results = {name: _protocol_result(task, settings, name, own) for name in protocols if name not in OPEN_PROTOCOLS}
+    shams = sham_methods(
+        task, settings, predictions, functools.partial(score_predictions, n_bootstrap=settings.n_bootstrap)
+    )
+    for protocol, methods in shams.items():
+        results[protocol]["methods"] |= methods
     novelty_results = {
         name: novelty_protocol_result(task, name, novelty, n_bootstrap=settings.n_bootstrap, seed=BOOTSTRAP_SEED)
         for name in protocols
@@ -179,11 +186,7 @@ def score_predictions(
     n_bootstrap : resamples of the units
     shuffled : see `diagnose.metrics.score_with_interval`
     """
-    labels, unit = task.labels(), np.asarray(task.dataset.column("unit_id"))
-    n_classes = len(task.class_names)
-    confusion = np.stack(
-        [confusion_by_unit(labels[record], predicted, unit[record], n_classes) for record, predicted in runs]
-    )
+    confusion = _confusion(task, runs)
     rng = np.random.default_rng(BOOTSTRAP_SEED)
     total = confusion.sum(axis=(0, 1))
     scores = {
@@ -194,6 +197,15 @@ def score_predictions(
         name: float(share) for name, share in zip(task.class_names, recall(total), strict=True) if np.isfinite(share)
     }
     return {**scores, "confusion": total.tolist(), "recall": shares}
+
+
+def _confusion(task: Task, runs: Sequence[tuple[NDArray[np.integer], NDArray[np.integer]]]) -> NDArray[np.int64]:
+    """Counts (seed, unit, true class, predicted class)."""
+    labels, unit = task.labels(), np.asarray(task.dataset.column("unit_id"))
+    n_classes = len(task.class_names)
+    return np.stack(
+        [confusion_by_unit(labels[record], predicted, unit[record], n_classes) for record, predicted in runs]
+    )
 
 
 def severity_rows(
@@ -249,12 +261,24 @@ def _protocol_result(
         "majority_accuracy": float(counts.max() / counts.sum()),
     }
     parts = {subset: np.unique(subset_segments(task, protocol, subset).record) for subset in SUBSETS}
+    oracle = chosen_oracle(task, mine)
+    over_oracle: dict[str, Any] = {}
+    if oracle is not None:
+        methods["oracle"] = {**methods[oracle], "chosen": oracle}
+        found = [
+            _confusion(task, [(run.record, run.predicted) for run in mine if run.method == name])
+            for name in (network[0].method, oracle)
+        ]
+        for name in SCORES:
+            rng = np.random.default_rng(BOOTSTRAP_SEED)
+            over_oracle[name] = ratio_with_interval(name, *found, n_bootstrap=settings.n_bootstrap, rng=rng)
     return {
         "leaky": is_leaky(protocol),
         "channels": {subset: list(task.part(protocol, subset).channel_names) for subset in ("train", "test")},
         "n_records": {subset: int(record.size) for subset, record in parts.items()},
         "n_units": {subset: int(np.unique(unit[record]).size) for subset, record in parts.items()},
         "methods": methods,
+        "over_oracle": over_oracle,
         "by_severity": severity_rows(task, [(run.record, run.predicted) for run in network]),
         "validation_loss": [list(run.validation_loss) for run in network],
         "best_epoch": [run.best_epoch for run in network],

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import difflib
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass, replace
 from typing import TYPE_CHECKING, Any
 
@@ -205,8 +205,11 @@ class WindowSet:
         return normalised(chosen, self.normalise)
 
 
-def load_windows(task: Task, segments: Segments) -> WindowSet:
-    """Read the stretches into memory (4 bytes a sample) and plan their windows.
+Read = Callable[["Task", int, int, int], NDArray[np.float32]]
+
+
+def load_windows(task: Task, segments: Segments, *, read: Read | None = None) -> WindowSet:
+    """Read the stretches into memory (4 bytes a sample), by `read_signal` or ``read``, and plan their windows.
 
     Raises
     ------
@@ -217,7 +220,7 @@ def load_windows(task: Task, segments: Segments) -> WindowSet:
     rows = [(int(segments.record[i]), int(segments.start[i]), int(segments.stop[i])) for i in used]
     record = segments.record[used][segment]
     return WindowSet(
-        signals=tuple(read_signal(task, *row) for row in rows),
+        signals=tuple((read or read_signal)(task, *row) for row in rows),
         segment=segment,
         start=start - segments.start[used][segment],
         label=task.labels()[record],
@@ -227,12 +230,12 @@ def load_windows(task: Task, segments: Segments) -> WindowSet:
     )
 
 
-def read_signal(task: Task, record: int, start: int, stop: int) -> NDArray[np.float32]:
+def read_signal(task: Task, record: int, start: int, stop: int, *, name: str = "acceleration") -> NDArray[np.float32]:
     """(channel, sample) m/s^2 of the task's channels; refuses values that are not finite."""
-    signal = np.asarray(task.dataset.signals(record, start, stop, task.channels), dtype=np.float32)
+    signal = np.asarray(task.dataset.signals(record, start, stop, task.channels, name=name), dtype=np.float32)
     if not np.isfinite(signal).all():
-        name = task.dataset.column("record_id")[record]
-        raise DatasetError(f"record {name} of {task.dataset.folder}: its signal holds values that are not finite")
+        which = task.dataset.column("record_id")[record]
+        raise DatasetError(f"record {which} of {task.dataset.folder}: its signal holds values that are not finite")
     return signal
 
 

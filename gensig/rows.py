@@ -60,6 +60,7 @@ class Stream(IntEnum):
     SUPPORT = 14
     DROPPED = 15
     TACHO = 16
+    HEALTHY_TWIN = 17
 
 
 def stream(seed: int, cause: Stream, index: int = 0) -> np.random.Generator:
@@ -103,6 +104,19 @@ def row_noisy(
     sensor = instrument.sensing.sensor
     too_many = int(sensor is not None and clipped > sensor.max_clipped_fraction)
     return sent, {"clipped_fraction": clipped, "clipped": too_many, "dropped_fraction": dropped}
+
+
+def row_healthy_twin(
+    config: Mapping[str, Any], row: Mapping[str, Any], instrument: Instrument, clean: Array, noise_power: Array
+) -> Array:
+    """What the sensors of a row report of its machine without faults, with drift, noise and losses of its own.
+
+    ``clean`` (sensor, sample) m/s2 is before drift. No draw is shared with the record: else their difference would be
+    free of noise.
+    """
+    drift, noise, dropped = _row_stream(config, row, Stream.HEALTHY_TWIN).spawn(3)
+    noisy, _ = instrument.record(clean * instrument.drift(clean.shape[1], drift), noise_power, noise)
+    return instrument.sent(noisy, dropped)[0]
 
 
 def _row_stream(config: Mapping[str, Any], row: Mapping[str, Any], cause: Stream) -> np.random.Generator:

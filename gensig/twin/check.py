@@ -110,7 +110,8 @@ def _healthy_records(config: Mapping[str, Any]) -> tuple[Sequence[Array], Sequen
         "n_records": N_RECORDS, "n_units": N_RECORDS, "n_gearboxes": 1, "conditions_per_unit": None, "n_repeats": 1,
         "classes": ["healthy"], "design": "latin_hypercube", "vary": {}, "sham": False,
     }  # fmt: skip
-    dataset = {**config["dataset"], "store_shaft_angle": True, "store_mesh_state": False, "store_detectability": False}
+    unused = dict.fromkeys(("store_mesh_state", "store_detectability", "store_healthy_twin"), False)
+    dataset = {**config["dataset"], **unused, "store_shaft_angle": True}
     whole = {**config, "plan": plan, "dataset": dataset}
     whole["classes"] = {"healthy": {"kind": "healthy", "vary": {}}}
     drawn = make_plan(whole)

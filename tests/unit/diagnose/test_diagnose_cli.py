@@ -72,7 +72,8 @@ def test_train_writes_what_it_promises(trained):
     assert "cross_specimen is left out: 1 specimen" in (trained / "report.html").read_text()
     methods = metrics["protocols"]["by_unit"]["methods"]
     assert set(methods) == {
-        "cnn", "label_shuffle", "indicators", "indicators_without_level", "rms_threshold", "chance",
+        "cnn", "label_shuffle", "indicators", "indicators_without_level", "rms_threshold", "metadata_probe",
+        "result_probe", "chance",
     }  # fmt: skip
     for name in ("cnn", "label_shuffle", "indicators", "rms_threshold"):
         value = methods[name]["balanced_accuracy"]
@@ -125,7 +126,12 @@ def test_the_page_stands_alone_and_says_what_matters(trained):
 
 def test_chosen_baselines_stand_in_the_report(data, tmp_path):
     out = tmp_path / "out"
-    few = ["protocols=[by_unit]", "shuffle_control=false", "baselines=[nearest_spectrum,minirocket]"]
+    few = [
+        "protocols=[by_unit]",
+        "shuffle_control=false",
+        "baselines=[nearest_spectrum,minirocket]",
+        "metadata_probe=false",
+    ]
     words = ["train", "data=good", f"out={out}", *FAST[:2], "epochs=1", "seeds=[0]", *FAST[4:], *few]
     assert main([*words, "minirocket_features=168"]) == 0
     text = visible_text((out / "report.html").read_text())
