@@ -14,6 +14,7 @@ VERBS = {
     "train": "train, judge and report",
     "evaluate": "judge a trained network",
     "predict": "try a trained network on a recording",
+    "adapt": "move a trained network to a machine by its healthy recordings",
 }
 
 

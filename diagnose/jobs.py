@@ -17,6 +17,7 @@ import numpy as np
 import torch
 from numpy.typing import NDArray
 
+from diagnose.adaptation import Statistics, healthy_statistics
 from diagnose.baselines import Prediction as BaselinePrediction
 from diagnose.baselines import indicator_model, nearest_spectrum, ridge_model, rms_threshold
 from diagnose.domain import Domain, fit_domain
@@ -57,6 +58,7 @@ class Prediction:
     detail: str
     weights: dict[str, NDArray[Any]] | None = None
     domain: Domain | None = None
+    healthy: Statistics | None = None
     best_epoch: int = 0
     validation_loss: tuple[float, ...] = ()
     log_probability: NDArray[np.floating] | None = None
@@ -134,6 +136,7 @@ def _run_training(task: Task, settings: TrainSettings, protocol: str, seed: int,
         detail=f"best epoch {training.best_epoch} of {len(training.validation_loss)}",
         weights=None if shuffled else {key: value.numpy() for key, value in training.model.state_dict().items()},
         domain=domain,
+        healthy=None if shuffled else healthy_statistics(training.model, train, task.class_names),
         best_epoch=training.best_epoch,
         validation_loss=training.validation_loss,
         log_probability=log_probability,

@@ -76,8 +76,7 @@ def predict_recording(
     from diagnose.metrics import over_records
     from diagnose.train import predict_windows
 
-    recording, channels = _read(description, source)
-    windows = _windows(_resampled(recording, description, source.file), description, source.file)
+    windows, recording, channels = windows_of(description, source)
     log_probability = predict_windows(model, windows)
     overall = probabilities(over_records(log_probability, windows.record)[1], description.temperature)[0]
     distance = None if domain is None else distances(domain, windows)
@@ -110,6 +109,12 @@ def predict_recording(
         "speed_rpm": source.speed_rpm,
         "trained_speed_rpm": None if description.speed_rpm_range is None else list(description.speed_rpm_range),
     }
+
+
+def windows_of(description: ModelDescription, source: Source) -> tuple[WindowSet, Recording, tuple[str, ...]]:
+    """Windows of a recording as the network takes them, the recording as read, and its names of the channels."""
+    recording, channels = _read(description, source)
+    return _windows(_resampled(recording, description, source.file), description, source.file), recording, channels
 
 
 def summary(result: dict[str, Any]) -> str:

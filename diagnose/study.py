@@ -110,7 +110,8 @@ def run_study(
     for prediction in predictions:
         if prediction.weights is not None:
             target = folder / "models" / f"{prediction.protocol}-seed{prediction.seed}"
-            known = {} if prediction.domain is None else prediction.domain.tensors()
+            parts = [part for part in (prediction.domain, prediction.healthy) if part is not None]
+            known = {name: tensor for part in parts for name, tensor in part.tensors().items()}
             save_model(target, prediction.weights | known, model_description(task, settings, prediction))
     results = {protocol: _protocol_result(task, settings, protocol, predictions) for protocol in protocols}
     return {
