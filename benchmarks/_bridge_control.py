@@ -29,6 +29,7 @@ FloatArray = NDArray[np.floating]
 
 NAME = "negative_control_*.npz"
 RATE, TEETH, SPEED = 12800.0, ("32", "80"), "1800"  # of its description; the first stage
+TORQUES = (3, 28)  # N m; up to what the twin assumes as rated: what the loads are is not known
 STATES = ("healthy", "broken_tooth")
 LOADS = (0, 50, 90)  # %
 SCORED = 3  # the channel in which both states have the same path; the others are only reported
@@ -60,7 +61,8 @@ def make_twin(file: Path, folder: Path) -> list[str]:
         "plan.n_records=320",
         "plan.n_units=40",
         "plan.n_gearboxes=1",
-        "plan.vary={operating.torque_nm: {distribution: uniform, low: 5, high: 60}}",
+        "operating.duration_s=0.5",
+        f"plan.vary={{operating.torque_nm: {{distribution: uniform, low: {TORQUES[0]}, high: {TORQUES[1]}}}}}",
     ]
 
 

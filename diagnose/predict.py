@@ -106,6 +106,7 @@ def predict_recording(
         "channels": dict(zip(description.channel_names, channels, strict=True)),
         "sampling_rate_hz": recording.sampling_rate,
         "model_sampling_rate_hz": rate,
+        "adaptation": description.adaptation,
         "speed_rpm": source.speed_rpm,
         "trained_speed_rpm": None if description.speed_rpm_range is None else list(description.speed_rpm_range),
     }
