@@ -15,7 +15,7 @@ demo: $(VENV)/.installed
 	$(BIN)/gensig generate experiment=quickstart out=$(DEMO)/data
 	$(BIN)/gensig verify $(DEMO)/data
 	$(BIN)/diagnose train data=$(DEMO)/data out=$(DEMO)/report
-	@echo "Look at $(DEMO)/report/report.md (figures beside it); the data set is $(DEMO)/data, described in its README.md"
+	@echo "Look at $(DEMO)/report/report.html; the data set is $(DEMO)/data, described in its README.md"
 
 test: $(VENV)/.installed-test
 	$(BIN)/python -m pytest $(PYTEST_ARGS)

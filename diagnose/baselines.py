@@ -13,7 +13,7 @@ from diagnose.metrics import balanced_accuracy, confusion_by_unit, over_records
 
 FloatArray = NDArray[np.floating]
 IntArray = NDArray[np.integer]
-Prediction = tuple[str, IntArray, IntArray]
+Prediction = tuple[str, IntArray, FloatArray]
 
 
 def rms_threshold(train: FeatureTable, test: FeatureTable, *, n_classes: int) -> Prediction:
@@ -21,7 +21,7 @@ def rms_threshold(train: FeatureTable, test: FeatureTable, *, n_classes: int) ->
 
     Returns
     -------
-    what was fitted, records (record,), predicted labels (record,)
+    what was fitted, records (record,), their log-probabilities (record, class)
     """
     from sklearn.tree import DecisionTreeClassifier
 
@@ -29,7 +29,7 @@ def rms_threshold(train: FeatureTable, test: FeatureTable, *, n_classes: int) ->
     tree.fit(_level(train), train.label)
     thresholds = sorted(float(np.exp(cut)) for cut in tree.tree_.threshold[tree.tree_.feature >= 0])
     text = "thresholds " + ", ".join(f"{value:.3g}" for value in thresholds) + " m/s^2"
-    return (text, *_vote(tree, _level(test), test.record, n_classes))
+    return (text, *over_records(_log_probability(tree, _level(test), n_classes), test.record))
 
 
 def indicator_model(
@@ -44,7 +44,7 @@ def indicator_model(
 
     Returns
     -------
-    what was chosen, records (record,), predicted labels (record,)
+    what was chosen, records (record,), their log-probabilities (record, class)
     """
     known = np.flatnonzero(np.isfinite(train.values).any(axis=0)).tolist()  # the boosting's bins need a value
     kept = [index for index in known if with_level or not train.names[index].endswith("log_rms")]
@@ -52,12 +52,10 @@ def indicator_model(
     for name, make in _candidates().items():
         model = make()
         model.fit(train.values[:, kept], train.label)
-        records, predicted = _vote(model, validation.values[:, kept], validation.record, n_classes)
-        label = _label_of(records, validation)
-        confusion = confusion_by_unit(label, predicted, np.zeros_like(label), n_classes)
-        scored.append((float(balanced_accuracy(confusion[0])), name, model))
+        judged = over_records(_log_probability(model, validation.values[:, kept], n_classes), validation.record)
+        scored.append((_accuracy(*judged, validation, n_classes), name, model))
     _, name, model = max(scored, key=lambda row: row[0])
-    return (name, *_vote(model, test.values[:, kept], test.record, n_classes))
+    return (name, *over_records(_log_probability(model, test.values[:, kept], n_classes), test.record))
 
 
 def nearest_spectrum(train: FeatureTable, test: FeatureTable, *, n_classes: int) -> Prediction:
@@ -65,12 +63,15 @@ def nearest_spectrum(train: FeatureTable, test: FeatureTable, *, n_classes: int)
 
     Returns
     -------
-    what was fitted, records (record,), predicted labels (record,)
+    what was fitted, records (record,), their log-probabilities (record, class)
     """
     from sklearn.neighbors import KNeighborsClassifier
 
     model = KNeighborsClassifier(n_neighbors=1).fit(train.values, train.label)
-    return (f"1-NN of {len(train.label)} spectra", *_vote(model, test.values, test.record, n_classes))
+    return (
+        f"1-NN of {len(train.label)} spectra",
+        *over_records(_log_probability(model, test.values, n_classes), test.record),
+    )
 
 
 def ridge_model(train: FeatureTable, validation: FeatureTable, test: FeatureTable, *, n_classes: int) -> Prediction:
@@ -78,7 +79,7 @@ def ridge_model(train: FeatureTable, validation: FeatureTable, test: FeatureTabl
 
     Returns
     -------
-    what was chosen, records (record,), predicted labels (record,)
+    what was chosen, records (record,), their log-probabilities (record, class)
     """
     from sklearn.linear_model import RidgeClassifier
     from sklearn.pipeline import make_pipeline
@@ -88,12 +89,10 @@ def ridge_model(train: FeatureTable, validation: FeatureTable, test: FeatureTabl
     for penalty in np.logspace(5, -1, 7):
         model = make_pipeline(StandardScaler(), RidgeClassifier(alpha=penalty, class_weight="balanced"))
         model.fit(train.values, train.label)
-        records, predicted = _vote_by_score(model, validation.values, validation.record, n_classes)
-        label = _label_of(records, validation)
-        confusion = confusion_by_unit(label, predicted, np.zeros_like(label), n_classes)
-        scored.append((float(balanced_accuracy(confusion[0])), f"ridge, penalty {penalty:g}", model))
+        judged = over_records(_soft_score(model, validation.values, n_classes), validation.record)
+        scored.append((_accuracy(*judged, validation, n_classes), f"ridge, penalty {penalty:g}", model))
     _, name, model = max(scored, key=lambda row: row[0])
-    return (name, *_vote_by_score(model, test.values, test.record, n_classes))
+    return (name, *over_records(_soft_score(model, test.values, n_classes), test.record))
 
 
 def _candidates() -> dict[str, Callable[[], Any]]:
@@ -127,25 +126,28 @@ def _level(table: FeatureTable) -> FloatArray:
     return np.nan_to_num(table.values[:, columns], nan=-50.0).mean(axis=1, keepdims=True)
 
 
-def _vote(model: Any, values: FloatArray, record: IntArray, n_classes: int) -> tuple[IntArray, IntArray]:
-    """Records and their predicted labels: the largest mean log-probability over the record's rows."""
+def _log_probability(model: Any, values: FloatArray, n_classes: int) -> FloatArray:
+    """(row, class), no smaller than log 1e-9, as for classes that the training did not have."""
     log_probability = np.full((values.shape[0], n_classes), np.log(1e-9))
     log_probability[:, model.classes_] = np.log(np.maximum(model.predict_proba(values), 1e-9))
-    records, by_record = over_records(log_probability, record)
-    return records, by_record.argmax(axis=1)
+    return log_probability
 
 
-def _vote_by_score(model: Any, values: FloatArray, record: IntArray, n_classes: int) -> tuple[IntArray, IntArray]:
-    """Records and their predicted labels: the largest mean score over the record's rows."""
+def _soft_score(model: Any, values: FloatArray, n_classes: int) -> FloatArray:
+    """(row, class) log-softmax of scores, which ranks as they do; a regression on membership has no probabilities."""
+    from scipy.special import log_softmax
+
     score = model.decision_function(values)
     if score.ndim == 1:  # two classes: one score, positive for the second
         score = np.stack([-score, score], axis=1)
-    by_class = np.full((values.shape[0], n_classes), -np.inf)
-    by_class[:, model.classes_] = score
-    records, by_record = over_records(by_class, record)
-    return records, by_record.argmax(axis=1)
+    by_class = np.full((values.shape[0], n_classes), np.log(1e-9))
+    by_class[:, model.classes_] = log_softmax(score, axis=1)
+    return by_class
 
 
-def _label_of(records: IntArray, table: FeatureTable) -> IntArray:
-    label = dict(zip(table.record.tolist(), table.label.tolist(), strict=True))
-    return np.array([label[record] for record in records.tolist()], dtype=np.int64)
+def _accuracy(records: IntArray, log_probability: FloatArray, table: FeatureTable, n_classes: int) -> float:
+    """Balanced accuracy over the records of a table."""
+    label_of = dict(zip(table.record.tolist(), table.label.tolist(), strict=True))
+    label = np.array([label_of[record] for record in records.tolist()], dtype=np.int64)
+    confusion = confusion_by_unit(label, log_probability.argmax(axis=1), np.zeros_like(label), n_classes)
+    return float(balanced_accuracy(confusion[0]))

@@ -32,6 +32,30 @@ def confusion_figure(path: Path, confusion: Sequence[Sequence[int]], class_names
     _save(figure, path)
 
 
+def scores_figure(path: Path, metrics: Mapping[str, Any]) -> None:
+    """Balanced accuracy and interval of every method, one panel a protocol, leaky ones last and in grey."""
+    results = sorted(metrics["protocols"].items(), key=lambda item: item[1]["leaky"])
+    named = dict.fromkeys([metrics["model"], *(name for _, result in results for name in result["methods"])])
+    methods = [name for name in named if name != "chance"]
+    height = 0.34 * len(methods) + 1.1
+    figure, axes = _subplots(len(results), size=(min(3.4 * len(results) + 1.6, 16), height), sharey=True)
+    for panel, (protocol, result) in zip(axes, results, strict=True):
+        panel.axvline(result["methods"]["chance"]["balanced_accuracy"], color="0.4", linestyle=":")
+        for place, name in enumerate(reversed(methods)):
+            if name not in result["methods"]:
+                continue
+            score = result["methods"][name]["balanced_accuracy"]
+            color = "0.6" if result["leaky"] else COLORS[0] if name == metrics["model"] else COLORS[-1]
+            panel.plot([score["low"], score["high"]], [place, place], color=color, linewidth=2)
+            panel.plot(score["mean"], place, color=color, marker="o")
+        panel.set_yticks(range(len(methods)), [name.replace("_", " ") for name in reversed(methods)])
+        title = protocol + ("\nLEAKY: not a result" if result["leaky"] else "")
+        panel.set(xlim=(0, 1.02), ylim=(-0.6, len(methods) - 0.4), xlabel="balanced accuracy")
+        panel.set_title(title, fontsize=10)
+        panel.grid(alpha=0.3, axis="x")
+    _save(figure, path)
+
+
 def severity_figure(path: Path, protocols: Mapping[str, Sequence[Mapping[str, Any]]]) -> None:
     """Share of faulty records recognised against severity, one panel a protocol; rows of `study.severity_rows`."""
     figure, axes = _subplots(len(protocols), size=(4.2 * len(protocols) + 0.6, 3.6))
@@ -76,14 +100,14 @@ def reliability_figure(path: Path, protocols: Mapping[str, Mapping[str, Any]]) -
     _save(figure, path)
 
 
-def _subplots(n_panels: int, *, size: tuple[float, float]) -> tuple[Any, list[Any]]:
+def _subplots(n_panels: int, *, size: tuple[float, float], sharey: bool = False) -> tuple[Any, list[Any]]:
     """Figure and axes without touching the state of pyplot, so that no display is needed."""
     from matplotlib.backends.backend_agg import FigureCanvasAgg
     from matplotlib.figure import Figure
 
     figure = Figure(figsize=size, layout="constrained")
     FigureCanvasAgg(figure)
-    return figure, list(np.atleast_1d(figure.subplots(1, n_panels)))
+    return figure, list(np.atleast_1d(figure.subplots(1, n_panels, sharey=sharey)))
 
 
 def _save(figure: Any, path: Path) -> None:

@@ -15,7 +15,6 @@ from typing import Any
 
 import numpy as np
 import torch
-from numpy.typing import NDArray
 
 from diagnose.adaptation import Statistics, healthy_statistics
 from diagnose.baselines import Prediction as BaselinePrediction
@@ -23,6 +22,7 @@ from diagnose.baselines import indicator_model, nearest_spectrum, ridge_model, r
 from diagnose.domain import Domain, fit_domain
 from diagnose.features import Cache, feature_table
 from diagnose.metrics import over_records
+from diagnose.predictions import Prediction
 from diagnose.settings import TrainSettings
 from diagnose.train import input_scale, predict_windows, train_network, with_shuffled_labels
 from diagnose.window_features import rocket_tables, spectrum_table
@@ -37,33 +37,6 @@ class Job:
     protocols: tuple[str, ...]
     seed: int | None
     shuffled: bool = False
-
-
-@dataclass(frozen=True, slots=True, kw_only=True)
-class Prediction:
-    """Test records of a protocol with their predicted labels, and what was fitted or trained.
-
-    Attributes of networks only
-    ---------------------------
-    log_probability : (record, class) mean over the windows
-    temperature : see `diagnose.calibration`
-    last_predicted : (record,) labels that the weights of the last epoch give
-    """
-
-    protocol: str
-    method: str
-    seed: int
-    record: NDArray[np.integer]
-    predicted: NDArray[np.integer]
-    detail: str
-    weights: dict[str, NDArray[Any]] | None = None
-    domain: Domain | None = None
-    healthy: Statistics | None = None
-    best_epoch: int = 0
-    validation_loss: tuple[float, ...] = ()
-    log_probability: NDArray[np.floating] | None = None
-    temperature: float = 1.0
-    last_predicted: NDArray[np.integer] | None = None
 
 
 def run_jobs(
@@ -132,14 +105,13 @@ def _run_training(task: Task, settings: TrainSettings, protocol: str, seed: int,
         method="label_shuffle" if shuffled else str(settings.model.get("name", "network")),
         seed=seed,
         record=record,
-        predicted=log_probability.argmax(axis=1),
+        log_probability=log_probability,
         detail=f"best epoch {training.best_epoch} of {len(training.validation_loss)}",
         weights=None if shuffled else {key: value.numpy() for key, value in training.model.state_dict().items()},
         domain=domain,
         healthy=None if shuffled else healthy_statistics(training.model, train, task.class_names),
         best_epoch=training.best_epoch,
         validation_loss=training.validation_loss,
-        log_probability=log_probability,
         temperature=training.temperature,
         last_predicted=last.argmax(axis=1),
     )
@@ -148,9 +120,16 @@ def _run_training(task: Task, settings: TrainSettings, protocol: str, seed: int,
 def _run_baselines(task: Task, settings: TrainSettings, protocol: str, cache: Cache) -> list[Prediction]:
     predictions = []
     for method in settings.baselines:
-        detail, record, predicted = _fit_baseline(task, settings, protocol, method, cache)
+        detail, record, log_probability = _fit_baseline(task, settings, protocol, method, cache)
         predictions.append(
-            Prediction(protocol=protocol, method=method, seed=0, record=record, predicted=predicted, detail=detail)
+            Prediction(
+                protocol=protocol,
+                method=method,
+                seed=0,
+                record=record,
+                log_probability=log_probability,
+                detail=detail,
+            )
         )
     return predictions
 

@@ -1,4 +1,4 @@
-"""The result of a study for readers: ``metrics.json``, figures and one Markdown page."""
+"""The result of a study: ``metrics.json`` for programs, figures, and one HTML page that is understood in a minute."""
 
 from __future__ import annotations
 
@@ -7,247 +7,175 @@ from collections.abc import Mapping, Sequence
 from pathlib import Path
 from typing import Any
 
-import numpy as np
-
-from diagnose.figures import confusion_figure, reliability_figure, severity_figure
+from diagnose.figures import confusion_figure, reliability_figure, scores_figure, severity_figure
+from diagnose.page import Section, Table, write_page
 from diagnose.protocols import MEANING
+from diagnose.report_text import (
+    METHOD_MEANING,
+    METHODS,
+    answer_card,
+    caveats,
+    confusions,
+    recall_table,
+    score_cell,
+    trust_table,
+)
 
-FEW_UNITS = 10
-CONFUSED = 0.1
+LEAKY_MEANING = (
+    "windows of one record on both sides of the split, as in many papers. It shows how much a careless split flatters; "
+    "it is no measure of diagnosis"
+)
 
 
 def write_report(folder: Path, metrics: Mapping[str, Any]) -> Path:
-    """Write ``metrics.json``, the figures (confusion by protocol, severity, reliability), ``report.md``; return it."""
+    """Write ``metrics.json``, the figures and ``report.html`` and return the page."""
     (folder / "metrics.json").write_text(json.dumps(metrics, indent=2, allow_nan=False) + "\n", encoding="utf-8")
-    model = metrics["model"]
-    for protocol, result in metrics["protocols"].items():
-        title = f"{model}, {protocol}" + (" (LEAKY)" if result["leaky"] else "")
-        path = folder / f"confusion_{protocol}.png"
-        confusion_figure(path, result["methods"][model]["confusion"], metrics["class_names"], title)
-    rows = {name: result["by_severity"] for name, result in metrics["protocols"].items() if not result["leaky"]}
-    rows = {name: part for name, part in rows.items() if part}
-    if rows:
-        severity_figure(folder / "severity.png", rows)
-    clean = {name: result for name, result in metrics["protocols"].items() if not result["leaky"]}
-    if clean:
-        reliability_figure(folder / "reliability.png", {name: result["calibration"] for name, result in clean.items()})
-    page = folder / "report.md"
-    page.write_text("\n".join(_page(metrics, list(rows))) + "\n", encoding="utf-8")
+    page = folder / "report.html"
+    write_page(page, title="Which faults can be told apart", lead=_lead(metrics), sections=_sections(folder, metrics))
     return page
 
 
 def result_table(metrics: Mapping[str, Any]) -> list[str]:
     """Markdown table of protocol x method: balanced accuracy with its 95 % interval, leaky protocols last."""
-    columns = {
-        metrics["model"]: metrics["model"].upper(),
-        "indicators": "indicators",
-        "indicators_without_level": "indicators without RMS",
-        "rms_threshold": "RMS threshold",
-        "nearest_spectrum": "1-NN on spectra",
-        "minirocket": "MiniRocket",
-        "label_shuffle": "label shuffle",
-        "chance": "chance",
-    }
-    results = metrics["protocols"]
-    shown = [key for key in columns if any(key in result["methods"] for result in results.values())]
-    lines = [
-        "| protocol | " + " | ".join(columns[key] for key in shown) + " |",
-        "|---" * (len(shown) + 1) + "|",
-    ]
-    for name, result in sorted(results.items(), key=lambda item: item[1]["leaky"]):
-        label = f"*{name}* (LEAKY: not a result)" if result["leaky"] else f"**{name}**"
-        lines.append("| " + " | ".join([label, *(_cell(result["methods"].get(key)) for key in shown)]) + " |")
+    table = _score_table(metrics)
+    lines = ["| " + " | ".join(table.head) + " |", "|---" * len(table.head) + "|"]
+    for number, (name, *cells) in enumerate(table.rows):
+        label = f"*{name}* (LEAKY: not a result)" if number in table.quiet else f"**{name}**"
+        lines.append("| " + " | ".join([label, *cells]) + " |")
     return lines
 
 
-def _cell(method: Mapping[str, Any] | None) -> str:
-    if method is None:
-        return "-"
-    value = method["balanced_accuracy"]
-    if isinstance(value, float):
-        return f"{value:.2f}"
-    return f"{value['mean']:.2f} [{value['low']:.2f}, {value['high']:.2f}]"
+def _score_table(metrics: Mapping[str, Any]) -> Table:
+    results = sorted(metrics["protocols"].items(), key=lambda item: item[1]["leaky"])
+    columns = {metrics["model"]: metrics["model"].upper(), **METHODS}
+    shown = [key for key in columns if any(key in result["methods"] for _, result in results)]
+    return Table(
+        head=["protocol", *(columns[key] for key in shown)],
+        rows=[[name, *(score_cell(result["methods"].get(key)) for key in shown)] for name, result in results],
+        quiet=[number for number, (_, result) in enumerate(results) if result["leaky"]],
+    )
 
 
-def _page(metrics: Mapping[str, Any], with_severity: Sequence[str]) -> list[str]:
-    results = metrics["protocols"]
+def _lead(metrics: Mapping[str, Any]) -> list[str]:
     settings = metrics["settings"]
     window_ms = 1e3 * settings["window_samples"] / metrics["sampling_rate_hz"]
     level = "level removed (RMS-normalised)" if settings["normalise"] == "rms" else "level kept"
-    lines = [
-        "# Which faults can be told apart",
-        "",
-        f"Data: `{_safe(metrics['data'])}`, {metrics['n_records']} records, classes {_list(metrics['class_names'])}; "
-        f"channels {_list(metrics['channel_names'])} at {metrics['sampling_rate_hz']:g} Hz. "
-        f"Network: {metrics['model']} on windows of {window_ms:.0f} ms, {level}, {len(settings['seeds'])} seed(s).",
-        "",
-        *[f"- {_headline(name, result, metrics['model'])}" for name, result in results.items() if not result["leaky"]],
-        "",
-        "Balanced accuracy over test records, mean over seeds [95 % interval over units]:",
-        "",
-        *result_table(metrics),
-        "",
-        "## Which faults are found",
-        "",
-        f"Share of the test records of each class that {metrics['model']} recognises:",
-        "",
-        *_recall_table(metrics),
-        "",
-        "## What the numbers mean",
-        "",
-        "- **Balanced accuracy**: mean over the classes of the share of records recognised. A record's label is the "
-        "class with the largest mean log-probability over its windows.",
-        *[f"- **{name}**: {MEANING[name]}." for name in results if name in MEANING],
-        "- **LEAKY**: windows of one record on both sides of the split, as in many papers. It shows how much a "
-        "careless split flatters; it is no measure of diagnosis.",
-        "- **indicators**: logistic regression or gradient boosting (chosen on validation units) on RMS, kurtosis, "
-        "crest factor, FM4 and sideband ratio of every channel over the whole stretch of signal; it knows the speed "
-        "and the tooth counts. **RMS threshold**: thresholds on the level alone.",
-        *_optional_baselines(metrics),
-        "- **label shuffle**: the same training on shuffled labels. Chance must lie in its interval, which covers the "
-        "units and the luck of the shuffle; if it lies below, something leaks.",
-        "",
-        "## Which classes are confused",
-        "",
+    return [
+        f"Data: {metrics['data']}, {metrics['n_records']} records, classes {', '.join(metrics['class_names'])}; "
+        f"channels {', '.join(metrics['channel_names'])} at {metrics['sampling_rate_hz']:g} Hz.",
+        f"Network: {metrics['model']} on windows of {window_ms:.0f} ms, {level}, {len(settings['seeds'])} seed(s). "
+        f"gensig {metrics['environment']['gensig']}, {metrics['environment']['finished']}.",
     ]
-    for name, result in results.items():
-        if not result["leaky"]:
-            lines += _confusions(name, result["methods"][metrics["model"]]["confusion"], metrics["class_names"])
-    lines += ["", *[f"![confusion, {name}](confusion_{name}.png)" for name in results]]
-    if with_severity:
-        lines += ["", "## How severe a fault must be", "", "![recognised by severity](severity.png)"]
-    lines += ["", *_trust_section(metrics)]
-    lines += ["", "## Caveats", "", *_caveats(metrics), ""]
-    lines.append("Everything in numbers, with macro-F1, recall and settings: `metrics.json`. Networks: `models/`.")
-    return lines
 
 
-def _optional_baselines(metrics: Mapping[str, Any]) -> list[str]:
-    """One line for each baseline that does not run by default."""
-    texts = {
-        "nearest_spectrum": "- **1-NN on spectra**: the class of the training signal with the nearest log-magnitude "
-        "spectrum, mean over the windows.",
-        "minirocket": "- **MiniRocket**: ridge regression on the shares of positive values of fixed convolutions "
-        "(Dempster et al. 2021), mean over the windows; the penalty is chosen on validation units.",
-    }
-    return [text for name, text in texts.items() if name in metrics["settings"]["baselines"]]
-
-
-def _recall_table(metrics: Mapping[str, Any]) -> list[str]:
-    """Recall by class and clean protocol, a Markdown table."""
-    names = metrics["class_names"]
-    lines = ["| protocol | " + " | ".join(_safe(name) for name in names) + " |", "|---" * (len(names) + 1) + "|"]
-    for protocol, result in metrics["protocols"].items():
-        if not result["leaky"]:
-            shares = result["methods"][metrics["model"]]["recall"]
-            lines.append(f"| **{protocol}** | " + " | ".join(f"{shares[name]:.2f}" for name in names) + " |")
-    return lines
-
-
-def _trust_section(metrics: Mapping[str, Any]) -> list[str]:
-    """How far the network's probabilities can be believed, and what the choice of the epoch brought."""
-    clean = {name: result for name, result in metrics["protocols"].items() if not result["leaky"]}
-    lines = [
-        "## What its probabilities are worth",
-        "",
-        "One temperature a network, fitted on the records of its validation units, brings the probabilities of records "
-        "nearer to the share that is right; it changes no label. Calibration error: mean distance between the two over "
-        "test records, and what such probabilities would have by chance if they were all true. Cross-entropy: smaller "
-        "is better. The network is the one of its best epoch on validation units; the score of its last epoch stands "
-        "beside.",
-        "",
-        "| protocol | calibration error before, after (chance) | cross-entropy before, after | temperature | best epoch"
-        " | last epoch | score of the last |",
-        "|---" * 7 + "|",
+def _sections(folder: Path, metrics: Mapping[str, Any]) -> list[Section]:
+    model = metrics["model"]
+    ordered = sorted(metrics["protocols"].items(), key=lambda item: item[1]["leaky"])
+    clean = {name: result for name, result in ordered if not result["leaky"]}
+    sections = [
+        Section(
+            title="In short",
+            text=["Balanced accuracy of the network over test records: the mean share recognised of each class."],
+            cards=[
+                answer_card(name, result, model, LEAKY_MEANING if result["leaky"] else MEANING[name])
+                for name, result in ordered
+            ],
+        ),
+        Section(
+            title="Network, baselines and controls",
+            text=["Mean over the seeds [95 % interval over test units, so over machines, not windows]."],
+            table=_score_table(metrics),
+            figures=_figures(folder, "scores.png", "scores and intervals; dotted: chance", scores_figure, metrics),
+        ),
     ]
-    for name, result in clean.items():
-        calibration, last = result["calibration"], result["last_epoch"]
-        before, after = (
-            {key: np.mean(calibration[when][key]) for key in ("expected_calibration_error", "cross_entropy")}
-            for when in ("before", "after")
+    if clean:
+        sections.append(_fault_section(folder, clean, metrics))
+        sections.append(_severity_section(folder, clean))
+    sections.append(Section(title="Caveats", notes=[("", line) for line in caveats(metrics)]))
+    sections.append(
+        Section(
+            title="What the numbers mean",
+            notes=[
+                (
+                    "A record's label",
+                    "the class with the largest mean log-probability over its windows.",
+                ),
+                *[(name, f"{MEANING[name]}.") for name in clean],
+                ("LEAKY", f"{LEAKY_MEANING}."),
+                *[(METHODS[name], text) for name, text in METHOD_MEANING.items() if _has(metrics, name)],
+            ],
+            folded=True,
         )
-        cells = (
-            f"**{name}**",
-            f"{before['expected_calibration_error']:.3f}, {after['expected_calibration_error']:.3f} "
-            f"({np.mean(calibration['after']['error_by_chance']):.3f})",
-            f"{before['cross_entropy']:.3f}, {after['cross_entropy']:.3f}",
-            _several(calibration["temperature"], ".2f"),
-            _several(result["best_epoch"], "d"),
-            _several(last["epoch"], "d"),
-            _cell(last),
+    )
+    if clean:
+        sections.append(_trust_section(folder, clean))
+    sections.append(_confusion_section(folder, metrics, ordered))
+    sections.append(
+        Section(
+            title="Files beside this page",
+            notes=[
+                ("metrics.json", "everything in numbers, with macro-F1, recall, calibration, settings and versions."),
+                ("predictions.csv", "what each method said of each test record."),
+                ("models/", "the networks, one folder each, for diagnose evaluate and diagnose predict."),
+            ],
+            folded=True,
         )
-        lines.append("| " + " | ".join(cells) + " |")
-    return [*lines, "", "![reliability](reliability.png)"] if clean else lines
+    )
+    return [section for section in sections if section.text or section.table or section.notes or section.figures]
 
 
-def _several(values: Sequence[float], form: str) -> str:
-    """One value a seed."""
-    return ", ".join(format(value, form) for value in values)
+def _fault_section(folder: Path, clean: Mapping[str, Any], metrics: Mapping[str, Any]) -> Section:
+    model, names = metrics["model"], metrics["class_names"]
+    return Section(
+        title="Which faults are found",
+        text=[f"Share of the test records of each class that {model} recognises."],
+        table=recall_table(clean, model, names),
+        notes=[(name, confusions(result["methods"][model]["confusion"], names)) for name, result in clean.items()],
+    )
 
 
-def _headline(name: str, result: Mapping[str, Any], model: str) -> str:
-    """One sentence: the score against chance and against the best baseline."""
-    methods = result["methods"]
-    score, chance = methods[model]["balanced_accuracy"], methods["chance"]["balanced_accuracy"]
-    verdict = "above chance" if score["low"] > chance else "not distinguishable from chance"
-    text = f"**{name}**: {model} {score['mean']:.2f}, {verdict} ({chance:.2f})"
-    named = ("indicators", "rms_threshold", "nearest_spectrum", "minirocket")
-    others = {key: methods[key] for key in named if key in methods}
-    if others:
-        best = max(others, key=lambda key: others[key]["balanced_accuracy"]["mean"])
-        value = others[best]["balanced_accuracy"]["mean"]
-        # an interval that holds the other's mean tells the two apart neither way
-        comparison = (
-            "better than" if score["low"] > value else "worse than" if score["high"] < value else "not told from"
-        )
-        text += f"; {comparison} the {best.replace('_', ' ')} baseline ({value:.2f})"
-    if "label_shuffle" in methods:
-        shuffled = methods["label_shuffle"]["balanced_accuracy"]
-        text += "; label shuffle " + (
-            "at chance" if shuffled["low"] <= chance else f"ABOVE chance ({shuffled['mean']:.2f}): look for a leak"
-        )
-    return text + "."
+def _severity_section(folder: Path, clean: Mapping[str, Any]) -> Section:
+    rows = {name: result["by_severity"] for name, result in clean.items() if result["by_severity"]}
+    if not rows:
+        return Section(title="How severe a fault must be")
+    return Section(
+        title="How severe a fault must be",
+        figures=_figures(folder, "severity.png", "recognised share against severity", severity_figure, rows),
+    )
 
 
-def _confusions(name: str, confusion: Sequence[Sequence[int]], class_names: Sequence[str]) -> list[str]:
-    """The largest off-diagonal shares of a protocol, at most three."""
-    found = []
-    for true, row in enumerate(confusion):
-        total = max(int(np.sum(row)), 1)
-        for predicted, count in enumerate(row):
-            if true != predicted and count / total >= CONFUSED:
-                found.append((count / total, class_names[true], class_names[predicted]))
-    if not found:
-        return [f"- **{name}**: no class is taken for another in {CONFUSED:.0%} of its records or more."]
-    pairs = [f"{_safe(a)} taken for {_safe(b)} ({share:.0%})" for share, a, b in sorted(found, reverse=True)[:3]]
-    return [f"- **{name}**: " + "; ".join(pairs) + "."]
+def _trust_section(folder: Path, clean: Mapping[str, Any]) -> Section:
+    calibration = {name: result["calibration"] for name, result in clean.items()}
+    return Section(
+        title="What its probabilities are worth",
+        text=[
+            "One temperature a network, fitted on the records of its validation units, brings the probabilities of "
+            "records nearer to the share that is right; it changes no label. Calibration error: mean distance between "
+            "the two over test records, and what such probabilities would have by chance if they were all true. "
+            "Cross-entropy: smaller is better. The network is the one of its best epoch on validation units; the score "
+            "of its last epoch stands beside."
+        ],
+        table=trust_table(clean),
+        figures=_figures(folder, "reliability.png", "share right against probability", reliability_figure, calibration),
+        folded=True,
+    )
 
 
-def _caveats(metrics: Mapping[str, Any]) -> list[str]:
-    lines = ["- Simulated vibration. A score here says nothing yet about measured machines."]
-    for name, result in metrics["protocols"].items():
-        n_units = result["n_units"]["test"]
-        if n_units < FEW_UNITS and not result["leaky"]:
-            lines.append(
-                f"- {name}: only {n_units} test unit(s). The interval shows the spread of these units and is too "
-                f"narrow for new ones; at least {FEW_UNITS} are advisable."
-            )
-    if metrics["settings"]["normalise"] == "rms":
-        lines.append(
-            "- The network sees windows without their level, the indicators with it unless stated; "
-            "`normalise=none` gives the level to the network too."
-        )
-    for name, reason in metrics["protocols_left_out"].items():
-        lines.append(f"- {name} is left out: {_safe(reason)}.")
-    if metrics["n_records_unusable"]:
-        lines.append(f"- {metrics['n_records_unusable']} record(s) failed in simulation and are left out.")
-    return lines
+def _confusion_section(folder: Path, metrics: Mapping[str, Any], ordered: Sequence[tuple[str, Any]]) -> Section:
+    figures = []
+    for name, result in ordered:
+        title = f"{metrics['model']}, {name}" + (" (LEAKY)" if result["leaky"] else "")
+        confusion = result["methods"][metrics["model"]]["confusion"]
+        confusion_figure(folder / f"confusion_{name}.png", confusion, metrics["class_names"], title)
+        figures.append((f"confusion_{name}.png", title))
+    return Section(title="Confusion matrices", figures=figures, folded=True)
 
 
-def _list(names: Sequence[str]) -> str:
-    return ", ".join(_safe(name) for name in names)
+def _figures(folder: Path, name: str, caption: str, draw: Any, content: Any) -> list[tuple[str, str]]:
+    """Draw one figure into the folder, for the page to show."""
+    draw(folder / name, content)
+    return [(name, caption)]
 
 
-def _safe(text: str) -> str:
-    """Text from a file without what Markdown or HTML would act on."""
-    return "".join(character if character.isalnum() or character in " _-./:," else "?" for character in text)
+def _has(metrics: Mapping[str, Any], method: str) -> bool:
+    return any(method in result["methods"] for result in metrics["protocols"].values())

@@ -8,7 +8,6 @@ import sys
 import time
 from collections.abc import Callable, Sequence
 from dataclasses import asdict
-from importlib.metadata import version
 from pathlib import Path
 from typing import Any
 
@@ -16,15 +15,17 @@ import numpy as np
 from numpy.typing import NDArray
 
 from diagnose.calibration import calibration_scores
-from diagnose.jobs import Job, Prediction, run_jobs
+from diagnose.jobs import Job, run_jobs
 from diagnose.metrics import SCORES, confusion_by_unit, recall, score_with_interval
 from diagnose.model_io import data_fingerprint, model_description, save_model
 from diagnose.models import build_model, check_window
+from diagnose.predictions import Prediction, write_predictions
 from diagnose.protocols import choose_protocols
 from diagnose.settings import BASELINES, TrainSettings
 from diagnose.train import device_of
 from diagnose.windows import SUBSETS, Task, plan_windows, subset_segments, task_of
 from gensig.errors import ConfigError
+from gensig.version import __version__
 
 METRICS_SCHEMA_VERSION = 1
 BOOTSTRAP_SEED = 20240607
@@ -93,7 +94,7 @@ def run_study(
     Parameters
     ----------
     task, settings : what to learn and how
-    folder : exists; receives ``models/<protocol>-seed<k>``
+    folder : exists; receives ``models/<protocol>-seed<k>`` and ``predictions.csv``
     protocols, jobs : of `plan_study`
     on_done : told one line for each finished piece
     """
@@ -113,6 +114,7 @@ def run_study(
             parts = [part for part in (prediction.domain, prediction.healthy) if part is not None]
             known = {name: tensor for part in parts for name, tensor in part.tensors().items()}
             save_model(target, prediction.weights | known, model_description(task, settings, prediction))
+    write_predictions(folder / "predictions.csv", task, predictions)
     results = {protocol: _protocol_result(task, settings, protocol, predictions) for protocol in protocols}
     return {
         "metrics_schema_version": METRICS_SCHEMA_VERSION,
@@ -242,8 +244,7 @@ def _calibration(task: Task, network: Sequence[Prediction]) -> dict[str, Any]:
     """Calibration of the probabilities of test records, see `diagnose.calibration.calibration_scores`."""
     labels = task.labels()
     runs = [(run.log_probability, labels[run.record], run.temperature) for run in network]
-    known = [(values, truth, scale) for values, truth, scale in runs if values is not None]
-    return calibration_scores(*(list(column) for column in zip(*known, strict=True)))
+    return calibration_scores(*(list(column) for column in zip(*runs, strict=True)))
 
 
 def _n_cores() -> int:
@@ -258,7 +259,7 @@ def _environment() -> dict[str, str]:
     import torch
 
     return {
-        "gensig": version("gensig"),
+        "gensig": __version__,
         "python": platform.python_version(),
         "numpy": np.__version__,
         "torch": str(torch.__version__),

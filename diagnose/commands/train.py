@@ -15,7 +15,7 @@ Train a network and its baselines on splits of a data set and write a report. De
 cross_specimen and the leaky one, as far as the data set has them.
 
   data=DIR    data set made by gensig generate
-  out=DIR     folder to write; must not exist or be empty. Receives report.md, metrics.json, figures, models/
+  out=DIR     folder to write; must not exist or be empty. Receives report.html, metrics.json, figures, models/
 
 Every other key=value overrides configs/train.yaml, model=NAME chooses a file of configs/model."""
 EXAMPLE = """\

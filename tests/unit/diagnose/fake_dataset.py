@@ -51,6 +51,10 @@ class FakeDataset:
             "unit_gain": rng.uniform(0.7, 1.4, n_units)[unit],
         }
 
+    @property
+    def column_names(self):
+        return list(self.columns)
+
     def column(self, name):
         return self.columns[name]
 

@@ -1,8 +1,11 @@
 """The command from data to report, and one line for every mistake."""
 
+import csv
 import json
+import re
 import subprocess
 import sys
+from html.parser import HTMLParser
 
 import numpy as np
 import pytest
@@ -10,7 +13,7 @@ from fake_dataset import FakeDataset
 
 import gensig.dataset.reader
 from diagnose.cli import main
-from diagnose.report import result_table
+from diagnose.report import result_table, write_report
 from gensig.errors import DatasetError
 
 FAST = [
@@ -58,13 +61,13 @@ def fails(capsys, words, message):
 def test_train_writes_what_it_promises(trained):
     names = {path.name for path in trained.iterdir()}
     assert names == {
-        "metrics.json", "report.md", "models", "severity.png", "reliability.png", "confusion_by_unit.png",
-        "confusion_random_window_leaky.png",
+        "metrics.json", "predictions.csv", "report.html", "models", "scores.png",
+        "severity.png", "reliability.png", "confusion_by_unit.png", "confusion_random_window_leaky.png",
     }  # fmt: skip
     metrics = json.loads((trained / "metrics.json").read_text())
     assert list(metrics["protocols"]) == ["by_unit", "random_window_leaky"]
     assert metrics["protocols_left_out"] == {"cross_specimen": "1 specimen_id in the plan, and at least 4 are needed"}
-    assert "cross_specimen is left out: 1 specimen" in (trained / "report.md").read_text()
+    assert "cross_specimen is left out: 1 specimen" in (trained / "report.html").read_text()
     methods = metrics["protocols"]["by_unit"]["methods"]
     assert set(methods) == {
         "cnn", "label_shuffle", "indicators", "indicators_without_level", "rms_threshold", "chance",
@@ -81,26 +84,41 @@ def test_train_writes_what_it_promises(trained):
     assert not list(trained.rglob("*.pkl")) + list(trained.rglob("*.pt"))
 
 
-def test_report_shows_the_leaky_protocol_last_and_says_so(trained):
-    page = (trained / "report.md").read_text()
-    rows = [line for line in page.partition("## Which faults")[0].splitlines() if line.startswith("| ")]
-    assert [row.split("|")[1].strip() for row in rows] == [
-        "protocol", "**by_unit**", "*random_window_leaky* (LEAKY: not a result)",
-    ]  # fmt: skip
-    for word in ("CNN", "indicators", "RMS threshold", "label shuffle", "chance", "Caveats", "2 test unit(s)"):
-        assert word in page
+def test_predictions_hold_what_the_scores_are_made_of(trained):
+    metrics = json.loads((trained / "metrics.json").read_text())
+    with (trained / "predictions.csv").open(encoding="utf-8") as file:
+        rows = list(csv.DictReader(file))
+    mine = [row for row in rows if (row["protocol"], row["method"]) == ("by_unit", "indicators")]
+    shares = []
+    for name in metrics["class_names"]:
+        guesses = [row["predicted"] for row in mine if row["label"] == name]
+        shares.append(sum(guess == name for guess in guesses) / len(guesses))
+    score = metrics["protocols"]["by_unit"]["methods"]["indicators"]["balanced_accuracy"]["mean"]
+    assert sum(shares) / len(shares) == pytest.approx(score, abs=1e-12)
+    for row in mine:
+        largest = max(metrics["class_names"], key=lambda name: float(row[f"log_probability_{name}"]))
+        assert largest == row["predicted"]
+    assert {row["method"] for row in rows} >= {"cnn", "indicators", "label_shuffle"}
+
+
+def test_the_table_shows_the_leaky_protocol_last_and_says_so(trained):
     metrics = json.loads((trained / "metrics.json").read_text())
     metrics["protocols"] = dict(reversed(metrics["protocols"].items()))
-    assert "LEAKY" in result_table(metrics)[-1]
+    names = [line.split("|")[1].strip() for line in result_table(metrics)]
+    assert names == ["protocol", "---", "**by_unit**", "*random_window_leaky* (LEAKY: not a result)"]
 
 
-def test_report_says_what_the_probabilities_are_worth(trained):
-    page = (trained / "report.md").read_text()
-    part = page.partition("## What its probabilities are worth")[2].partition("\n## ")[0]
-    assert "![reliability](reliability.png)" in part
-    assert "| **by_unit** | " in part
-    assert "leaky" not in part
-    assert "1-NN" not in page
+def test_the_page_stands_alone_and_says_what_matters(trained):
+    page = (trained / "report.html").read_text()
+    text = visible_text(page)
+    for word in ("CNN", "indicators", "RMS threshold", "label shuffle", "chance", "Caveats", "2 test unit(s)"):
+        assert word in text
+    assert text.index("by_unit") < text.index("random_window_leaky (LEAKY)") < text.index("Which faults are found")
+    assert "1-NN" not in text
+    sources = re.findall(r'src="([^"]{0,40})', page)
+    assert len(sources) == 5
+    assert all(source.startswith("data:image/png;base64,") for source in sources)
+    assert "<script" not in page
 
 
 def test_chosen_baselines_stand_in_the_report(data, tmp_path):
@@ -108,11 +126,27 @@ def test_chosen_baselines_stand_in_the_report(data, tmp_path):
     few = ["protocols=[by_unit]", "shuffle_control=false", "baselines=[nearest_spectrum,minirocket]"]
     words = ["train", "data=good", f"out={out}", *FAST[:2], "epochs=1", "seeds=[0]", *FAST[4:], *few]
     assert main([*words, "minirocket_features=168"]) == 0
-    page = (out / "report.md").read_text()
-    assert "| protocol | CNN | 1-NN on spectra | MiniRocket | chance |" in page
-    assert "- **MiniRocket**: ridge" in page
-    methods = json.loads((out / "metrics.json").read_text())["protocols"]["by_unit"]["methods"]
-    assert list(methods) == ["nearest_spectrum", "minirocket", "cnn", "chance"]
+    text = visible_text((out / "report.html").read_text())
+    assert "protocol CNN 1-NN on spectra MiniRocket chance by_unit" in text
+    assert "MiniRocket : ridge regression" in text
+    metrics = json.loads((out / "metrics.json").read_text())
+    assert list(metrics["protocols"]["by_unit"]["methods"]) == ["nearest_spectrum", "minirocket", "cnn", "chance"]
+
+
+def test_names_from_a_file_stay_text_in_the_page(trained, tmp_path):
+    text = (trained / "metrics.json").read_text().replace('"pitting"', '"<img src=x onerror=alert(1)>"')
+    page = write_report(tmp_path, json.loads(text)).read_text()
+    assert "<img src=x" not in page
+    assert "<img src=x onerror=alert(1)>" in visible_text(page)
+
+
+def visible_text(page):
+    """Text of an HTML page, words separated by single spaces."""
+    collected = []
+    parser = HTMLParser()
+    parser.handle_data = collected.append
+    parser.feed(page.partition("</style>")[2])
+    return " ".join(" ".join(collected).split())
 
 
 def test_evaluate_repeats_the_test_score_of_its_seed(trained, data, capsys, tmp_path):
