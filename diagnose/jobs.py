@@ -16,7 +16,7 @@ from typing import Any
 import numpy as np
 import torch
 
-from diagnose.adaptation import Statistics, healthy_statistics
+from diagnose.adaptation import healthy_statistics
 from diagnose.baselines import Prediction as BaselinePrediction
 from diagnose.baselines import indicator_model, nearest_spectrum, ridge_model, rms_threshold
 from diagnose.domain import Domain, fit_domain

@@ -29,8 +29,9 @@ class Prediction:
     record : (record,) place in the data set, sorted, each once
     log_probability : (record, class) mean over the windows; of ridge regression a score that ranks alike
     detail : what was fitted or trained, in words
-    weights, domain, healthy, best_epoch, validation_loss, temperature, last_predicted : of networks only; `temperature` as in
-        `diagnose.calibration`, `last_predicted` (record,) the labels that the weights of the last epoch give
+    weights, domain, healthy, best_epoch, validation_loss, temperature, last_predicted : of networks only;
+        `temperature` as in `diagnose.calibration`, `last_predicted` (record,) the labels that the weights of the last
+        epoch give
     """
 
     protocol: str
