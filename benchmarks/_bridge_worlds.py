@@ -24,8 +24,10 @@ IntArray = NDArray[np.integer]
 
 BASE = ("experiment=quickstart", "plan.n_gearboxes=8", "operating.duration_s=0.5")
 SOURCE = (*BASE, "sensing=housing")
+OTHER_SENSORS = ("sensing.path.natural_frequency_hz=[150,6000]", "sensing.sensor.mounted_resonance_hz=9000")  # assumed
 WORLDS = {
     "paths": (*SOURCE, "seed=1"),
+    "sensors": (*SOURCE, "seed=3", *OTHER_SENSORS),
     "machines": (
         *BASE,
         "sensing=machine",
@@ -34,8 +36,7 @@ WORLDS = {
         "quality.support_damping_ratio_low=0.01",
         "quality.support_damping_ratio_high=0.1",
         "quality.iso1328_grade=7",
-        "sensing.path.natural_frequency_hz=[150,6000]",
-        "sensing.sensor.mounted_resonance_hz=9000",
+        *OTHER_SENSORS,
     ),
 }
 PROTOCOL = "by_unit"

@@ -28,6 +28,7 @@ from gensig.errors import ConfigError, GensigError
 
 TRAINING = ("protocols=[by_unit]", "baselines=false", "shuffle_control=false")
 SEEDS = (0, 1, 2)
+TOLD = ("cpu_model", "python", "numpy", "gensig", "created")  # of the machine, in the file
 
 
 def main(arguments: Sequence[str] | None = None) -> int:
@@ -44,7 +45,8 @@ def main(arguments: Sequence[str] | None = None) -> int:
         return 1
     print(f"\n{time.perf_counter() - begun:.0f} s")
     if options.json:
-        text = json.dumps({"machine": named, "seeds": SEEDS, **found}, indent=1)
+        told = {key: named[key] for key in TOLD}
+        text = json.dumps({"machine": told, "seeds": SEEDS, **found}, indent=1)
         options.json.write_text(text + "\n", encoding="utf-8")
     return 0
 
@@ -76,36 +78,43 @@ def judge_worlds(folder: Path) -> dict[str, Any]:
     return found
 
 
-def judge_control(folder: Path) -> list[dict[str, Any]]:
-    """Rows of the negative control; none where the recordings are not there."""
+def judge_control(folder: Path) -> dict[str, Any]:
+    """Rows of the negative control for each set trained on; none where the recordings are not there."""
     file = control.find_control()
     if file is None:
         print(f"\nThe negative control is left out: ${VARIABLE} names no folder that holds it.")
-        return []
-    words = control.make_twin(file, folder / "twin")
-    data = folder / "twin_data"
-    if not data.is_dir():
-        gensig.generate(*words, out=data, config_dir=folder / "twin")
-    lengths = [f"{name}={control.WINDOW}" for name in ("window_samples", "stride_samples")]
-    models = trained(folder / "model_twin", data, *lengths)
-    print(f"\nnegative control; its network on unseen units of the twin: {_said(_own_score(folder / 'model_twin'))}")
-    rows = control.judge_control(file, models)
-    print("P(fault): channel, load %, variant: healthy, broken, difference; windows unlike the training")
-    for row in rows:
-        low, high = row["interval"]
-        verdict = "both refused" if row["refuses_both"] else "contains 0" if row["contains_zero"] else "DIFFERS"
-        print(
-            f"  {row['channel']} {row['load']:>3} {row['variant']:<8}{row['fault_if_healthy']:.3f} "
-            f"{row['fault_if_broken']:.3f} {row['difference']:+.3f} [{low:+.3f}, {high:+.3f}]  "
-            f"{row['beyond_if_healthy']:.2f} {row['beyond_if_broken']:.2f}  {verdict}"
-            f"{'' if row['channel'] == control.SCORED else ' (not scored)'}"
-        )
-    return rows
+        return {}
+    found = {}
+    for name, (words, options) in control.training_sets(file, folder / "twin").items():
+        data = folder / f"control_{name}"
+        if not data.is_dir():
+            gensig.generate(*words, out=data, config_dir=options)
+        models = trained(folder / f"model_{data.name}", data, *control.TRAINING)
+        own = _own_score(folder / f"model_{data.name}")
+        rows = control.judge_control(file, models)
+        found[name] = {"own": own, "rows": rows}
+        print(f"\nnegative control, trained on {name}; on its own unseen units {_said(own)}")
+        print("P(fault): channel, load %, variant: healthy, broken, difference; windows unlike the training")
+        for row in rows:
+            _print_control(row)
+    return found
+
+
+def _print_control(row: Mapping[str, Any]) -> None:
+    low, high = row["interval"]
+    verdict = "both refused" if row["refuses_both"] else "contains 0" if row["contains_zero"] else "DIFFERS"
+    print(
+        f"  {row['channel']} {row['load']:>3} {row['variant']:<8}{row['fault_if_healthy']:.3f} "
+        f"{row['fault_if_broken']:.3f} {row['difference']:+.3f} [{low:+.3f}, {high:+.3f}]  "
+        f"{row['beyond_if_healthy']:.2f} {row['beyond_if_broken']:.2f}  {verdict}"
+        f"{'' if row['channel'] == control.SCORED else ' (not scored)'}",
+        flush=True,
+    )
 
 
 def trained(folder: Path, data: Path, *words: str) -> list[Path]:
     """Folders of the networks, one a seed, trained on a data set where they are not there yet."""
-    if not folder.is_dir():
+    if not (folder / "metrics.json").is_file():
         seeds = f"seeds=[{','.join(map(str, SEEDS))}]"
         status = diagnose_main(["train", f"data={data}", f"out={folder}", *TRAINING, seeds, *words])
         if status != 0:
