@@ -15,6 +15,7 @@ VERBS = {
     "evaluate": "judge a trained network",
     "predict": "try a trained network on a recording",
     "adapt": "move a trained network to a machine by its healthy recordings",
+    "detectability": "which test shows a fault: maps over speed, torque, channel and bandwidth",
 }
 
 
