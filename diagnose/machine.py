@@ -52,7 +52,12 @@ def adapt_model(folder: str | Path, sources: Sequence[Source], method: str, out:
     domain = load_domain(folder, description)
     moved = None if domain is None else adapt_domain(domain, statistics, windows)
     recordings = [
-        {"file": Path(source.file).name, "sha256": _sha256(source.file), "n_windows": len(part)}
+        {
+            "file": Path(source.file).name,
+            "array": source.array,
+            "sha256": _sha256(source.file),
+            "n_windows": len(part),
+        }
         for source, part in zip(sources, parts, strict=True)
     ]
     weights = {name: value.numpy() for name, value in adapted.state_dict().items()}
