@@ -16,6 +16,7 @@ from typing import Any
 import numpy as np
 import torch
 
+from diagnose.adaptation import healthy_statistics
 from diagnose.baselines import Prediction as BaselinePrediction
 from diagnose.baselines import indicator_model, nearest_spectrum, ridge_model, rms_threshold
 from diagnose.domain import Domain, fit_domain
@@ -23,6 +24,7 @@ from diagnose.features import Cache, FeatureTable, feature_table
 from diagnose.metrics import over_records
 from diagnose.novelty import NoveltyRun, fitted_runs, trained_runs
 from diagnose.oracle import NETWORK as ORACLE_NETWORK
+from diagnose.oracle import Cache as OracleCache
 from diagnose.oracle import fit_oracle_indicators, oracle_windows
 from diagnose.predictions import Prediction, Rows
 from diagnose.probe import fit_probe
@@ -110,7 +112,8 @@ def run_job(task: Task, settings: TrainSettings, job: Job) -> list[Outcome]:
     if job.control == PROBE:
         return [fit_probe(task, name, results=results) for name in job.protocols for results in (False, True)]
     if job.control == ORACLE:
-        return [fit_oracle_indicators(task, name, cache) for name in job.protocols]
+        twins: OracleCache = {}
+        return [fit_oracle_indicators(task, name, twins) for name in job.protocols]
     found = [prediction for name in job.protocols for prediction in _run_baselines(task, settings, name, cache)]
     return [replace(one, method=sham_method(one.method, "")) for one in found] if job.control == SHAM else [*found]
 
@@ -156,6 +159,7 @@ def _run_training(
         windows=Rows(record=test.record, log_probability=by_window),
         weights={key: value.numpy() for key, value in training.model.state_dict().items()} if is_model else None,
         domain=domain,
+        healthy=None if shuffled else healthy_statistics(training.model, train, task.class_names),
         best_epoch=training.best_epoch,
         validation_loss=training.validation_loss,
         temperature=training.temperature,

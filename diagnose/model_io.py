@@ -18,6 +18,7 @@ from gensig.errors import DatasetError
 if TYPE_CHECKING:
     from torch import nn
 
+    from diagnose.adaptation import Statistics
     from diagnose.domain import Domain
     from diagnose.jobs import Prediction
     from gensig.dataset.reader import Dataset
@@ -54,6 +55,7 @@ class ModelDescription:
     n_teeth: tuple[int, int] | None = None  # of the driving and the driven gear; None where not told or not the same
     temperature: float = 1.0  # see `diagnose.calibration`; models of before have none
     test_channel_names: tuple[str, ...] | None = None  # of protocol cross_sensor
+    adaptation: dict[str, Any] | None = None  # see `diagnose.machine`; None as trained
 
     def __post_init__(self) -> None:
         if not 0 < self.temperature < float("inf"):
@@ -100,7 +102,7 @@ def save_model(folder: Path, weights: Mapping[str, np.ndarray], description: Mod
     """Write both files into a new folder."""
     from safetensors.numpy import save_file
 
-    folder.mkdir(parents=True)
+    folder.mkdir(parents=True, exist_ok=True)
     save_file({key: np.ascontiguousarray(value) for key, value in weights.items()}, folder / WEIGHTS)
     (folder / DESCRIPTION).write_text(json.dumps(asdict(description), indent=2) + "\n", encoding="utf-8")
 
@@ -114,6 +116,7 @@ def load_model(folder: str | Path) -> tuple[nn.Module, ModelDescription]:
     """
     import torch
 
+    from diagnose.adaptation import PREFIX
     from diagnose.domain import TENSOR
     from diagnose.models import build_model
 
@@ -122,7 +125,7 @@ def load_model(folder: str | Path) -> tuple[nn.Module, ModelDescription]:
     model = build_model(
         description.model, n_channels=len(description.channel_names), n_classes=len(description.class_names)
     )
-    stored = {name: value for name, value in _tensors(folder).items() if name != TENSOR}
+    stored = {k: v for k, v in _tensors(folder).items() if k != TENSOR and not k.startswith(PREFIX)}
     try:
         model.load_state_dict({name: torch.from_numpy(value) for name, value in stored.items()})
     except (RuntimeError, TypeError) as error:
@@ -143,6 +146,21 @@ def load_domain(folder: str | Path, description: ModelDescription) -> Domain | N
         return None
     try:
         return domain_from(description.out_of_distribution, _tensors(Path(folder)))
+    except DatasetError as error:
+        raise DatasetError(f"{folder}: {error}") from None
+
+
+def load_statistics(folder: str | Path) -> Statistics | None:
+    """What healthy training windows look like inside the network of a folder; None for one that does not tell.
+
+    Raises
+    ------
+    DatasetError    for tensors that are no such statistics
+    """
+    from diagnose.adaptation import statistics_from
+
+    try:
+        return statistics_from(_tensors(Path(folder)))
     except DatasetError as error:
         raise DatasetError(f"{folder}: {error}") from None
 
@@ -197,8 +215,9 @@ def _read_description(folder: Path) -> ModelDescription:
         if content.get("n_teeth") is not None:
             driving, driven = content["n_teeth"]
             content["n_teeth"] = (int(driving), int(driven))
-        if content.get("out_of_distribution") is not None:
-            content["out_of_distribution"] = dict(content["out_of_distribution"])
+        for name in ("out_of_distribution", "adaptation"):
+            if content.get(name) is not None:
+                content[name] = dict(content[name])
         return ModelDescription(**content)
     except FileNotFoundError:
         inside = sorted(child.name for child in (folder / "models").glob("*") if (child / DESCRIPTION).is_file())

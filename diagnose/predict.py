@@ -99,9 +99,7 @@ def predict_recording(
     from diagnose.metrics import over_records
     from diagnose.train import predict_windows
 
-    recording, channels, tacho = _read(description, source)
-    tracked = _tracked(recording, tacho, source) if source.is_tracked else None
-    windows = _windows(_in_domain(recording, tracked, description, source), description, source.file)
+    windows, recording, channels, tracked = windows_of(description, source)
     log_probability = predict_windows(model, windows)
     overall = probabilities(over_records(log_probability, windows.record)[1], description.temperature)[0]
     distance = None if domain is None else distances(domain, windows)
@@ -131,11 +129,23 @@ def predict_recording(
         "channels": dict(zip(description.channel_names, channels, strict=True)),
         "sampling_rate_hz": recording.sampling_rate,
         "model_sampling_rate_hz": rate,
+        "adaptation": description.adaptation,
         "speed_rpm": source.speed_rpm,
         "order_tracking": None if tracked is None else _tracking_facts(tracked, source),
         "trained_n_teeth": None if description.n_teeth is None else list(description.n_teeth),
         "trained_speed_rpm": None if description.speed_rpm_range is None else list(description.speed_rpm_range),
     }
+
+
+def windows_of(
+    description: ModelDescription, source: Source
+) -> tuple[WindowSet, Recording, tuple[str, ...], Tracked | None]:
+    """Windows of a recording as the network takes them, the recording as read, its names of the channels, and over the
+    shaft's angle where that is tracked."""
+    recording, channels, tacho = _read(description, source)
+    tracked = _tracked(recording, tacho, source) if source.is_tracked else None
+    signal = _in_domain(recording, tracked, description, source)
+    return _windows(signal, description, source.file), recording, channels, tracked
 
 
 def summary(result: dict[str, Any]) -> str:

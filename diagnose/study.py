@@ -122,8 +122,10 @@ def run_study(
 
     def report(predictions: list[Outcome]) -> None:
         last = predictions[-1]
-        trained = f"{last.protocol}, {last.method}, seed {last.seed}: {last.detail}"
-        on_done(trained if last.best_epoch else ", ".join(dict.fromkeys(one.method for one in predictions)))
+        if isinstance(last, NoveltyRun) or last.best_epoch:
+            on_done(f"{last.protocol}, {last.method}, seed {last.seed}: {last.detail}")
+        else:
+            on_done(", ".join(dict.fromkeys(one.method for one in predictions)))
 
     n_workers = settings.n_threads or _n_cores()
     outcomes = run_jobs(task, settings, jobs, n_workers=n_workers, on_done=report)
@@ -132,7 +134,8 @@ def run_study(
     for prediction in predictions:
         if prediction.weights is not None:
             target = folder / "models" / f"{prediction.protocol}-seed{prediction.seed}"
-            known = {} if prediction.domain is None else prediction.domain.tensors()
+            parts = [part for part in (prediction.domain, prediction.healthy) if part is not None]
+            known = {name: tensor for part in parts for name, tensor in part.tensors().items()}
             save_model(target, prediction.weights | known, model_description(task, settings, prediction))
     own = without_sham(predictions)
     write_predictions(folder / "predictions.csv", task, own)
