@@ -36,7 +36,7 @@ class CopiedChannels(FakeDataset):
         )
         self.channel_names = ("near_x", "near_y", "far_x", "far_y")
 
-    def signals(self, record_index, start=0, stop=None, channels=None):
+    def signals(self, record_index, start=0, stop=None, channels=None, **which):
         near = super().signals(record_index, start, stop)[:2]
         both = np.concatenate([near, near])
         return both if channels is None else both[channels]
