@@ -8,7 +8,9 @@ import pytest
 
 from gensig.dynamics import integrator
 from gensig.dynamics.decimation import in_band_error
-from gensig.dynamics.integrator import COARSE, settling_oversampling, settling_stages
+from gensig.dynamics.integrator import BOUNCING, COARSE, settling_oversampling, settling_stages
+from gensig.errors import SimulationError
+from gensig.faults.broken import MissingTooth
 from gensig.faults.crack import Crack
 from gensig.sensing.manufacturing import draw_gearbox, draw_specimen
 from gensig.systems.spur_pair import Run, simulate_together
@@ -87,6 +89,29 @@ def test_machines_that_begin_in_different_stages_keep_their_bits(runs, machine):
         (alone,) = simulate_together([one])
         assert alone.acceleration.tobytes() == other.acceleration.tobytes()
         assert alone.shaft_angle.tobytes() == other.shaft_angle.tobytes()
+
+
+class TestHardLandings:
+    """Two teeth missing under 1.1 N m at 3600 r/min: landings are too stiff for one step a sample."""
+
+    @pytest.fixture(scope="class")
+    @classmethod
+    def bouncing(cls, machine):
+        missing = [MissingTooth(gear="pinion", tooth=tooth) for tooth in (3, 4)]
+        run = made(machine, {"operating.torque_nm": 1.1, "operating.speed_rpm": 3600}, missing)
+        return replace(run, specimen=None, gearbox=None)
+
+    def test_they_are_settled_in_finer_steps_and_leave_their_neighbours_alone(self, runs, bouncing):
+        together = simulate_together([runs[0], bouncing, *runs[1:]])
+        assert together[1].contact_loss_fraction > BOUNCING
+        for one, other in zip([runs[0], bouncing, *runs[1:]], together, strict=True):
+            (alone,) = simulate_together([one])
+            assert alone.acceleration.tobytes() == other.acceleration.tobytes()
+
+    def test_coarse_steps_would_lose_them(self, bouncing, monkeypatch):
+        monkeypatch.setattr(integrator, "CAREFUL", 1)
+        (record,) = simulate_together([bouncing])
+        assert isinstance(record, SimulationError)
 
 
 def test_stages_become_finer_and_end_before_the_record(dynamics_of, xiamen):
