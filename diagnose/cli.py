@@ -14,6 +14,7 @@ VERBS = {
     "train": "train, judge and report",
     "evaluate": "judge a trained network",
     "predict": "try a trained network on a recording",
+    "detectability": "which test shows a fault: maps over speed, torque, channel and bandwidth",
 }
 
 

@@ -15,7 +15,7 @@ MARKERS = ("o", "s", "^", "D", "v", "P", "X")
 
 def confusion_figure(path: Path, confusion: Sequence[Sequence[int]], class_names: Sequence[str], title: str) -> None:
     """Share of each true class given each label, with counts of records (summed over seeds)."""
-    figure, axes = _subplots(1, size=(1.2 * len(class_names) + 2.4, 1.0 * len(class_names) + 1.9))
+    figure, axes = subplots(1, size=(1.2 * len(class_names) + 2.4, 1.0 * len(class_names) + 1.9))
     counts = np.asarray(confusion)
     total = counts.sum(axis=1, keepdims=True)
     share = np.divide(counts, total, out=np.zeros(counts.shape), where=total > 0)
@@ -29,7 +29,7 @@ def confusion_figure(path: Path, confusion: Sequence[Sequence[int]], class_names
     axes[0].set_yticks(ticks, class_names)
     axes[0].set(xlabel="predicted", ylabel="true", title=title)
     figure.colorbar(image, ax=axes[0], label="share of the true class", fraction=0.046)
-    _save(figure, path)
+    save(figure, path)
 
 
 def scores_figure(path: Path, metrics: Mapping[str, Any]) -> None:
@@ -38,7 +38,7 @@ def scores_figure(path: Path, metrics: Mapping[str, Any]) -> None:
     named = dict.fromkeys([metrics["model"], *(name for _, result in results for name in result["methods"])])
     methods = [name for name in named if name != "chance"]
     height = 0.34 * len(methods) + 1.1
-    figure, axes = _subplots(len(results), size=(min(3.4 * len(results) + 1.6, 16), height), sharey=True)
+    figure, axes = subplots(len(results), size=(min(3.4 * len(results) + 1.6, 16), height), sharey=True)
     for panel, (protocol, result) in zip(axes, results, strict=True):
         panel.axvline(result["methods"]["chance"]["balanced_accuracy"], color="0.4", linestyle=":")
         for place, name in enumerate(reversed(methods)):
@@ -53,12 +53,12 @@ def scores_figure(path: Path, metrics: Mapping[str, Any]) -> None:
         panel.set(xlim=(0, 1.02), ylim=(-0.6, len(methods) - 0.4), xlabel="balanced accuracy")
         panel.set_title(title, fontsize=10)
         panel.grid(alpha=0.3, axis="x")
-    _save(figure, path)
+    save(figure, path)
 
 
 def severity_figure(path: Path, protocols: Mapping[str, Sequence[Mapping[str, Any]]]) -> None:
     """Share of faulty records recognised against severity, one panel a protocol; rows of `study.severity_rows`."""
-    figure, axes = _subplots(len(protocols), size=(4.2 * len(protocols) + 0.6, 3.6))
+    figure, axes = subplots(len(protocols), size=(4.2 * len(protocols) + 0.6, 3.6))
     classes = list(dict.fromkeys(row["class"] for rows in protocols.values() for row in rows))
     for panel, (protocol, rows) in zip(axes, protocols.items(), strict=True):
         for index, name in enumerate(classes):
@@ -75,12 +75,12 @@ def severity_figure(path: Path, protocols: Mapping[str, Sequence[Mapping[str, An
         panel.grid(alpha=0.3)
     axes[0].set_ylabel("share of records recognised")
     axes[0].legend(loc="best", fontsize=8)
-    _save(figure, path)
+    save(figure, path)
 
 
 def reliability_figure(path: Path, protocols: Mapping[str, Mapping[str, Any]]) -> None:
     """Share of right predictions against their probability, one panel a protocol; `calibration.calibration_scores`."""
-    figure, axes = _subplots(len(protocols), size=(3.9 * len(protocols) + 0.6, 3.9))
+    figure, axes = subplots(len(protocols), size=(3.9 * len(protocols) + 0.6, 3.9))
     for panel, (protocol, calibration) in zip(axes, protocols.items(), strict=True):
         panel.plot([0, 1], [0, 1], color="0.6", linestyle="--", label="calibrated")
         for index, name in enumerate(("before", "after")):
@@ -97,10 +97,10 @@ def reliability_figure(path: Path, protocols: Mapping[str, Mapping[str, Any]]) -
         panel.grid(alpha=0.3)
         panel.legend(loc="upper left", fontsize=8)
     axes[0].set_ylabel("share of records that are right")
-    _save(figure, path)
+    save(figure, path)
 
 
-def _subplots(n_panels: int, *, size: tuple[float, float], sharey: bool = False) -> tuple[Any, list[Any]]:
+def subplots(n_panels: int, *, size: tuple[float, float], sharey: bool = False) -> tuple[Any, list[Any]]:
     """Figure and axes without touching the state of pyplot, so that no display is needed."""
     from matplotlib.backends.backend_agg import FigureCanvasAgg
     from matplotlib.figure import Figure
@@ -110,5 +110,6 @@ def _subplots(n_panels: int, *, size: tuple[float, float], sharey: bool = False)
     return figure, list(np.atleast_1d(figure.subplots(1, n_panels, sharey=sharey)))
 
 
-def _save(figure: Any, path: Path) -> None:
+def save(figure: Any, path: Path) -> None:
+    """Write a PNG with the same bytes on every run."""
     figure.savefig(path, dpi=120, metadata={"Software": None})

@@ -19,9 +19,9 @@ import torch
 from diagnose.baselines import Prediction as BaselinePrediction
 from diagnose.baselines import indicator_model, nearest_spectrum, ridge_model, rms_threshold
 from diagnose.domain import Domain, fit_domain
-from diagnose.features import Cache, feature_table
+from diagnose.features import Cache, FeatureTable, feature_table
 from diagnose.metrics import over_records
-from diagnose.predictions import Prediction
+from diagnose.predictions import Prediction, Rows
 from diagnose.settings import TrainSettings
 from diagnose.train import input_scale, predict_windows, train_network, with_shuffled_labels
 from diagnose.window_features import rocket_tables, spectrum_table
@@ -94,7 +94,9 @@ def _run_training(task: Task, settings: TrainSettings, protocol: str, seed: int,
     training = train_network(
         train, validation, model_config=settings.model, n_classes=n_classes, settings=settings, seed=seed
     )
-    record, log_probability = over_records(predict_windows(training.model, test), test.record)
+    by_window = predict_windows(training.model, test)
+    record, log_probability = over_records(by_window, test.record)
+    held_out, held_out_scores = over_records(predict_windows(training.model, validation), validation.record)
     domain = None if shuffled else _domain(protocol, train, validation)
     last = log_probability
     if training.last_model is not None and not shuffled:
@@ -106,6 +108,8 @@ def _run_training(task: Task, settings: TrainSettings, protocol: str, seed: int,
         record=record,
         log_probability=log_probability,
         detail=f"best epoch {training.best_epoch} of {len(training.validation_loss)}",
+        validation=Rows(record=held_out, log_probability=held_out_scores),
+        windows=Rows(record=test.record, log_probability=by_window),
         weights=None if shuffled else {key: value.numpy() for key, value in training.model.state_dict().items()},
         domain=domain,
         best_epoch=training.best_epoch,
@@ -119,36 +123,53 @@ def _run_baselines(task: Task, settings: TrainSettings, protocol: str, cache: Ca
     predictions = []
     for method in settings.baselines:
         detail, record, log_probability = _fit_baseline(task, settings, protocol, method, cache)
+        tested = np.isin(record, subset_segments(task, protocol, "test").record)
+        held_out = Rows(record=record[~tested], log_probability=log_probability[~tested])
         predictions.append(
             Prediction(
                 protocol=protocol,
                 method=method,
                 seed=0,
-                record=record,
-                log_probability=log_probability,
+                record=record[tested],
+                log_probability=log_probability[tested],
                 detail=detail,
+                validation=held_out if held_out.record.size else None,
             )
         )
     return predictions
 
 
 def _fit_baseline(task: Task, settings: TrainSettings, protocol: str, method: str, cache: Cache) -> BaselinePrediction:
-    """Fit one of `diagnose.settings.BASELINES` and judge it on the test part."""
+    """Fit one of `diagnose.settings.BASELINES` and judge it on the test and the validation records."""
     n_classes = len(task.class_names)
     if method in ("nearest_spectrum", "minirocket"):
         sets = [_windows(task, protocol)[subset] for subset in SUBSETS]
         if method == "minirocket":
-            return ridge_model(*rocket_tables(*sets, n_features=settings.minirocket_features), n_classes=n_classes)
+            train, validation, test = rocket_tables(*sets, n_features=settings.minirocket_features)
+            return ridge_model(train, validation, _with_validation(validation, test), n_classes=n_classes)
         scale = input_scale(sets[0])
-        train, _, test = (spectrum_table(windows, scale) for windows in sets)
-        return nearest_spectrum(train, test, n_classes=n_classes)
+        train, validation, test = (spectrum_table(windows, scale) for windows in sets)
+        return nearest_spectrum(train, _with_validation(validation, test), n_classes=n_classes)
     train, validation, test = (
         feature_table(task, subset_segments(task, protocol, subset), features=settings.features, cache=cache)
         for subset in SUBSETS
     )
+    judged = _with_validation(validation, test)
     if method == "rms_threshold":
-        return rms_threshold(train, test, n_classes=n_classes)
-    return indicator_model(train, validation, test, n_classes=n_classes, with_level=method == "indicators")
+        return rms_threshold(train, judged, n_classes=n_classes)
+    return indicator_model(train, validation, judged, n_classes=n_classes, with_level=method == "indicators")
+
+
+def _with_validation(validation: FeatureTable, test: FeatureTable) -> FeatureTable:
+    """Rows of both parts; the test rows alone where a record is in both, as in a leaky split."""
+    if np.isin(validation.record, test.record).any():
+        return test
+    return FeatureTable(
+        values=np.concatenate([validation.values, test.values]),
+        names=test.names,
+        label=np.concatenate([validation.label, test.label]),
+        record=np.concatenate([validation.record, test.record]),
+    )
 
 
 # Windows of the protocol a process works on; jobs come protocol by protocol.

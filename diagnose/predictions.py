@@ -20,6 +20,14 @@ CONDITION_COLUMNS = ("unit_id", "specimen_id", "gearbox_id", "severity", "speed_
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
+class Rows:
+    """What a method says of records, or of windows in time order: record (row,) and log-probabilities (row, class)."""
+
+    record: NDArray[np.integer]
+    log_probability: NDArray[np.floating]
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
 class Prediction:
     """Test records of a protocol with what one method, trained with one seed, says of them.
 
@@ -28,6 +36,8 @@ class Prediction:
     record : (record,) place in the data set, sorted, each once
     log_probability : (record, class) mean over the windows; of ridge regression a score that ranks alike
     detail : what was fitted or trained, in words
+    validation : the same for the validation records; None where they are test records too
+    windows : of networks only, for each window of the test records
     weights, domain, best_epoch, validation_loss, temperature, last_predicted : of networks only; `temperature` as in
         `diagnose.calibration`, `last_predicted` (record,) the labels that the weights of the last epoch give
     """
@@ -38,6 +48,8 @@ class Prediction:
     record: NDArray[np.integer]
     log_probability: NDArray[np.floating]
     detail: str
+    validation: Rows | None = None
+    windows: Rows | None = None
     weights: dict[str, NDArray[Any]] | None = None
     domain: Domain | None = None
     best_epoch: int = 0

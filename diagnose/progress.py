@@ -1,4 +1,4 @@
-"""How far a study is: a bar on a terminal, plain lines elsewhere."""
+"""How far a long run is: a bar on a terminal, plain lines elsewhere."""
 
 from __future__ import annotations
 
@@ -9,11 +9,11 @@ from contextlib import contextmanager
 
 
 @contextmanager
-def progress(n_steps: int) -> Iterator[Callable[[str], None]]:
+def progress(n_steps: int, what: str = "training") -> Iterator[Callable[[str], None]]:
     """Give a function to call with one line for each finished step."""
     started = time.perf_counter()
     if sys.stderr.isatty():
-        with _bar(n_steps) as advance:
+        with _bar(n_steps, what) as advance:
             yield advance
         return
     done = 0
@@ -28,7 +28,7 @@ def progress(n_steps: int) -> Iterator[Callable[[str], None]]:
 
 
 @contextmanager
-def _bar(n_steps: int) -> Iterator[Callable[[str], None]]:
+def _bar(n_steps: int, what: str) -> Iterator[Callable[[str], None]]:
     from rich.console import Console
     from rich.progress import (
         BarColumn,
@@ -48,5 +48,5 @@ def _bar(n_steps: int) -> Iterator[Callable[[str], None]]:
         TextColumn("{task.description}", markup=False),
     )
     with Progress(*columns, console=Console(stderr=True)) as bar:
-        task = bar.add_task("training", total=n_steps)
+        task = bar.add_task(what, total=n_steps)
         yield lambda line: bar.update(task, advance=1, description=line)

@@ -7,6 +7,8 @@ from collections.abc import Mapping, Sequence
 from pathlib import Path
 from typing import Any
 
+from diagnose.answer_sections import answer_sections
+from diagnose.answer_tables import write_tables
 from diagnose.figures import confusion_figure, reliability_figure, scores_figure, severity_figure
 from diagnose.page import Section, Table, write_page
 from diagnose.protocols import MEANING
@@ -30,6 +32,7 @@ LEAKY_MEANING = (
 def write_report(folder: Path, metrics: Mapping[str, Any]) -> Path:
     """Write ``metrics.json``, the figures and ``report.html`` and return the page."""
     (folder / "metrics.json").write_text(json.dumps(metrics, indent=2, allow_nan=False) + "\n", encoding="utf-8")
+    write_tables(folder, metrics)
     page = folder / "report.html"
     write_page(page, title="Which faults can be told apart", lead=_lead(metrics), sections=_sections(folder, metrics))
     return page
@@ -91,6 +94,7 @@ def _sections(folder: Path, metrics: Mapping[str, Any]) -> list[Section]:
     if clean:
         sections.append(_fault_section(folder, clean, metrics))
         sections.append(_severity_section(folder, clean))
+        sections += answer_sections(folder, clean)
     sections.append(Section(title="Caveats", notes=[("", line) for line in caveats(metrics)]))
     sections.append(
         Section(
@@ -116,6 +120,7 @@ def _sections(folder: Path, metrics: Mapping[str, Any]) -> list[Section]:
             notes=[
                 ("metrics.json", "everything in numbers, with macro-F1, recall, calibration, settings and versions."),
                 ("predictions.csv", "what each method said of each test record."),
+                ("scores.csv and more", "the same numbers as tables, explained in docs/howto/report.md."),
                 ("models/", "the networks, one folder each, for diagnose evaluate and diagnose predict."),
             ],
             folded=True,

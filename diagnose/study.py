@@ -14,6 +14,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
+from diagnose.answers import protocol_answers
 from diagnose.calibration import calibration_scores
 from diagnose.jobs import Job, run_jobs
 from diagnose.metrics import SCORES, confusion_by_unit, recall, score_with_interval
@@ -229,6 +230,7 @@ def _protocol_result(
         "best_epoch": [run.best_epoch for run in network],
         "last_epoch": _last_epoch(task, settings, network),
         "calibration": _calibration(task, network),
+        "answers": None if is_leaky(protocol) else protocol_answers(task, settings, mine),
     }
 
 

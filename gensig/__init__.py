@@ -12,6 +12,7 @@ Importing the package is light: physics, HDF5 and Hydra are imported by the func
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from pathlib import Path
 from typing import TYPE_CHECKING
 
@@ -19,10 +20,11 @@ from gensig.version import __version__
 
 if TYPE_CHECKING:
     from gensig.dataset.reader import Dataset
+    from gensig.pairs import FaultPairs
     from gensig.streaming import RecordStream
     from gensig.systems.spur_pair import SpurPair
 
-__all__ = ["__version__", "generate", "load_system", "open_dataset", "stream"]
+__all__ = ["__version__", "fault_pairs", "generate", "load_system", "open_dataset", "stream"]
 
 
 def open_dataset(path: str | Path, *, allow_incomplete: bool = False) -> Dataset:
@@ -83,3 +85,27 @@ def stream(*overrides: str, epoch: int = 0, config_dir: str | Path | None = None
     if len(sweep(overrides)) > 1:
         raise ConfigError("a stream is one data set: give one value a key, and make a stream for each")
     return open_stream(read_request(overrides, config_dir=config_dir).config, epoch=epoch)
+
+
+def fault_pairs(
+    *overrides: str,
+    speeds_rpm: Sequence[float] | None = None,
+    torques_nm: Sequence[float] | None = None,
+    n_units: int = 8,
+    fixed_noise: bool = False,
+    epoch: int = 0,
+    config_dir: str | Path | None = None,
+) -> FaultPairs:
+    """The selected machine with and without its fault over a map of speeds and torques; see ``gensig.pairs``.
+
+    Raises
+    ------
+    gensig.errors.GensigError    for anything that cannot be used
+    """
+    from gensig.config import read_request
+    from gensig.pairs import make_pairs
+
+    config = read_request(overrides, config_dir=config_dir).config
+    return make_pairs(
+        config, speeds_rpm=speeds_rpm, torques_nm=torques_nm, n_units=n_units, fixed_noise=fixed_noise, epoch=epoch
+    )

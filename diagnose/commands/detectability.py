@@ -1,0 +1,110 @@
+"""``diagnose detectability``."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from functools import partial
+from pathlib import Path
+
+from diagnose.commands.parser import verb_parser
+from gensig.errors import ConfigError
+
+HELP = """\
+Which test shows the fault? Maps over speed, torque, channel and bandwidth, without training anything.
+
+Machines of the same build are simulated with and without the selected fault, everything as configured. Two observers
+look at them: one knows what the fault adds and the spectrum of the noise (physically there), one knows indicators of
+other machines (seen). Both answer with d', how many standard deviations sound and faulty lie apart.
+
+OVERRIDES are those of gensig: fault=crack fault.crack_depth_mm=1 sensing=housing; plan.sham=true is the control."""
+EXAMPLE = """\
+examples:
+  diagnose detectability fault=crack --plot crack.png --json crack.json
+  diagnose detectability fault=pitting sensing=housing --speeds 600 1200 2400 --torques 10 40 --n-units 12"""
+FIGURE_TYPES = (".png", ".svg", ".pdf")
+
+
+def run(words: Sequence[str]) -> int:
+    """Make the maps, write them, print the best test and the worst."""
+    parser = verb_parser("detectability", HELP, EXAMPLE)
+    parser.add_argument("overrides", nargs="*", metavar="OVERRIDES", help="see above")
+    parser.add_argument("--config-dir", metavar="DIR", help="folder with groups and options of your own")
+    shares = "of the driving pinion (default: shares of the set-point,"
+    parser.add_argument("--speeds", nargs="+", metavar="RPM", help=f"{shares} a quarter to twice)")
+    parser.add_argument("--torques", nargs="+", metavar="NM", help=f"{shares} a quarter to twice)")
+    parser.add_argument("--bandwidths", nargs="+", metavar="HZ", help="upper frequencies (default: 1000 to 20000)")
+    parser.add_argument("--n-units", type=int, default=8, metavar="K", help="machines of the same build (default: 8)")
+    fixed = "the noise of the set-point everywhere, as a sensor's own is (default: the same snr_db everywhere)"
+    parser.add_argument("--fixed-noise", action="store_true", help=fixed)
+    parser.add_argument("--workers", type=int, metavar="N", help="processes (default: one a core)")
+    parser.add_argument("--json", metavar="FILE", help="write every number")
+    parser.add_argument("--plot", metavar="FILE", help="write a figure (PNG, SVG or PDF)")
+    arguments = parser.parse_intermixed_args(words)
+    figure, table = _file("--plot", arguments.plot, FIGURE_TYPES), _file("--json", arguments.json, (".json",))
+    if arguments.workers is not None and arguments.workers < 1:
+        raise ConfigError(f"--workers {arguments.workers} must be at least 1")
+    overrides = list(arguments.overrides)
+    speeds, torques, bandwidths = (
+        _numbers(f"--{name}", getattr(arguments, name), overrides) for name in ("speeds", "torques", "bandwidths")
+    )
+    import gensig
+    from diagnose.detectability import confirm_best, make_maps, read_bandwidths
+    from diagnose.detectability_report import content, summary
+    from diagnose.progress import progress
+
+    make_pairs = partial(
+        gensig.fault_pairs,
+        *overrides,
+        speeds_rpm=speeds,
+        torques_nm=torques,
+        n_units=arguments.n_units,
+        fixed_noise=arguments.fixed_noise,
+        config_dir=arguments.config_dir,
+    )
+    pairs = make_pairs()
+    edges = read_bandwidths(bandwidths, pairs)
+    with progress(pairs.n_cells, "simulating") as on_done:
+        maps = make_maps(pairs, edges, n_workers=arguments.workers or _n_cores(), on_done=on_done)
+    again = confirm_best(maps, make_pairs(epoch=1))
+    print("\n".join(summary(maps, again)))
+    if maps.n_failed:
+        print(f"{maps.n_failed} pairs did not stay finite and are left out")
+    if table is not None:
+        import json
+
+        table.write_text(json.dumps(content(maps, again), indent=1, allow_nan=False) + "\n", encoding="utf-8")
+    if figure is not None:
+        from diagnose.detectability_figure import detectability_figure
+
+        detectability_figure(figure, maps)
+    return 0
+
+
+def _numbers(flag: str, given: Sequence[str] | None, overrides: list[str]) -> list[float] | None:
+    """The numbers of a flag; overrides that were typed behind them join the others."""
+    if given is None:
+        return None
+    overrides += [word for word in given if "=" in word]
+    numbers = [word for word in given if "=" not in word]
+    try:
+        return [float(word) for word in numbers]
+    except ValueError:
+        raise ConfigError(f"{flag} {' '.join(numbers)}: give numbers") from None
+
+
+def _file(flag: str, name: str | None, types: tuple[str, ...]) -> Path | None:
+    """Refuse a file that cannot be written before anything is simulated for it."""
+    if name is None:
+        return None
+    path = Path(name)
+    if path.suffix not in types:
+        raise ConfigError(f"{flag} {name}: the name must end in {', '.join(types)}")
+    if not path.parent.is_dir():
+        raise ConfigError(f"{flag} {name}: there is no folder {path.parent}; make it first")
+    return path
+
+
+def _n_cores() -> int:
+    import os
+
+    return len(os.sched_getaffinity(0)) if hasattr(os, "sched_getaffinity") else os.cpu_count() or 1
