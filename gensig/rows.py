@@ -6,6 +6,7 @@ import copy
 import json
 from collections.abc import Mapping
 from enum import IntEnum
+from functools import lru_cache
 from typing import Any
 
 import numpy as np
@@ -14,8 +15,9 @@ from numpy.typing import NDArray
 from gensig.errors import ConfigError, SimulationError
 from gensig.faults.base import Fault
 from gensig.faults.registry import read_faults
+from gensig.geometry.gear import Gear
 from gensig.sensing.instrument import Instrument, draw_instrument
-from gensig.sensing.manufacturing import Gearbox, Specimen, draw_gearbox, draw_specimen, with_damping_ratio
+from gensig.sensing.manufacturing import Gearbox, Quality, Specimen, draw_gearbox, draw_specimen, with_damping_ratio
 from gensig.systems.nuisances import with_nuisances
 from gensig.systems.registry import read_system
 from gensig.systems.shaft_sensors import shaft_signals
@@ -214,9 +216,14 @@ def _unit(config: Mapping[str, Any], system: SpurPair, row: Mapping[str, Any]) -
         stream(seed, Stream.GEARBOX, gearbox), len(system.sensing.channels), quality, system.sensing.gain_scatter
     )
     return (
-        draw_specimen(stream(seed, Stream.SPECIMEN, specimen), system.pair.pinion, system.pair.wheel, quality),
+        _specimen(seed, specimen, system.pair.pinion, system.pair.wheel, quality),
         with_damping_ratio(box, stream(seed, Stream.SUPPORT, gearbox), quality),
     )
+
+
+@lru_cache(maxsize=32)  # the records of a unit share it
+def _specimen(seed: int, number: int, pinion: Gear, wheel: Gear, quality: Quality) -> Specimen:
+    return draw_specimen(stream(seed, Stream.SPECIMEN, number), pinion, wheel, quality)
 
 
 def replace_key(config: dict[str, Any], key: str, value: float) -> None:
