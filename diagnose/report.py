@@ -10,7 +10,7 @@ from typing import Any
 from diagnose.answer_sections import answer_sections
 from diagnose.answer_tables import write_tables
 from diagnose.controls_text import controls_section
-from diagnose.figures import confusion_figure, reliability_figure, scores_figure, severity_figure
+from diagnose.figures import confusion_figure, reliability_figure, scores_figure
 from diagnose.novelty_report import novelty_sections
 from diagnose.page import Section, Table, write_page
 from diagnose.protocols import MEANING
@@ -83,7 +83,6 @@ def _sections(folder: Path, metrics: Mapping[str, Any]) -> list[Section]:
         sections += _score_sections(folder, metrics, ordered)
     if clean:
         sections.append(_fault_section(folder, clean, metrics))
-        sections.append(_severity_section(folder, clean))
         sections += answer_sections(folder, clean)
     sections += novelty_sections(metrics["novelty"])
     if ordered:
@@ -156,16 +155,6 @@ def _fault_section(folder: Path, clean: Mapping[str, Any], metrics: Mapping[str,
     )
 
 
-def _severity_section(folder: Path, clean: Mapping[str, Any]) -> Section:
-    rows = {name: result["by_severity"] for name, result in clean.items() if result["by_severity"]}
-    if not rows:
-        return Section(title="How severe a fault must be")
-    return Section(
-        title="How severe a fault must be",
-        figures=_figures(folder, "severity.png", "recognised share against severity", severity_figure, rows),
-    )
-
-
 def _trust_section(folder: Path, clean: Mapping[str, Any]) -> Section:
     calibration = {name: result["calibration"] for name, result in clean.items()}
     return Section(
@@ -190,7 +179,7 @@ def _confusion_section(folder: Path, metrics: Mapping[str, Any], ordered: Sequen
         confusion = result["methods"][metrics["model"]]["confusion"]
         confusion_figure(folder / f"confusion_{name}.png", confusion, metrics["class_names"], title)
         figures.append((f"confusion_{name}.png", title))
-    return Section(title="Confusion matrices", figures=figures, folded=True)
+    return Section(title="Confusion matrices", figures=figures, side_by_side=True, folded=True)
 
 
 def _figures(folder: Path, name: str, caption: str, draw: Any, content: Any) -> list[tuple[str, str]]:

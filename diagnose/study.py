@@ -38,7 +38,6 @@ from gensig.version import __version__
 
 METRICS_SCHEMA_VERSION = 1
 BOOTSTRAP_SEED = 20240607
-MAX_SEVERITY_BINS = 5
 
 
 def is_leaky(protocol: str) -> bool:
@@ -211,40 +210,6 @@ def _confusion(task: Task, runs: Sequence[tuple[NDArray[np.integer], NDArray[np.
     )
 
 
-def severity_rows(
-    task: Task, runs: Sequence[tuple[NDArray[np.integer], NDArray[np.integer]]]
-) -> list[dict[str, float | int | str]]:
-    """Share of faulty test records given their own class, by class and severity, mean over the seeds.
-
-    Empty where severities do not vary. More than `MAX_SEVERITY_BINS` values of a class become that many equal groups.
-    """
-    labels = task.labels()
-    severity = np.asarray(task.dataset.column("severity"), dtype=float)
-    record = runs[0][0]
-    hits = np.mean([predicted == labels[record] for record, predicted in runs], axis=0)
-    rows: list[dict[str, float | int | str]] = []
-    for index, name in enumerate(task.class_names):
-        mask = (labels[record] == index) & (severity[record] > 0)
-        values = np.unique(severity[record][mask])
-        if values.size > MAX_SEVERITY_BINS:
-            order = np.argsort(severity[record][mask], kind="stable")
-            groups = [np.flatnonzero(mask)[part] for part in np.array_split(order, MAX_SEVERITY_BINS)]
-        else:
-            groups = [np.flatnonzero(mask & (severity[record] == value)) for value in values]
-        for group in groups if values.size > 1 else []:
-            inside = severity[record][group]
-            rows.append(
-                {
-                    "class": name,
-                    "severity_low": float(inside.min()),
-                    "severity_high": float(inside.max()),
-                    "n_records": int(group.size),
-                    "recall": float(hits[group].mean()),
-                }
-            )
-    return rows
-
-
 def _protocol_result(
     task: Task, settings: TrainSettings, protocol: str, predictions: Sequence[Prediction]
 ) -> dict[str, Any]:
@@ -282,7 +247,6 @@ def _protocol_result(
         "n_units": {subset: int(np.unique(unit[record]).size) for subset, record in parts.items()},
         "methods": methods,
         "over_oracle": over_oracle,
-        "by_severity": severity_rows(task, [(run.record, run.predicted) for run in network]),
         "validation_loss": [list(run.validation_loss) for run in network],
         "best_epoch": [run.best_epoch for run in network],
         "last_epoch": _last_epoch(task, settings, network),

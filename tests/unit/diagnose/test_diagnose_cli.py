@@ -62,7 +62,7 @@ def test_train_writes_what_it_promises(trained):
     names = {path.name for path in trained.iterdir()}
     assert names == {
         "metrics.json", "predictions.csv", "report.html", "models", "scores.png",
-        "severity.png", "reliability.png", "confusion_by_unit.png", "confusion_random_window_leaky.png",
+        "reliability.png", "confusion_by_unit.png", "confusion_random_window_leaky.png",
         "detection_by_unit.png", "window_length.png", "scores.csv", "by_severity.csv", "comparisons.csv",
         "confusion_by_unit.csv", "confusion_random_window_leaky.csv",
     }  # fmt: skip
@@ -119,7 +119,7 @@ def test_the_page_stands_alone_and_says_what_matters(trained):
     assert text.index("by_unit") < text.index("random_window_leaky (LEAKY)") < text.index("Which faults are found")
     assert "1-NN" not in text
     sources = re.findall(r'src="([^"]{0,40})', page)
-    assert len(sources) == 7
+    assert len(sources) == 6
     assert all(source.startswith("data:image/png;base64,") for source in sources)
     assert "<script" not in page
 
