@@ -8,12 +8,25 @@ from pathlib import Path
 from typing import Any
 
 from benchmarks._rates import quickstart
-from benchmarks._stages import CLOSING, EQUATIONS, INTEGRATION, LOW_PASS, NOISE, STAGES, TABLES, WRITING, Stages
+from benchmarks._stages import (
+    CLOSING,
+    EQUATIONS,
+    INTEGRATION,
+    LOW_PASS,
+    NOISE,
+    RECORDING,
+    STAGES,
+    TABLES,
+    WRITING,
+    Stages,
+)
 from gensig import records
 from gensig.execution.local import LocalExecutor
 from gensig.generation import begin_folder, run_folder
+from gensig.mesh.load_distribution import sound_load
 from gensig.systems import spur_pair
 
+RECORDING_SHARE = "share of the records' own integration"  # of the kernel's rate, where that would be the same
 SHARD = 24  # records, as in the experiment
 N_SHARDS, SHARDS_A_WORKER = 2, 3
 
@@ -35,6 +48,7 @@ def by_stage(precision: str, runs: int) -> dict[str, float]:
         # what would not be there for records that have not been made before
         records.forget_twins()
         spur_pair._mesh_table.cache_clear()
+        sound_load.cache_clear()
         with tempfile.TemporaryDirectory() as folder:
             begin_folder(config, [], Path(folder) / "set")
             stages, start = Stages(), time.perf_counter()
@@ -52,6 +66,7 @@ def by_stage(precision: str, runs: int) -> dict[str, float]:
         "all, ms a record": total,
         "of which for the healthy twins that noise is set by": for_twins,
         "share of integration": integration / total,
+        RECORDING_SHARE: spent[RECORDING] / total,
         "share of mesh tables": spent[TABLES] / total,
         "share of low-pass": spent[LOW_PASS] / total,
         "share of noise and labels": spent[NOISE] / total,

@@ -27,6 +27,7 @@ from gensig.errors import SimulationError
 from gensig.execution.local import LocalExecutor
 from gensig.faults.registry import read_faults
 from gensig.generation import begin_folder, run_folder, write_shard
+from gensig.mesh.load_distribution import sound_load
 from gensig.systems import spur_pair
 from gensig.systems.registry import read_system
 from gensig.systems.spur_pair import Run, Start, simulate_together
@@ -169,6 +170,7 @@ def against_teeth(runs: int) -> tuple[dict[str, float], dict[str, float]]:
 
     def table(run: Run) -> None:
         spur_pair._mesh_table.cache_clear()
+        sound_load.cache_clear()
         run.dynamics()
 
     for n_teeth in TEETH:

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Callable
+from dataclasses import replace
 from typing import Any
 
 import numpy as np
@@ -48,14 +49,29 @@ def indicator_model(
     """
     known = np.flatnonzero(np.isfinite(train.values).any(axis=0)).tolist()  # the boosting's bins need a value
     kept = [index for index in known if with_level or not train.names[index].endswith("log_rms")]
+    train, validation, test = (replace(table, values=table.values[:, kept]) for table in (train, validation, test))
+    name, model = best_candidate(train, validation, n_classes=n_classes)
+    return (name, *judged(model, test, n_classes))
+
+
+def best_candidate(train: FeatureTable, validation: FeatureTable, *, n_classes: int) -> tuple[str, Any]:
+    """Name and fitted model of logistic regression or gradient boosting, the better one on the validation units."""
     scored = []
     for name, make in _candidates().items():
-        model = make()
-        model.fit(train.values[:, kept], train.label)
-        judged = over_records(_log_probability(model, validation.values[:, kept], n_classes), validation.record)
-        scored.append((_accuracy(*judged, validation, n_classes), name, model))
+        model = make().fit(train.values, train.label)
+        scored.append((_accuracy(*judged(model, validation, n_classes), validation, n_classes), name, model))
     _, name, model = max(scored, key=lambda row: row[0])
-    return (name, *over_records(_log_probability(model, test.values[:, kept], n_classes), test.record))
+    return name, model
+
+
+def gradient_boosting(train: FeatureTable) -> Any:
+    """Fitted gradient boosting."""
+    return _candidates()["gradient boosting"]().fit(train.values, train.label)
+
+
+def judged(model: Any, table: FeatureTable, n_classes: int) -> tuple[IntArray, FloatArray]:
+    """Records (record,) of a table and their log-probabilities (record, class)."""
+    return over_records(_log_probability(model, table.values, n_classes), table.record)
 
 
 def nearest_spectrum(train: FeatureTable, test: FeatureTable, *, n_classes: int) -> Prediction:
@@ -89,8 +105,8 @@ def ridge_model(train: FeatureTable, validation: FeatureTable, test: FeatureTabl
     for penalty in np.logspace(5, -1, 7):
         model = make_pipeline(StandardScaler(), RidgeClassifier(alpha=penalty, class_weight="balanced"))
         model.fit(train.values, train.label)
-        judged = over_records(_soft_score(model, validation.values, n_classes), validation.record)
-        scored.append((_accuracy(*judged, validation, n_classes), f"ridge, penalty {penalty:g}", model))
+        found = over_records(_soft_score(model, validation.values, n_classes), validation.record)
+        scored.append((_accuracy(*found, validation, n_classes), f"ridge, penalty {penalty:g}", model))
     _, name, model = max(scored, key=lambda row: row[0])
     return (name, *over_records(_soft_score(model, test.values, n_classes), test.record))
 

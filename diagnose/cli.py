@@ -14,6 +14,8 @@ VERBS = {
     "train": "train, judge and report",
     "evaluate": "judge a trained network",
     "predict": "try a trained network on a recording",
+    "export": "write a trained network as ONNX",
+    "adapt": "move a trained network to a machine by its healthy recordings",
     "detectability": "which test shows a fault: maps over speed, torque, channel and bandwidth",
 }
 

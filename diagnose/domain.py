@@ -93,7 +93,7 @@ def fit_domain(train: WindowSet, validation: WindowSet) -> Domain:
     """
     kept = np.unique(np.linspace(0, len(train) - 1, min(len(train), MOST_WINDOWS)).round().astype(int))
     levels = window_levels(train, kept).astype(np.float32)
-    distance = _distance(window_levels(validation, np.arange(len(validation))), levels)
+    distance = neighbor_distance(window_levels(validation, np.arange(len(validation))), levels)
     return Domain(
         levels=levels,
         threshold=float(np.quantile(distance, QUANTILE, method="higher")),
@@ -113,7 +113,7 @@ def distances(domain: Domain, windows: WindowSet) -> FloatArray:
         raise DatasetError(
             f"the model's out-of-distribution flag has {domain.levels.shape[1]} levels, a window {levels.shape[1]}"
         )
-    return _distance(levels, domain.levels)
+    return neighbor_distance(levels, domain.levels)
 
 
 def window_levels(windows: WindowSet, chosen: NDArray[np.integer], *, batch_size: int = 64) -> FloatArray:
@@ -133,7 +133,7 @@ def band_levels(windows: NDArray[np.floating]) -> FloatArray:
     return np.log(mean + least)
 
 
-def _distance(levels: FloatArray, known: NDArray[np.float32]) -> FloatArray:
+def neighbor_distance(levels: FloatArray, known: FloatArray) -> FloatArray:
     """(window,) from each row to the fifth nearest of the known ones, the last where there are fewer."""
     from sklearn.neighbors import NearestNeighbors
 

@@ -2,11 +2,14 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
+from dataclasses import replace
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
+from diagnose.at_rate import at_rate
 from diagnose.model_io import ModelDescription, data_fingerprint, schema_version
 from diagnose.windows import Segments, Task, all_segments, subset_segments, task_of
 from gensig.errors import ConfigError, DatasetError
@@ -24,17 +27,20 @@ def evaluate_model(
     *,
     protocol: str | None = None,
     subset: str | None = None,
+    channels: Sequence[str] | None = None,
 ) -> dict[str, Any]:
     """Score a network by record.
 
     On the data set it was trained on it is judged on the test part of its protocol; on another one, on every record,
-    unless `protocol` and `subset` say otherwise.
+    unless `protocol` and `subset` say otherwise. A network of ``cross_sensor`` is judged on the channels of its test on
+    the test part of that protocol, elsewhere on those of its training, unless `channels` says otherwise.
 
     Parameters
     ----------
     model, description : of `diagnose.model_io.load_model`
     dataset : open data set
     protocol, subset : part of a split of that data set
+    channels : in place of those it was trained on, in their order
 
     Returns
     -------
@@ -43,7 +49,7 @@ def evaluate_model(
     Raises
     ------
     DatasetError    if schema version, sampling rate, channels or classes do not fit the network
-    ConfigError    for a protocol or subset that does not exist
+    ConfigError    for a protocol or subset that does not exist, another number of channels
     """
     from diagnose.calibration import calibration_scores
     from diagnose.metrics import over_records
@@ -51,9 +57,9 @@ def evaluate_model(
     from diagnose.train import predict_windows
     from diagnose.turns import load_inputs
 
-    task = _matching_task(description, dataset)
-    segments, part = _segments(task, description, protocol, subset)
-    windows = load_inputs(task, segments, description.model)
+    task = _matching_task(description, dataset, channels)
+    segments, part, shown = _segments(task, description, protocol, subset)
+    windows = load_inputs(shown, segments, description.model)
     record, log_probability = over_records(predict_windows(model, windows), windows.record)
     scores = score_predictions(task, [(record, log_probability.argmax(axis=1))], description.n_bootstrap)
     return {
@@ -62,6 +68,7 @@ def evaluate_model(
         "n_records": int(record.size),
         "n_units": int(np.unique(np.asarray(dataset.column("unit_id"))[record]).size),
         "class_names": list(description.class_names),
+        "channel_names": list(shown.channel_names),
         "model": str(description.model.get("name", "network")),
         "trained_on_protocol": description.protocol,
         "seed": description.seed,
@@ -70,18 +77,24 @@ def evaluate_model(
     }
 
 
-def _matching_task(description: ModelDescription, dataset: Dataset) -> Task:
+def _matching_task(description: ModelDescription, dataset: Dataset, channels: Sequence[str] | None) -> Task:
     """Task as the network was trained for, on this data set; refuses what does not fit."""
     where = f"{dataset.folder} does not fit the model"
     if schema_version(dataset) != description.data_schema_version:
         raise DatasetError(
             f"{where}: data schema {schema_version(dataset)}, trained on schema {description.data_schema_version}"
         )
-    if not np.isclose(dataset.sampling_rate, description.sampling_rate_hz, rtol=1e-9):
+    if dataset.sampling_rate < description.sampling_rate_hz * (1 - 1e-9):
         raise DatasetError(
             f"{where}: sampled at {dataset.sampling_rate:g} Hz, trained at {description.sampling_rate_hz:g} Hz"
         )
-    if missing := [name for name in description.channel_names if name not in dataset.channel_names]:
+    if channels is not None and len(channels) != len(description.channel_names):
+        raise ConfigError(
+            f"channels={','.join(channels)}: the model takes {len(description.channel_names)}, in the order of "
+            f"{', '.join(description.channel_names)}"
+        )
+    wanted = tuple(channels or description.channel_names)
+    if missing := [name for name in wanted if name not in dataset.channel_names]:
         raise DatasetError(
             f"{where}: it has no channel {', '.join(missing)} (it has {', '.join(dataset.channel_names)})"
         )
@@ -89,30 +102,34 @@ def _matching_task(description: ModelDescription, dataset: Dataset) -> Task:
     own = data_fingerprint(dataset) == description.data_fingerprint
     if set(known) - set(offered) or (set(offered) - set(known) and not own):
         raise DatasetError(f"{where}: its classes are {', '.join(offered)}, the model knows {', '.join(known)}")
-    return task_of(
-        dataset,
+    task = task_of(
+        at_rate(dataset, description.sampling_rate_hz),
         window_samples=description.window_samples,
         stride_samples=description.stride_samples,
         normalise=description.normalise,
         classes=known,
-        channels=description.channel_names,
+        channels=wanted,
     )
+    if description.test_channel_names is None:
+        return task
+    tested = description.test_channel_names if channels is None else wanted
+    return replace(task, cross_channels=(wanted, tested))
 
 
 def _segments(
     task: Task, description: ModelDescription, protocol: str | None, subset: str | None
-) -> tuple[Segments, str]:
-    """What to judge, and in words."""
+) -> tuple[Segments, str, Task]:
+    """What to judge, in words, and the task with the channels of that part."""
     own = data_fingerprint(task.dataset) == description.data_fingerprint
     if protocol is None and subset is not None and not own:
         raise ConfigError(f"subset={subset} needs protocol=..., one of {', '.join(task.dataset.protocols)}")
     if protocol is None and own:
         protocol = description.protocol
     if protocol is None:
-        return all_segments(task), "all records"
+        return all_segments(task), "all records", task
     subset = subset or "test"
     note = " (the data set it was trained on)" if own else ""
-    return subset_segments(task, protocol, subset), f"{subset} part of {protocol}{note}"
+    return subset_segments(task, protocol, subset), f"{subset} part of {protocol}{note}", task.part(protocol, subset)
 
 
 def write_evaluation(folder: Path, result: dict[str, Any]) -> None:

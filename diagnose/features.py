@@ -45,7 +45,7 @@ FURTHER = (
 )
 FEATURES = {"basic": INDICATORS, "all": INDICATORS + FURTHER}
 BURST_WINDOW = 0.005  # s, assumed: shorter than a turn, longer than a gearbox mode rings
-Cache = dict[tuple[int, int, int], FloatArray]
+Cache = dict[tuple[tuple[str, ...], int, int, int], FloatArray]  # channels, record, first and last sample
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -139,27 +139,33 @@ def feature_table(
     n_threads : stretches computed at once; the values do not depend on it
     """
     known: Cache = {} if cache is None else cache
-    speed_rpm = np.asarray(task.dataset.column("speed_rpm"), dtype=float)
-    n_teeth = {gear: _n_teeth(task.dataset.attributes, gear) for gear in GEARS}
+    speed, n_teeth = known_rotation(task)
     keys = list(zip(segments.record.tolist(), segments.start.tolist(), segments.stop.tolist(), strict=True))
 
     def compute(key: tuple[int, int, int]) -> FloatArray:
-        pinion = speed_rpm[key[0]] / 60
-        frequency = {"pinion": pinion, "wheel": pinion * n_teeth["pinion"] / n_teeth["wheel"]}
+        frequency = {gear: values[key[0]] for gear, values in speed.items()}
         return indicators(signals[key], task.dataset.sampling_rate, frequency, n_teeth, features=features).ravel()
 
-    missing = [key for key in keys if key not in known]
+    missing = [key for key in keys if (task.channel_names, *key) not in known]
     with ThreadPoolExecutor(max_workers=n_threads) as pool:
         for first in range(0, len(missing), 32):
             block = missing[first : first + 32]
             signals = {key: read_signal(task, *key) for key in block}
-            known.update(zip(block, pool.map(compute, block), strict=True))
+            names = [(task.channel_names, *key) for key in block]
+            known.update(zip(names, pool.map(compute, block), strict=True))
     return FeatureTable(
-        values=np.stack([known[key] for key in keys]),
+        values=np.stack([known[(task.channel_names, *key)] for key in keys]),
         names=tuple(f"{channel}/{name}" for channel in task.channel_names for name in FEATURES[features]),
         label=task.labels()[segments.record],
         record=segments.record,
     )
+
+
+def known_rotation(task: Task) -> tuple[dict[str, FloatArray], dict[str, int]]:
+    """Rotation frequency in Hz, (record,), and number of teeth of each of `GEARS`."""
+    pinion = np.asarray(task.dataset.column("speed_rpm"), dtype=float) / 60
+    n_teeth = {gear: _n_teeth(task.dataset.attributes, gear) for gear in GEARS}
+    return {"pinion": pinion, "wheel": pinion * n_teeth["pinion"] / n_teeth["wheel"]}, n_teeth
 
 
 def _n_teeth(attributes: Mapping[str, Any], gear: str) -> int:

@@ -56,28 +56,6 @@ def scores_figure(path: Path, metrics: Mapping[str, Any]) -> None:
     save(figure, path)
 
 
-def severity_figure(path: Path, protocols: Mapping[str, Sequence[Mapping[str, Any]]]) -> None:
-    """Share of faulty records recognised against severity, one panel a protocol; rows of `study.severity_rows`."""
-    figure, axes = subplots(len(protocols), size=(4.2 * len(protocols) + 0.6, 3.6))
-    classes = list(dict.fromkeys(row["class"] for rows in protocols.values() for row in rows))
-    for panel, (protocol, rows) in zip(axes, protocols.items(), strict=True):
-        for index, name in enumerate(classes):
-            mine = [row for row in rows if row["class"] == name]
-            middle = [(row["severity_low"] + row["severity_high"]) / 2 for row in mine]
-            panel.plot(
-                middle,
-                [row["recall"] for row in mine],
-                color=COLORS[index % len(COLORS)],
-                marker=MARKERS[index % len(MARKERS)],
-                label=name,
-            )
-        panel.set(xlabel="severity (0 healthy, 1 most severe)", ylim=(-0.03, 1.03), title=protocol)
-        panel.grid(alpha=0.3)
-    axes[0].set_ylabel("share of records recognised")
-    axes[0].legend(loc="best", fontsize=8)
-    save(figure, path)
-
-
 def reliability_figure(path: Path, protocols: Mapping[str, Mapping[str, Any]]) -> None:
     """Share of right predictions against their probability, one panel a protocol; `calibration.calibration_scores`."""
     figure, axes = subplots(len(protocols), size=(3.9 * len(protocols) + 0.6, 3.9))

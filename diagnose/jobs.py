@@ -10,34 +10,54 @@ from collections.abc import Callable, Iterator, Mapping, Sequence
 from concurrent.futures import ProcessPoolExecutor, as_completed
 from concurrent.futures.process import BrokenProcessPool
 from contextlib import contextmanager
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from typing import Any
 
 import numpy as np
 import torch
 
+from diagnose.adaptation import healthy_statistics
 from diagnose.baselines import Prediction as BaselinePrediction
 from diagnose.baselines import indicator_model, nearest_spectrum, ridge_model, rms_threshold
 from diagnose.domain import Domain, fit_domain
 from diagnose.features import Cache, FeatureTable, feature_table
 from diagnose.heads import predict_heads
 from diagnose.metrics import over_records
+from diagnose.novelty import NoveltyRun, fitted_runs, trained_runs
+from diagnose.oracle import NETWORK as ORACLE_NETWORK
+from diagnose.oracle import Cache as OracleCache
+from diagnose.oracle import fit_oracle_indicators, oracle_windows
 from diagnose.predictions import Prediction, Rows
+from diagnose.probe import fit_probe
+from diagnose.protocols import OPEN_PROTOCOLS
 from diagnose.settings import TrainSettings
+from diagnose.sham import sham_method, sham_task
+from diagnose.tensorboard import epoch_log
 from diagnose.train import input_scale, predict_windows, train_network, with_shuffled_labels
 from diagnose.turns import load_inputs, wants_turns
 from diagnose.window_features import rocket_tables, spectrum_table
 from diagnose.windows import SUBSETS, Task, WindowSet, subset_segments
 from gensig.errors import GensigError
 
+# Controls beside the label shuffle, of `diagnose.probe`, `.oracle` and `.sham`, and the network that sees the level.
+PROBE, ORACLE, SHAM, LEVEL_KEPT = "probe", "oracle", "sham", "level_kept"
+
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Job:
-    """One training (with or without shuffled labels), or with seed None the baselines of all the protocols."""
+    """One training (with or without shuffled labels), or with seed None the baselines of all the protocols.
+
+    One of `OPEN_PROTOCOLS` is a job of its own: with seed None the scores that are fitted, else those of a network.
+    ``control`` is "" or one of the controls, which then takes the place of the training or of the baselines.
+    """
 
     protocols: tuple[str, ...]
     seed: int | None
     shuffled: bool = False
+    control: str = ""
+
+
+Outcome = Prediction | NoveltyRun
 
 
 def run_jobs(
@@ -46,8 +66,8 @@ def run_jobs(
     jobs: Sequence[Job],
     *,
     n_workers: int,
-    on_done: Callable[[list[Prediction]], None],
-) -> list[Prediction]:
+    on_done: Callable[[list[Outcome]], None],
+) -> list[Outcome]:
     """Run all jobs and collect their predictions in the order of the jobs.
 
     Raises
@@ -62,6 +82,7 @@ def run_jobs(
                 on_done(results[-1])
         _loaded.clear()
         _domains.clear()
+        _shams.clear()
         return [prediction for result in results for prediction in result]
     context = multiprocessing.get_context("spawn")
     executor = ProcessPoolExecutor(min(n_workers, len(jobs)), context, _start_worker, (task, settings))
@@ -78,42 +99,69 @@ def run_jobs(
         executor.shutdown(wait=True, cancel_futures=True)
 
 
-def run_job(task: Task, settings: TrainSettings, job: Job) -> list[Prediction]:
-    """Predictions on the test part of each of the job's protocols."""
-    if job.seed is None:
-        cache: Cache = {}
-        return [prediction for name in job.protocols for prediction in _run_baselines(task, settings, name, cache)]
-    return [_run_training(task, settings, name, job.seed, job.shuffled) for name in job.protocols]
+def run_job(task: Task, settings: TrainSettings, job: Job) -> list[Outcome]:
+    """Predictions, or scores of novelty, on the test part of each of the job's protocols."""
+    if job.protocols[0] in OPEN_PROTOCOLS:
+        name = job.protocols[0]
+        if job.seed is None:
+            return [*fitted_runs(task, settings, name, _windows(task, name))]
+        return [*trained_runs(settings, name, job.seed, _windows(task, name, "", settings.model))]
+    if job.control == SHAM:
+        task = _sham(task, settings)
+    if job.seed is not None:
+        return [_run_training(task, settings, name, job.seed, job.shuffled, job.control) for name in job.protocols]
+    cache: Cache = {}
+    if job.control == PROBE:
+        return [fit_probe(task, name, results=results) for name in job.protocols for results in (False, True)]
+    if job.control == ORACLE:
+        twins: OracleCache = {}
+        return [fit_oracle_indicators(task, name, twins) for name in job.protocols]
+    found = [prediction for name in job.protocols for prediction in _run_baselines(task, settings, name, cache)]
+    return [replace(one, method=sham_method(one.method, "")) for one in found] if job.control == SHAM else [*found]
 
 
-def _run_training(task: Task, settings: TrainSettings, protocol: str, seed: int, shuffled: bool) -> Prediction:
+def _run_training(
+    task: Task, settings: TrainSettings, protocol: str, seed: int, shuffled: bool, control: str
+) -> Prediction:
     n_classes = len(task.class_names)
-    train, validation, test = (_windows(task, protocol, settings.model)[subset] for subset in SUBSETS)
+    train, validation, test = (_windows(task, protocol, control, settings.model)[subset] for subset in SUBSETS)
     if shuffled:
         rng = np.random.default_rng([seed, 2])
         train = with_shuffled_labels(train, n_classes, rng)
         validation = with_shuffled_labels(validation, n_classes, rng)
-    training = train_network(
-        train, validation, model_config=settings.model, n_classes=n_classes, settings=settings, seed=seed
-    )
+    run = f"{protocol}-{'label_shuffle-' if shuffled else ''}seed{seed}"
+    with epoch_log(settings.out, run, wanted=settings.tensorboard) as on_epoch:
+        training = train_network(
+            train,
+            validation,
+            model_config=settings.model,
+            n_classes=n_classes,
+            settings=settings,
+            seed=seed,
+            on_epoch=on_epoch,
+        )
     by_window = predict_windows(training.model, test)
     record, log_probability = over_records(by_window, test.record)
     held_out, held_out_scores = over_records(predict_windows(training.model, validation), validation.record)
-    domain = None if shuffled else _domain(protocol, train, validation)
+    is_model = not shuffled and not control
+    domain = _domain(protocol, train, validation) if is_model else None
+    network = str(settings.model.get("name", "network"))
+    names = {ORACLE: ORACLE_NETWORK, SHAM: sham_method(network, network), LEVEL_KEPT: LEVEL_KEPT}
     last = log_probability
     if training.last_model is not None and not shuffled:
         _, last = over_records(predict_windows(training.last_model, test), test.record)
     return Prediction(
         protocol=protocol,
-        method="label_shuffle" if shuffled else str(settings.model.get("name", "network")),
+        method="label_shuffle" if shuffled else names.get(control, network),
         seed=seed,
         record=record,
         log_probability=log_probability,
         detail=f"best epoch {training.best_epoch} of {len(training.validation_loss)}",
         validation=Rows(record=held_out, log_probability=held_out_scores),
         windows=Rows(record=test.record, log_probability=by_window),
-        weights=None if shuffled else {key: value.numpy() for key, value in training.model.state_dict().items()},
+        weights={key: value.numpy() for key, value in training.model.state_dict().items()} if is_model else None,
         domain=domain,
+        healthy=None if shuffled else healthy_statistics(training.model, train, task.class_names),
         best_epoch=training.best_epoch,
         validation_loss=training.validation_loss,
         temperature=training.temperature,
@@ -154,7 +202,12 @@ def _fit_baseline(task: Task, settings: TrainSettings, protocol: str, method: st
         train, validation, test = (spectrum_table(windows, scale) for windows in sets)
         return nearest_spectrum(train, _with_validation(validation, test), n_classes=n_classes)
     train, validation, test = (
-        feature_table(task, subset_segments(task, protocol, subset), features=settings.features, cache=cache)
+        feature_table(
+            task.part(protocol, subset),
+            subset_segments(task, protocol, subset),
+            features=settings.features,
+            cache=cache,
+        )
         for subset in SUBSETS
     )
     judged = _with_validation(validation, test)
@@ -176,22 +229,38 @@ def _with_validation(validation: FeatureTable, test: FeatureTable) -> FeatureTab
 
 
 # Windows of the protocol a process works on; jobs come protocol by protocol.
-_loaded: dict[tuple[str, bool], dict[str, WindowSet]] = {}
+_loaded: dict[tuple[str, str, bool, bool], dict[str, WindowSet]] = {}
 _domains: dict[str, Domain] = {}
+_shams: dict[str, Task] = {}
 _work: dict[str, Any] = {}
 
 
-def _windows(task: Task, protocol: str, model_config: Mapping[str, Any] | None = None) -> dict[str, WindowSet]:
+def _windows(
+    task: Task, protocol: str, control: str = "", model_config: Mapping[str, Any] | None = None
+) -> dict[str, WindowSet]:
     """Windows of time, or what a network of this configuration reads."""
     config = model_config or {}
-    key = (protocol, wants_turns(config))
+    key = (str(task.dataset.folder), protocol, control == ORACLE, wants_turns(config))
     if key not in _loaded:
         _loaded.clear()
+        load = oracle_windows if control == ORACLE else load_inputs
         _loaded[key] = {
-            name: load_inputs(task, subset_segments(task, protocol, name), config, training=name == "train")
+            name: load(
+                task.part(protocol, name), subset_segments(task, protocol, name), config, training=name == "train"
+            )
             for name in SUBSETS
         }
+    if control == LEVEL_KEPT:
+        return {name: replace(windows, normalise="none") for name, windows in _loaded[key].items()}
     return _loaded[key]
+
+
+def _sham(task: Task, settings: TrainSettings) -> Task:
+    """The task on the sham data set, opened once a process."""
+    folder = str(settings.sham)
+    if folder not in _shams:
+        _shams[folder] = sham_task(task, folder)
+    return _shams[folder]
 
 
 def _domain(protocol: str, train: WindowSet, validation: WindowSet) -> Domain:
@@ -210,7 +279,7 @@ def _start_worker(task: Task, settings: TrainSettings) -> None:
     _work.update(task=task, settings=settings)
 
 
-def _run_in_worker(job: Job) -> list[Prediction]:
+def _run_in_worker(job: Job) -> list[Outcome]:
     return run_job(_work["task"], _work["settings"], job)
 
 

@@ -92,17 +92,55 @@ def score_with_interval(
     """
     score = SCORES[name]
     per_seed = score(confusion.sum(axis=1))
-    n_seeds, n_units = confusion.shape[:2]
+    n_units = confusion.shape[1]
     times_drawn = rng.multinomial(n_units, np.full(n_units, 1 / n_units), size=n_bootstrap)
     resampled = score(np.einsum("bu,sutp->bstp", times_drawn, confusion))
     if shuffled:
         resampled = resampled + _renaming_luck(name, confusion.sum(axis=1), n_bootstrap, rng)
-    seeds_drawn = rng.integers(n_seeds, size=(n_bootstrap, n_seeds))
-    means = np.take_along_axis(resampled, seeds_drawn, axis=1).mean(axis=1)
+    means = _over_drawn_seeds(resampled, rng)
     low, high = np.clip(np.nanquantile(means, [0.025, 0.975]), 0, 1)
     return Score(
         mean=float(np.mean(per_seed)), low=float(low), high=float(high), per_seed=tuple(float(v) for v in per_seed)
     )
+
+
+def ratio_with_interval(
+    name: str,
+    confusion: NDArray[np.int64],
+    reference: NDArray[np.int64],
+    *,
+    n_bootstrap: int,
+    rng: np.random.Generator,
+) -> dict[str, float]:
+    """Score over that of a reference on the same units, each a mean over its seeds, with a 95 % interval.
+
+    Parameters
+    ----------
+    name : key of `SCORES`
+    confusion, reference : (seed, unit, true class, predicted class) counts of records; the same units in the same order
+    n_bootstrap : resamples; each draws the units once for both, and the seeds of each
+    rng : source of the resamples
+
+    Returns
+    -------
+    ``mean``, ``low``, ``high``
+    """
+    score, n_units = SCORES[name], confusion.shape[1]
+    times_drawn = rng.multinomial(n_units, np.full(n_units, 1 / n_units), size=n_bootstrap)
+    above, below = (
+        _over_drawn_seeds(score(np.einsum("bu,sutp->bstp", times_drawn, counts)), rng)
+        for counts in (confusion, reference)
+    )
+    least = np.finfo(float).tiny  # a reference that finds nothing in a resample
+    low, high = np.nanquantile(above / np.maximum(below, least), [0.025, 0.975])
+    mean = np.mean(score(confusion.sum(axis=1))) / max(np.mean(score(reference.sum(axis=1))), least)
+    return {"mean": float(mean), "low": float(low), "high": float(high)}
+
+
+def _over_drawn_seeds(resampled: FloatArray, rng: np.random.Generator) -> FloatArray:
+    """(draw,) mean over as many seeds as there are, drawn anew for each draw, from (draw, seed)."""
+    seeds = rng.integers(resampled.shape[1], size=resampled.shape)
+    return np.take_along_axis(resampled, seeds, axis=1).mean(axis=1)
 
 
 def _renaming_luck(

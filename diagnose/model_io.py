@@ -16,6 +16,7 @@ from diagnose.windows import Task, subset_segments
 from gensig.errors import DatasetError
 
 if TYPE_CHECKING:
+    from diagnose.adaptation import Statistics
     from diagnose.domain import Domain
     from diagnose.jobs import Prediction
     from diagnose.network import Network
@@ -50,7 +51,10 @@ class ModelDescription:
     n_bootstrap: int
     speed_rpm_range: tuple[float, float] | None = None
     out_of_distribution: dict[str, Any] | None = None
+    n_teeth: tuple[int, int] | None = None  # of the driving and the driven gear; None where not told or not the same
     temperature: float = 1.0  # see `diagnose.calibration`; models of before have none
+    test_channel_names: tuple[str, ...] | None = None  # of protocol cross_sensor
+    adaptation: dict[str, Any] | None = None  # see `diagnose.machine`; None as trained
 
     def __post_init__(self) -> None:
         if not 0 < self.temperature < float("inf"):
@@ -60,12 +64,13 @@ class ModelDescription:
 def model_description(task: Task, settings: TrainSettings, prediction: Prediction) -> ModelDescription:
     """Description of the network behind a prediction."""
     trained_on = subset_segments(task, prediction.protocol, "train").record
+    channels, tested = (task.part(prediction.protocol, subset).channel_names for subset in ("train", "test"))
     speed = np.asarray(task.dataset.column("speed_rpm"), dtype=float)[trained_on]
     return ModelDescription(
         model_schema_version=MODEL_SCHEMA_VERSION,
         model=dict(settings.model),
         class_names=task.class_names,
-        channel_names=task.channel_names,
+        channel_names=channels,
         sampling_rate_hz=float(task.dataset.sampling_rate),
         window_samples=task.window_samples,
         stride_samples=task.stride_samples,
@@ -77,16 +82,26 @@ def model_description(task: Task, settings: TrainSettings, prediction: Predictio
         best_epoch=prediction.best_epoch,
         n_bootstrap=settings.n_bootstrap,
         speed_rpm_range=(float(speed.min()), float(speed.max())),
+        n_teeth=_n_teeth(task.dataset),
         out_of_distribution=None if prediction.domain is None else prediction.domain.facts(),
         temperature=prediction.temperature,
+        test_channel_names=None if tested == channels else tested,
     )
+
+
+def _n_teeth(dataset: Dataset) -> tuple[int, int] | None:
+    """Teeth of the data set's pinion, which drives, and of its wheel."""
+    names = ("n_teeth_pinion", "n_teeth_wheel")
+    if any(dataset.attributes.get(name) is None for name in names):
+        return None
+    return int(dataset.attributes[names[0]]), int(dataset.attributes[names[1]])
 
 
 def save_model(folder: Path, weights: Mapping[str, np.ndarray], description: ModelDescription) -> None:
     """Write both files into a new folder."""
     from safetensors.numpy import save_file
 
-    folder.mkdir(parents=True)
+    folder.mkdir(parents=True, exist_ok=True)
     save_file({key: np.ascontiguousarray(value) for key, value in weights.items()}, folder / WEIGHTS)
     (folder / DESCRIPTION).write_text(json.dumps(asdict(description), indent=2) + "\n", encoding="utf-8")
 
@@ -100,6 +115,7 @@ def load_model(folder: str | Path) -> tuple[Network, ModelDescription]:
     """
     import torch
 
+    from diagnose.adaptation import PREFIX
     from diagnose.domain import TENSOR
     from diagnose.models import build_model
 
@@ -108,7 +124,7 @@ def load_model(folder: str | Path) -> tuple[Network, ModelDescription]:
     model = build_model(
         description.model, n_channels=len(description.channel_names), n_classes=len(description.class_names)
     )
-    stored = {name: value for name, value in _tensors(folder).items() if name != TENSOR}
+    stored = {k: v for k, v in _tensors(folder).items() if k != TENSOR and not k.startswith(PREFIX)}
     try:
         model.load_state_dict({name: torch.from_numpy(value) for name, value in stored.items()})
     except (RuntimeError, TypeError) as error:
@@ -129,6 +145,21 @@ def load_domain(folder: str | Path, description: ModelDescription) -> Domain | N
         return None
     try:
         return domain_from(description.out_of_distribution, _tensors(Path(folder)))
+    except DatasetError as error:
+        raise DatasetError(f"{folder}: {error}") from None
+
+
+def load_statistics(folder: str | Path) -> Statistics | None:
+    """What healthy training windows look like inside the network of a folder; None for one that does not tell.
+
+    Raises
+    ------
+    DatasetError    for tensors that are no such statistics
+    """
+    from diagnose.adaptation import statistics_from
+
+    try:
+        return statistics_from(_tensors(Path(folder)))
     except DatasetError as error:
         raise DatasetError(f"{folder}: {error}") from None
 
@@ -171,6 +202,8 @@ def _read_description(folder: Path) -> ModelDescription:
             raise DatasetError(f"{path}: model schema {version!r}, this program reads {known}")
         for name in ("class_names", "channel_names"):
             content[name] = tuple(str(value) for value in content[name])
+        if content.get("test_channel_names") is not None:
+            content["test_channel_names"] = tuple(str(value) for value in content["test_channel_names"])
         content["sampling_rate_hz"] = float(content["sampling_rate_hz"])
         for name in ("window_samples", "stride_samples"):
             if not isinstance(content[name], int) or content[name] < 1:
@@ -178,8 +211,12 @@ def _read_description(folder: Path) -> ModelDescription:
         if content.get("speed_rpm_range") is not None:
             low, high = content["speed_rpm_range"]
             content["speed_rpm_range"] = (float(low), float(high))
-        if content.get("out_of_distribution") is not None:
-            content["out_of_distribution"] = dict(content["out_of_distribution"])
+        if content.get("n_teeth") is not None:
+            driving, driven = content["n_teeth"]
+            content["n_teeth"] = (int(driving), int(driven))
+        for name in ("out_of_distribution", "adaptation"):
+            if content.get(name) is not None:
+                content[name] = dict(content[name])
         return ModelDescription(**content)
     except FileNotFoundError:
         inside = sorted(child.name for child in (folder / "models").glob("*") if (child / DESCRIPTION).is_file())

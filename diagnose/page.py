@@ -44,6 +44,7 @@ class Section:
     text : paragraphs
     notes : points of a list, each a term in bold, or "", and what is said of it
     figures : (file in the folder of the page, what it shows)
+    side_by_side : whether figures share a line
     folded : whether the reader opens it by a click
     """
 
@@ -53,6 +54,7 @@ class Section:
     table: Table | None = None
     notes: Sequence[tuple[str, str]] = ()
     figures: Sequence[tuple[str, str]] = field(default=())
+    side_by_side: bool = False
     folded: bool = False
 
 

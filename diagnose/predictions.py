@@ -12,6 +12,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 if TYPE_CHECKING:
+    from diagnose.adaptation import Statistics
     from diagnose.domain import Domain
     from diagnose.windows import Task
 
@@ -38,8 +39,9 @@ class Prediction:
     detail : what was fitted or trained, in words
     validation : the same for the validation records; None where they are test records too
     windows : of networks only, for each window of the test records
-    weights, domain, best_epoch, validation_loss, temperature, last_predicted : of networks only; `temperature` as in
-        `diagnose.calibration`, `last_predicted` (record,) the labels that the weights of the last epoch give
+    weights, domain, healthy, best_epoch, validation_loss, temperature, last_predicted : of networks only;
+        `temperature` as in `diagnose.calibration`, `last_predicted` (record,) the labels that the weights of the last
+        epoch give
     heads : of a network that has them, `diagnose.heads.predict_heads`
     """
 
@@ -53,6 +55,7 @@ class Prediction:
     windows: Rows | None = None
     weights: dict[str, NDArray[Any]] | None = None
     domain: Domain | None = None
+    healthy: Statistics | None = None
     best_epoch: int = 0
     validation_loss: tuple[float, ...] = ()
     temperature: float = 1.0

@@ -5,13 +5,13 @@ from __future__ import annotations
 from collections.abc import Sequence
 from typing import TYPE_CHECKING
 
-from diagnose.windows import check_names
+from diagnose.windows import CROSS_SENSOR, check_names
 from gensig.errors import ConfigError
 
 if TYPE_CHECKING:
-    from gensig.dataset.reader import Dataset
+    from diagnose.windows import Task
 
-# Their training lacks classes that the test has: accuracy over classes says nothing there.
+# Their training lacks classes that the test has: scores of novelty are judged there, not accuracy over classes.
 OPEN_PROTOCOLS = ("healthy_only", "open_set")
 MEANING = {
     "by_unit": "tested on machines (unit = one set of gears in one gearbox) never seen in training",
@@ -19,6 +19,7 @@ MEANING = {
     "cross_gearbox": "on gearboxes never seen; their sets of gears may be known",
     "cross_speed": "on machines never seen, at speeds above all of training",
     "cross_torque": "on machines never seen, at torques above all of training",
+    CROSS_SENSOR: "on machines never seen, with sensors never trained on",
     "cross_snr": "on machines never seen, in more noise than all of training",
     "unseen_severity_inner": "on machines never seen, with severities in a gap in the middle of those of training; "
     "healthy records and faults of one severity as in by_unit",
@@ -27,31 +28,66 @@ MEANING = {
 }
 
 
-def choose_protocols(dataset: Dataset, wanted: Sequence[str] | None) -> tuple[tuple[str, ...], dict[str, str]]:
-    """Protocols to run, and of those wanted that the data set has not, why.
+def choose_protocols(task: Task, wanted: Sequence[str] | None) -> tuple[tuple[str, ...], dict[str, str]]:
+    """Protocols to run, and of those wanted that cannot be run, why.
 
     Parameters
     ----------
-    dataset : open data set
-    wanted : names, or None for every protocol of the set whose training has all classes
+    task : of an open data set
+    wanted : names, or None for every protocol that the set has, `OPEN_PROTOCOLS` and `CROSS_SENSOR` too
 
     Raises
     ------
-    ConfigError    for a name that is no protocol, one whose training lacks classes, and where none is left
+    ConfigError    for a name that is no protocol, and where none is left
     """
-    left_out = dataset.left_out
+    dataset = task.dataset
+    offered, left_out = list(dataset.protocols), dict(dataset.left_out)
+    if reason := _why_no_cross_sensor(task):
+        left_out[CROSS_SENSOR] = reason
+    else:
+        offered.append(CROSS_SENSOR)
     if wanted is None:
-        wanted = [name for name in dataset.protocols if name not in OPEN_PROTOCOLS]
-    for name in wanted:
-        if name in OPEN_PROTOCOLS:
-            raise ConfigError(
-                f"protocol {name}: training has not all classes, and diagnose train judges by telling classes apart; "
-                "take it from the data set in a program of your own, or give other protocols"
-            )
-    check_names("protocol", wanted, [*dataset.protocols, *left_out])
+        wanted = offered
+    check_names("protocol", wanted, [*offered, *left_out])
     absent = {name: left_out[name] for name in wanted if name in left_out}
     found = tuple(name for name in wanted if name not in absent)
     if not found:
         reasons = "; ".join(f"{name}: {reason}" for name, reason in absent.items())
         raise ConfigError(f"{dataset.folder} has none of the protocols to train on ({reasons or 'it has no splits'})")
     return found, absent
+
+
+def channels_to_cross(
+    available: Sequence[str], channels: Sequence[str] | None, test_channels: Sequence[str] | None
+) -> tuple[tuple[str, ...], tuple[str, ...]] | str:
+    """Channels that `CROSS_SENSOR` trains and tests on, the same number, or in one line why there are none.
+
+    Without a word of the user the first half of the channels is trained on and as many of the second half are tested
+    on: data sets list the sensors of one place side by side, so that a pair of directions stays a pair. With `channels`
+    alone those are tested on that come first among the others.
+
+    Raises
+    ------
+    ConfigError    for test channels that do not exist, are trained on, or are not as many
+    """
+    if test_channels is None:
+        n = len(available) // 2 if channels is None else len(channels)
+        trained = tuple(available[:n] if channels is None else channels)
+        others = [name for name in available if name not in trained]
+        if n == 0:
+            return f"the data set has {len(available)} channel, and 2 are needed"
+        if len(others) < n:
+            return f"{len(others)} channel(s) are left beside channels={','.join(trained)}; name fewer"
+        return trained, tuple(others[:n])
+    if channels is None or len(channels) != len(test_channels):
+        raise ConfigError("test_channels needs channels beside it, the same number of them")
+    check_names("channel", [*channels, *test_channels], available)
+    if both := sorted(set(channels) & set(test_channels)):
+        raise ConfigError(f"channel {both[0]} is in channels and in test_channels; a sensor never seen is in one")
+    return tuple(channels), tuple(test_channels)
+
+
+def _why_no_cross_sensor(task: Task) -> str | None:
+    if "by_unit" not in task.dataset.protocols:
+        return "it needs the protocol by_unit"
+    return task.cross_channels if isinstance(task.cross_channels, str) else None

@@ -9,8 +9,10 @@ from typing import Any
 
 from diagnose.answer_sections import answer_sections
 from diagnose.answer_tables import write_tables
-from diagnose.figures import confusion_figure, reliability_figure, scores_figure, severity_figure
+from diagnose.controls_text import controls_section
+from diagnose.figures import confusion_figure, reliability_figure, scores_figure
 from diagnose.heads import heads_notes
+from diagnose.novelty_report import novelty_sections
 from diagnose.page import Section, Table, write_page
 from diagnose.protocols import MEANING
 from diagnose.report_text import (
@@ -41,6 +43,8 @@ def write_report(folder: Path, metrics: Mapping[str, Any]) -> Path:
 
 def result_table(metrics: Mapping[str, Any]) -> list[str]:
     """Markdown table of protocol x method: balanced accuracy with its 95 % interval, leaky protocols last."""
+    if not metrics["protocols"]:
+        return []
     table = _score_table(metrics)
     lines = ["| " + " | ".join(table.head) + " |", "|---" * len(table.head) + "|"]
     for number, (name, *cells) in enumerate(table.rows):
@@ -63,7 +67,7 @@ def _score_table(metrics: Mapping[str, Any]) -> Table:
 def _lead(metrics: Mapping[str, Any]) -> list[str]:
     settings = metrics["settings"]
     window_ms = 1e3 * settings["window_samples"] / metrics["sampling_rate_hz"]
-    level = "level removed (RMS-normalised)" if settings["normalise"] == "rms" else "level kept"
+    level = "level kept" if settings["normalise"] == "none" else "level removed (RMS-normalised)"
     return [
         f"Data: {metrics['data']}, {metrics['n_records']} records, classes {', '.join(metrics['class_names'])}; "
         f"channels {', '.join(metrics['channel_names'])} at {metrics['sampling_rate_hz']:g} Hz.",
@@ -73,10 +77,42 @@ def _lead(metrics: Mapping[str, Any]) -> list[str]:
 
 
 def _sections(folder: Path, metrics: Mapping[str, Any]) -> list[Section]:
-    model = metrics["model"]
     ordered = sorted(metrics["protocols"].items(), key=lambda item: item[1]["leaky"])
     clean = {name: result for name, result in ordered if not result["leaky"]}
-    sections = [
+    sections = []
+    if ordered:
+        sections += _score_sections(folder, metrics, ordered)
+    if clean:
+        sections.append(_fault_section(folder, clean, metrics))
+        sections += answer_sections(folder, clean)
+    sections += novelty_sections(metrics["novelty"])
+    if ordered:
+        sections.append(controls_section(metrics))
+    sections.append(Section(title="Caveats", notes=[("", line) for line in caveats(metrics)]))
+    if ordered:
+        sections.append(_meaning_section(metrics, clean))
+    if clean:
+        sections.append(_trust_section(folder, clean))
+    sections.append(_confusion_section(folder, metrics, ordered))
+    sections.append(
+        Section(
+            title="Files beside this page",
+            notes=[
+                ("metrics.json", "everything in numbers, with macro-F1, recall, calibration, settings and versions."),
+                ("predictions.csv", "what each method said of each test record."),
+                ("scores.csv and more", "the same numbers as tables, explained in docs/howto/report.md."),
+                *([("novelty.csv", "each score of novelty of each test record.")] if metrics["novelty"] else []),
+                ("models/", "the networks, one folder each, for diagnose evaluate and diagnose predict."),
+            ],
+            folded=True,
+        )
+    )
+    return [section for section in sections if section.text or section.table or section.notes or section.figures]
+
+
+def _score_sections(folder: Path, metrics: Mapping[str, Any], ordered: Sequence[tuple[str, Any]]) -> list[Section]:
+    model = metrics["model"]
+    return [
         Section(
             title="In short",
             text=["Balanced accuracy of the network over test records: the mean share recognised of each class."],
@@ -92,42 +128,22 @@ def _sections(folder: Path, metrics: Mapping[str, Any]) -> list[Section]:
             figures=_figures(folder, "scores.png", "scores and intervals; dotted: chance", scores_figure, metrics),
         ),
     ]
-    if clean:
-        sections.append(_fault_section(folder, clean, metrics))
-        sections.append(_severity_section(folder, clean))
-        sections += answer_sections(folder, clean)
-    sections.append(Section(title="Caveats", notes=[("", line) for line in caveats(metrics)]))
-    sections.append(
-        Section(
-            title="What the numbers mean",
-            notes=[
-                (
-                    "A record's label",
-                    "the class with the largest mean log-probability over its windows.",
-                ),
-                *[(name, f"{MEANING[name]}.") for name in clean],
-                ("LEAKY", f"{LEAKY_MEANING}."),
-                *[(METHODS[name], text) for name, text in METHOD_MEANING.items() if _has(metrics, name)],
-            ],
-            folded=True,
-        )
+
+
+def _meaning_section(metrics: Mapping[str, Any], clean: Mapping[str, Any]) -> Section:
+    return Section(
+        title="What the numbers mean",
+        notes=[
+            (
+                "A record's label",
+                "the class with the largest mean log-probability over its windows.",
+            ),
+            *[(name, f"{MEANING[name]}{_sensors(result)}.") for name, result in clean.items()],
+            ("LEAKY", f"{LEAKY_MEANING}."),
+            *[(METHODS[name], text) for name, text in METHOD_MEANING.items() if _has(metrics, name)],
+        ],
+        folded=True,
     )
-    if clean:
-        sections.append(_trust_section(folder, clean))
-    sections.append(_confusion_section(folder, metrics, ordered))
-    sections.append(
-        Section(
-            title="Files beside this page",
-            notes=[
-                ("metrics.json", "everything in numbers, with macro-F1, recall, calibration, settings and versions."),
-                ("predictions.csv", "what each method said of each test record."),
-                ("scores.csv and more", "the same numbers as tables, explained in docs/howto/report.md."),
-                ("models/", "the networks, one folder each, for diagnose evaluate and diagnose predict."),
-            ],
-            folded=True,
-        )
-    )
-    return [section for section in sections if section.text or section.table or section.notes or section.figures]
 
 
 def _fault_section(folder: Path, clean: Mapping[str, Any], metrics: Mapping[str, Any]) -> Section:
@@ -140,16 +156,6 @@ def _fault_section(folder: Path, clean: Mapping[str, Any], metrics: Mapping[str,
             *((name, confusions(result["methods"][model]["confusion"], names)) for name, result in clean.items()),
             *heads_notes(clean),
         ],
-    )
-
-
-def _severity_section(folder: Path, clean: Mapping[str, Any]) -> Section:
-    rows = {name: result["by_severity"] for name, result in clean.items() if result["by_severity"]}
-    if not rows:
-        return Section(title="How severe a fault must be")
-    return Section(
-        title="How severe a fault must be",
-        figures=_figures(folder, "severity.png", "recognised share against severity", severity_figure, rows),
     )
 
 
@@ -177,13 +183,19 @@ def _confusion_section(folder: Path, metrics: Mapping[str, Any], ordered: Sequen
         confusion = result["methods"][metrics["model"]]["confusion"]
         confusion_figure(folder / f"confusion_{name}.png", confusion, metrics["class_names"], title)
         figures.append((f"confusion_{name}.png", title))
-    return Section(title="Confusion matrices", figures=figures, folded=True)
+    return Section(title="Confusion matrices", figures=figures, side_by_side=True, folded=True)
 
 
 def _figures(folder: Path, name: str, caption: str, draw: Any, content: Any) -> list[tuple[str, str]]:
     """Draw one figure into the folder, for the page to show."""
     draw(folder / name, content)
     return [(name, caption)]
+
+
+def _sensors(result: Mapping[str, Any]) -> str:
+    """Which channels, where the test has others than the training."""
+    trained, tested = (", ".join(result["channels"][subset]) for subset in ("train", "test"))
+    return "" if trained == tested else f": trained on {trained}, tested on {tested}"
 
 
 def _has(metrics: Mapping[str, Any], method: str) -> bool:

@@ -7,6 +7,7 @@ from typing import Any
 
 import numpy as np
 
+from diagnose.novelty_report import novelty_caveats
 from diagnose.page import Card, Table
 
 FEW_UNITS = 10
@@ -18,10 +19,14 @@ METHODS = {
     "rms_threshold": "RMS threshold",
     "nearest_spectrum": "1-NN on spectra",
     "minirocket": "MiniRocket",
+    "level_kept": "network with RMS",
+    "oracle": "oracle",
     "label_shuffle": "label shuffle",
+    "sham": "sham",
     "chance": "chance",
 }
 RIVALS = ("indicators", "rms_threshold", "nearest_spectrum", "minirocket")
+MUST_BE_AT_CHANCE = {"label_shuffle": "label shuffle", "metadata_probe": "metadata", "sham": "sham"}
 METHOD_MEANING = {
     "indicators": "logistic regression or gradient boosting (chosen on validation units) on RMS, kurtosis, crest "
     "factor, FM4 and sideband ratio of every channel over the whole stretch of signal; it knows the speed and the "
@@ -31,6 +36,9 @@ METHOD_MEANING = {
     "windows.",
     "minirocket": "ridge regression on the shares of positive values of fixed convolutions (Dempster et al. 2021), "
     "mean over the windows; the penalty is chosen on validation units.",
+    "level_kept": "the same network on windows in m/s^2, their level not removed.",
+    "oracle": "the better of two models that are given each record's healthy twin; see Controls.",
+    "sham": "the same training on a data set of severity zero whose labels were kept; see Controls.",
     "label_shuffle": "the same training on shuffled labels. Chance must lie in its interval, which covers the units "
     "and the luck of the shuffle; if it lies below, something leaks.",
 }
@@ -63,14 +71,20 @@ def answer_card(name: str, result: Mapping[str, Any], model: str, meaning: str) 
         comparison = "better than" if better else "worse than" if worse else "not told from"
         verdict.append(f"{comparison} {METHODS[best]} ({others[best]:.2f})")
     leak = False
-    if "label_shuffle" in methods:
-        shuffled = methods["label_shuffle"]["balanced_accuracy"]
-        leak = shuffled["low"] > chance
-        verdict.append(
-            f"label shuffle ABOVE chance ({shuffled['mean']:.2f}): look for a leak"
-            if leak
-            else "label shuffle at chance"
-        )
+    if "oracle" in methods:
+        share, best = result["over_oracle"]["balanced_accuracy"], methods["oracle"]["balanced_accuracy"]
+        spread_of_share = f"{share['low']:.2f} to {share['high']:.2f}"
+        verdict.append(f"{share['mean']:.2f} ({spread_of_share}) of the oracle ({best['mean']:.2f})")
+    for key, control in MUST_BE_AT_CHANCE.items():
+        if key in methods:
+            found = methods[key]["balanced_accuracy"]
+            above_chance = found["low"] > chance
+            leak |= above_chance
+            verdict.append(
+                f"{control} ABOVE chance ({found['mean']:.2f}): look for a leak"
+                if above_chance
+                else f"{control} at chance"
+            )
     mark = "good" if above and not leak else "bad"
     text = _sentence(meaning if meaning.startswith("tested") else f"tested {meaning}")
     return Card(title=name, value=value, spread=spread, verdict="; ".join(verdict), meaning=text, mark=mark)
@@ -146,6 +160,7 @@ def caveats(metrics: Mapping[str, Any]) -> list[str]:
                 f"{name}: only {n_units} test unit(s). The interval shows the spread of these units and is too "
                 f"narrow for new ones; at least {FEW_UNITS} are advisable."
             )
+    lines += novelty_caveats(metrics["novelty"], FEW_UNITS)
     if metrics["settings"]["normalise"] == "rms":
         lines.append(
             "The network sees windows without their level, the indicators with it unless stated; "

@@ -12,6 +12,7 @@ from gensig.errors import ConfigError
 BASELINES = ("indicators", "indicators_without_level", "rms_threshold", "nearest_spectrum", "minirocket")
 DEVICES = ("auto", "cpu", "cuda")
 HEADS = ("severity", "gear")
+BOTH = "both"  # of normalise: without the level, and beside it a second training with it
 LEAST_ROCKET_FEATURES = 84  # one for each of the kernels
 
 
@@ -25,7 +26,9 @@ class TrainSettings:
     protocols: tuple[str, ...] | None
     classes: tuple[str, ...] | None
     channels: tuple[str, ...] | None
+    test_channels: tuple[str, ...] | None
     seeds: tuple[int, ...]
+    sampling_rate_hz: float | None
     window_samples: int
     stride_samples: int
     normalise: str
@@ -38,12 +41,16 @@ class TrainSettings:
     heads: tuple[str, ...]
     shuffle_control: bool
     n_seeds_control: int
+    metadata_probe: bool
+    oracle: str | bool
+    sham: str | None
     baselines: tuple[str, ...]
     features: str
     minirocket_features: int
     n_bootstrap: int
     n_threads: int | None
     device: str
+    tensorboard: bool
 
     def __post_init__(self) -> None:
         for name in (
@@ -59,16 +66,23 @@ class TrainSettings:
         _check_whole("minirocket_features", self.minirocket_features, least=LEAST_ROCKET_FEATURES)
         if self.n_threads is not None:
             _check_whole("n_threads", self.n_threads, least=1)
+        if self.sampling_rate_hz is not None:
+            _check_rate("sampling_rate_hz", self.sampling_rate_hz)
         for name in ("learning_rate", "weight_decay", "epoch_fraction"):
             _check_number(name, getattr(self, name))
-        for name in ("protocols", "classes", "channels", "seeds"):
+        for name in ("protocols", "classes", "channels", "test_channels", "seeds"):
             values = getattr(self, name)
             if values is not None and (not values or len(set(values)) < len(values)):
                 raise ConfigError(f"{name} must be a list of different values, at least one")
         for seed in self.seeds:
             _check_whole("seeds", seed, least=0)
-        if not isinstance(self.shuffle_control, bool):
-            raise ConfigError(f"shuffle_control must be true or false, not {self.shuffle_control!r}")
+        for name in ("shuffle_control", "tensorboard", "metadata_probe"):
+            if not isinstance(getattr(self, name), bool):
+                raise ConfigError(f"{name} must be true or false, not {getattr(self, name)!r}")
+        if self.oracle not in ("auto", False):
+            raise ConfigError(f"oracle must be auto or false, not {self.oracle!r}")
+        if self.sham is not None and (not isinstance(self.sham, str) or not self.sham):
+            raise ConfigError(f"sham must be the folder of a data set made with plan.sham=true, not {self.sham!r}")
         if len(set(self.baselines)) < len(self.baselines) or not set(self.baselines) <= set(BASELINES):
             raise ConfigError(
                 f"baselines must be false or a list of different names out of {', '.join(BASELINES)}, "
@@ -96,7 +110,7 @@ def settings_from(config: Mapping[str, Any]) -> TrainSettings:
     if unknown := sorted(set(config) - known):
         raise ConfigError(f"diagnose train knows no key '{unknown[0]}'")
     values = dict(config)
-    for name in ("protocols", "classes", "channels", "seeds"):
+    for name in ("protocols", "classes", "channels", "test_channels", "seeds"):
         values[name] = _as_tuple(name, values[name])
     if values["seeds"] is None:
         raise ConfigError("seeds must be a list of different values, at least one")
@@ -118,6 +132,11 @@ def _as_tuple(name: str, value: Any) -> tuple[Any, ...] | None:
 def _check_whole(name: str, value: Any, *, least: int) -> None:
     if isinstance(value, bool) or not isinstance(value, int) or value < least:
         raise ConfigError(f"{name} must be a whole number of at least {least}, not {value!r}")
+
+
+def _check_rate(name: str, value: Any) -> None:
+    if isinstance(value, bool) or not isinstance(value, int | float) or not 0 < value < float("inf"):
+        raise ConfigError(f"{name} must be null or a number of samples a second, not {value!r}")
 
 
 def _check_number(name: str, value: Any) -> None:

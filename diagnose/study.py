@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import functools
 import os
 import platform
 import sys
@@ -15,24 +16,30 @@ import numpy as np
 from numpy.typing import NDArray
 
 from diagnose.answers import protocol_answers
+from diagnose.at_rate import at_rate
+from diagnose.autoencoder import check_window_for_autoencoder
 from diagnose.calibration import calibration_scores
+from diagnose.controls import control_jobs, sham_methods, without_sham
 from diagnose.heads import head_scores
-from diagnose.jobs import Job, run_jobs
-from diagnose.metrics import SCORES, confusion_by_unit, recall, score_with_interval
+from diagnose.jobs import Job, Outcome, run_jobs
+from diagnose.metrics import SCORES, confusion_by_unit, ratio_with_interval, recall, score_with_interval
 from diagnose.model_io import data_fingerprint, model_description, save_model
 from diagnose.models import build_model, check_window
+from diagnose.novelty import NoveltyRun
+from diagnose.novelty_metrics import check_open_protocol, novelty_protocol_result, write_novelty
+from diagnose.oracle import chosen_oracle
 from diagnose.predictions import Prediction, write_predictions
-from diagnose.protocols import choose_protocols
-from diagnose.settings import BASELINES, TrainSettings
+from diagnose.protocols import OPEN_PROTOCOLS, channels_to_cross, choose_protocols
+from diagnose.settings import BOTH, TrainSettings
+from diagnose.tensorboard import need_tensorboard, write_scores
 from diagnose.train import device_of
 from diagnose.turns import check_turns, completed, n_points, wants_turns
-from diagnose.windows import SUBSETS, Task, plan_windows, subset_segments, task_of
+from diagnose.windows import NORMALISATIONS, SUBSETS, Task, check_names, plan_windows, subset_segments, task_of
 from gensig.errors import ConfigError
 from gensig.version import __version__
 
 METRICS_SCHEMA_VERSION = 1
 BOOTSTRAP_SEED = 20240607
-MAX_SEVERITY_BINS = 5
 
 
 def is_leaky(protocol: str) -> bool:
@@ -48,7 +55,7 @@ def plan_study(task: Task, settings: TrainSettings) -> tuple[tuple[str, ...], li
     ConfigError    for a protocol that does not exist or cannot be trained on, a device that does not exist, an empty
         subset or a window that does not fit
     """
-    wanted, _ = choose_protocols(task.dataset, settings.protocols)
+    wanted, _ = choose_protocols(task, settings.protocols)
     protocols = tuple(sorted(wanted, key=lambda name: (is_leaky(name), wanted.index(name))))
     labels = task.labels()
     for protocol in protocols:
@@ -59,32 +66,43 @@ def plan_study(task: Task, settings: TrainSettings) -> tuple[tuple[str, ...], li
             else:
                 plan_windows(segments, task.window_samples, task.stride_samples)
             present = np.unique(labels[segments.record])
-            if subset != "validation" and present.size < 2:
+            if protocol not in OPEN_PROTOCOLS and subset != "validation" and present.size < 2:
                 name = task.class_names[int(present[0])]
                 raise ConfigError(f"protocol {protocol}: one class only in its {subset} part ({name})")
+        if protocol in OPEN_PROTOCOLS:
+            check_open_protocol(task, protocol)
+    if "healthy_only" in protocols:
+        check_window_for_autoencoder(task.window_samples)
     model = build_model(settings.model, n_channels=len(task.channel_names), n_classes=len(task.class_names))
     n_read = n_points(settings.model) if wants_turns(settings.model) else task.window_samples
     check_window(model, len(task.channel_names), n_read)
     device_of(settings.device)
-    jobs = [Job(protocols=protocols, seed=None)] if settings.baselines else []
+    if settings.tensorboard:
+        need_tensorboard()
+    closed = tuple(name for name in protocols if name not in OPEN_PROTOCOLS)
+    jobs = [Job(protocols=closed, seed=None)] if settings.baselines and closed else []
     for protocol in protocols:
+        jobs += [Job(protocols=(protocol,), seed=None)] if protocol not in closed else []
         jobs += [Job(protocols=(protocol,), seed=seed) for seed in settings.seeds]
-        if settings.shuffle_control:
+        if settings.shuffle_control and protocol in closed:
             first = min(settings.seeds)
             jobs += [Job(protocols=(protocol,), seed=first + k, shuffled=True) for k in range(settings.n_seeds_control)]
-    return protocols, jobs
+    return protocols, jobs + control_jobs(task, settings, [name for name in closed if not is_leaky(name)])
 
 
 def task_from(dataset: Any, settings: TrainSettings) -> Task:
     """Task that the settings describe on an open data set."""
-    return task_of(
-        dataset,
+    check_names("normalisation", (settings.normalise,), (*NORMALISATIONS, BOTH))
+    task = task_of(
+        at_rate(dataset, settings.sampling_rate_hz),
         window_samples=settings.window_samples,
         stride_samples=settings.stride_samples,
-        normalise=settings.normalise,
+        normalise="rms" if settings.normalise == BOTH else settings.normalise,
         classes=settings.classes,
         channels=settings.channels,
     )
+    crossed = channels_to_cross(dataset.channel_names, settings.channels, settings.test_channels)
+    return replace(task, cross_channels=crossed)
 
 
 def settings_for(dataset: Any, settings: TrainSettings) -> TrainSettings:
@@ -112,21 +130,40 @@ def run_study(
     """
     started = time.perf_counter()
 
-    def report(predictions: list[Prediction]) -> None:
+    def report(predictions: list[Outcome]) -> None:
         last = predictions[-1]
-        baselines = last.method in BASELINES
-        name = "baselines" if baselines else f"{last.protocol}, {last.method}, seed {last.seed}: {last.detail}"
-        on_done(name)
+        if isinstance(last, NoveltyRun) or last.best_epoch:
+            on_done(f"{last.protocol}, {last.method}, seed {last.seed}: {last.detail}")
+        else:
+            on_done(", ".join(dict.fromkeys(one.method for one in predictions)))
 
     n_workers = settings.n_threads or _n_cores()
-    predictions = run_jobs(task, settings, jobs, n_workers=n_workers, on_done=report)
+    outcomes = run_jobs(task, settings, jobs, n_workers=n_workers, on_done=report)
+    predictions = [outcome for outcome in outcomes if isinstance(outcome, Prediction)]
+    novelty = [outcome for outcome in outcomes if isinstance(outcome, NoveltyRun)]
     for prediction in predictions:
         if prediction.weights is not None:
             target = folder / "models" / f"{prediction.protocol}-seed{prediction.seed}"
-            known = {} if prediction.domain is None else prediction.domain.tensors()
+            parts = [part for part in (prediction.domain, prediction.healthy) if part is not None]
+            known = {name: tensor for part in parts for name, tensor in part.tensors().items()}
             save_model(target, prediction.weights | known, model_description(task, settings, prediction))
-    write_predictions(folder / "predictions.csv", task, predictions)
-    results = {protocol: _protocol_result(task, settings, protocol, predictions) for protocol in protocols}
+    own = without_sham(predictions)
+    write_predictions(folder / "predictions.csv", task, own)
+    if novelty:
+        write_novelty(folder / "novelty.csv", task, novelty)
+    results = {name: _protocol_result(task, settings, name, own) for name in protocols if name not in OPEN_PROTOCOLS}
+    shams = sham_methods(
+        task, settings, predictions, functools.partial(score_predictions, n_bootstrap=settings.n_bootstrap)
+    )
+    for protocol, methods in shams.items():
+        results[protocol]["methods"] |= methods
+    novelty_results = {
+        name: novelty_protocol_result(task, name, novelty, n_bootstrap=settings.n_bootstrap, seed=BOOTSTRAP_SEED)
+        for name in protocols
+        if name in OPEN_PROTOCOLS
+    }
+    if settings.tensorboard:
+        write_scores(folder, results)
     return {
         "metrics_schema_version": METRICS_SCHEMA_VERSION,
         "data": str(task.dataset.folder),
@@ -139,7 +176,8 @@ def run_study(
         "model": str(settings.model.get("name", "network")),
         "settings": {**asdict(settings), "model": dict(settings.model)},
         "protocols": results,
-        "protocols_left_out": choose_protocols(task.dataset, settings.protocols)[1],
+        "novelty": novelty_results,
+        "protocols_left_out": choose_protocols(task, settings.protocols)[1],
         "duration_s": round(time.perf_counter() - started, 1),
         "environment": _environment(),
     }
@@ -161,11 +199,7 @@ def score_predictions(
     n_bootstrap : resamples of the units
     shuffled : see `diagnose.metrics.score_with_interval`
     """
-    labels, unit = task.labels(), np.asarray(task.dataset.column("unit_id"))
-    n_classes = len(task.class_names)
-    confusion = np.stack(
-        [confusion_by_unit(labels[record], predicted, unit[record], n_classes) for record, predicted in runs]
-    )
+    confusion = _confusion(task, runs)
     rng = np.random.default_rng(BOOTSTRAP_SEED)
     total = confusion.sum(axis=(0, 1))
     scores = {
@@ -178,38 +212,13 @@ def score_predictions(
     return {**scores, "confusion": total.tolist(), "recall": shares}
 
 
-def severity_rows(
-    task: Task, runs: Sequence[tuple[NDArray[np.integer], NDArray[np.integer]]]
-) -> list[dict[str, float | int | str]]:
-    """Share of faulty test records given their own class, by class and severity, mean over the seeds.
-
-    Empty where severities do not vary. More than `MAX_SEVERITY_BINS` values of a class become that many equal groups.
-    """
-    labels = task.labels()
-    severity = np.asarray(task.dataset.column("severity"), dtype=float)
-    record = runs[0][0]
-    hits = np.mean([predicted == labels[record] for record, predicted in runs], axis=0)
-    rows: list[dict[str, float | int | str]] = []
-    for index, name in enumerate(task.class_names):
-        mask = (labels[record] == index) & (severity[record] > 0)
-        values = np.unique(severity[record][mask])
-        if values.size > MAX_SEVERITY_BINS:
-            order = np.argsort(severity[record][mask], kind="stable")
-            groups = [np.flatnonzero(mask)[part] for part in np.array_split(order, MAX_SEVERITY_BINS)]
-        else:
-            groups = [np.flatnonzero(mask & (severity[record] == value)) for value in values]
-        for group in groups if values.size > 1 else []:
-            inside = severity[record][group]
-            rows.append(
-                {
-                    "class": name,
-                    "severity_low": float(inside.min()),
-                    "severity_high": float(inside.max()),
-                    "n_records": int(group.size),
-                    "recall": float(hits[group].mean()),
-                }
-            )
-    return rows
+def _confusion(task: Task, runs: Sequence[tuple[NDArray[np.integer], NDArray[np.integer]]]) -> NDArray[np.int64]:
+    """Counts (seed, unit, true class, predicted class)."""
+    labels, unit = task.labels(), np.asarray(task.dataset.column("unit_id"))
+    n_classes = len(task.class_names)
+    return np.stack(
+        [confusion_by_unit(labels[record], predicted, unit[record], n_classes) for record, predicted in runs]
+    )
 
 
 def _protocol_result(
@@ -231,12 +240,24 @@ def _protocol_result(
         "majority_accuracy": float(counts.max() / counts.sum()),
     }
     parts = {subset: np.unique(subset_segments(task, protocol, subset).record) for subset in SUBSETS}
+    oracle = chosen_oracle(task, mine)
+    over_oracle: dict[str, Any] = {}
+    if oracle is not None:
+        methods["oracle"] = {**methods[oracle], "chosen": oracle}
+        found = [
+            _confusion(task, [(run.record, run.predicted) for run in mine if run.method == name])
+            for name in (network[0].method, oracle)
+        ]
+        for name in SCORES:
+            rng = np.random.default_rng(BOOTSTRAP_SEED)
+            over_oracle[name] = ratio_with_interval(name, *found, n_bootstrap=settings.n_bootstrap, rng=rng)
     return {
         "leaky": is_leaky(protocol),
+        "channels": {subset: list(task.part(protocol, subset).channel_names) for subset in ("train", "test")},
         "n_records": {subset: int(record.size) for subset, record in parts.items()},
         "n_units": {subset: int(np.unique(unit[record]).size) for subset, record in parts.items()},
         "methods": methods,
-        "by_severity": severity_rows(task, [(run.record, run.predicted) for run in network]),
+        "over_oracle": over_oracle,
         "validation_loss": [list(run.validation_loss) for run in network],
         "best_epoch": [run.best_epoch for run in network],
         "last_epoch": _last_epoch(task, settings, network),

@@ -56,7 +56,7 @@ def train_network(
     n_classes: int,
     settings: TrainSettings,
     seed: int,
-    on_epoch: Callable[[], None] = lambda: None,
+    on_epoch: Callable[[int, float, float], None] = lambda epoch, training, validation: None,
 ) -> Training:
     """Train with early stopping on the validation units' loss.
 
@@ -67,7 +67,7 @@ def train_network(
     n_classes : of the task
     settings : epochs, patience, batch size, learning rate, weight decay, share drawn an epoch, device
     seed : decides initial weights, order, window starts and dropout; same seed, threads and machine, same weights
-    on_epoch : called after each epoch
+    on_epoch : told number, mean training loss and validation loss of each epoch
 
     Raises
     ------
@@ -93,6 +93,7 @@ def train_network(
         best_weights, best_epoch = copy.deepcopy(model.state_dict()), 0
         for epoch in range(1, settings.epochs + 1):
             model.train()
+            total = 0.0
             for batch in np.array_split(rng.permutation(len(train))[:n_drawn], n_batches):
                 windows = torch.from_numpy(train.cut(batch, rng)).to(device)
                 label = torch.from_numpy(train.label[batch]).to(device)
@@ -103,9 +104,10 @@ def train_network(
                 loss.backward()
                 optimizer.step()
                 schedule.step()
+                total += float(loss.detach())
             log_probability = _log_probabilities(model, held_out)
             losses.append(record_loss(log_probability, validation))
-            on_epoch()
+            on_epoch(epoch, total / n_batches, losses[-1])
             if np.isfinite(losses[-1]) and losses[-1] <= min(losses):
                 best_weights, best_epoch = copy.deepcopy(model.state_dict()), epoch
                 best_log_probability = log_probability

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import difflib
 from collections.abc import Callable, Mapping, Sequence
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
@@ -17,6 +17,7 @@ if TYPE_CHECKING:
 
 SUBSETS = ("train", "validation", "test")
 NORMALISATIONS = ("rms", "none")
+CROSS_SENSOR = "cross_sensor"  # the units of by_unit, tested on other channels
 IntArray = NDArray[np.integer]
 FloatArray = NDArray[np.floating]
 
@@ -32,6 +33,7 @@ class Task:
     channel_names : in the order of the network's input
     window_samples, stride_samples : length of a window and step from one to the next, in samples
     normalise : ``"rms"`` divides each channel of each window by its RMS, ``"none"`` keeps m/s^2
+    cross_channels : channels that `CROSS_SENSOR` trains and tests on, or in one line why there are none
     """
 
     dataset: Dataset
@@ -40,6 +42,7 @@ class Task:
     window_samples: int
     stride_samples: int
     normalise: str
+    cross_channels: tuple[tuple[str, ...], tuple[str, ...]] | str = "no channels to test on are named"
 
     def __post_init__(self) -> None:
         check_names("class", self.class_names, self.dataset.class_names)
@@ -55,6 +58,20 @@ class Task:
         """Index of each channel in the data set."""
         available = list(self.dataset.channel_names)
         return [available.index(name) for name in self.channel_names]
+
+    def part(self, protocol: str, subset: str) -> Task:
+        """The task as one subset of a protocol sees it: with channels of its own in `CROSS_SENSOR`.
+
+        Raises
+        ------
+        ConfigError    for `CROSS_SENSOR` of a task that has no channels to test on
+        """
+        if protocol != CROSS_SENSOR:
+            return self
+        if isinstance(self.cross_channels, str):
+            raise ConfigError(f"protocol {protocol}: {self.cross_channels}")
+        trained, tested = self.cross_channels
+        return replace(self, channel_names=tested if subset == "test" else trained)
 
     def labels(self) -> IntArray:
         """(record,) index into `class_names`; -1 for another class and for a record that failed."""
@@ -100,12 +117,13 @@ def subset_segments(task: Task, protocol: str, subset: str) -> Segments:
     ------
     ConfigError    for a protocol or subset that does not exist, or a subset without records
     """
-    check_names("protocol", (protocol,), task.dataset.protocols)
+    stored = "by_unit" if protocol == CROSS_SENSOR else protocol
+    check_names("protocol", (stored,), task.dataset.protocols)
     check_names("subset", (subset,), SUBSETS)
     labels, length = task.labels(), n_samples(task.dataset)
     rows = [
         (record, int(np.ceil(start * length - 1e-6)), int(np.floor(stop * length + 1e-6)))
-        for record, start, stop in task.dataset.split(protocol).get(subset, [])
+        for record, start, stop in task.dataset.split(stored).get(subset, [])
         if labels[record] >= 0
     ]
     if not rows:
@@ -214,12 +232,12 @@ def load_windows(task: Task, segments: Segments, *, read: Read | None = None) ->
     )
 
 
-def read_signal(task: Task, record: int, start: int, stop: int) -> NDArray[np.float32]:
+def read_signal(task: Task, record: int, start: int, stop: int, *, name: str = "acceleration") -> NDArray[np.float32]:
     """(channel, sample) m/s^2 of the task's channels; refuses values that are not finite."""
-    signal = np.asarray(task.dataset.signals(record, start, stop, task.channels), dtype=np.float32)
+    signal = np.asarray(task.dataset.signals(record, start, stop, task.channels, name=name), dtype=np.float32)
     if not np.isfinite(signal).all():
-        name = task.dataset.column("record_id")[record]
-        raise DatasetError(f"record {name} of {task.dataset.folder}: its signal holds values that are not finite")
+        which = task.dataset.column("record_id")[record]
+        raise DatasetError(f"record {which} of {task.dataset.folder}: its signal holds values that are not finite")
     return signal
 
 

@@ -50,6 +50,21 @@ def _stiffness(parser: argparse.ArgumentParser) -> None:
     parser.add_argument("--plot", metavar="FILE", help="write a figure (PNG, SVG or PDF)")
 
 
+def _modify_flank(parser: argparse.ArgumentParser) -> None:
+    _overrides(parser)
+    parser.add_argument("--out", required=True, metavar="FILE", help="option to write: DIR/modification/NAME.yaml")
+    parser.add_argument(
+        "--torques", type=float, nargs="+", metavar="NM", help="of the pinion (default: the configured)"
+    )
+    parser.add_argument(
+        "--misalignments", type=float, nargs="+", default=[0.0], metavar="UM", help="over the face (default: 0)"
+    )
+    parser.add_argument("--points", type=int, default=7, metavar="N", help="of the front; 1: least ripple (default: 7)")
+    parser.add_argument("--seed", type=int, default=0, metavar="N", help="of the search (default: 0)")
+    parser.add_argument("--json", metavar="FILE", help="write the front")
+    parser.add_argument("--plot", metavar="FILE", help="write a figure (PNG, SVG or PDF)")
+
+
 def _simulate(parser: argparse.ArgumentParser) -> None:
     _overrides(parser)
     parser.add_argument("--from", dest="folder", metavar="DIR", help="a record of this data set, made again")
@@ -175,6 +190,21 @@ VERBS: dict[str, Verb] = {
         "gensig export runs/quickstart --to parquet --out quickstart.parquet",
         "gensig.commands.export:export",
         _export,
+    ),
+    "transmission-error": Verb(
+        "loaded flanks slice by slice: transmission error, line load, pressure",
+        "gensig transmission-error system=helical_pair modification=beihang_both --plot te.png\n"
+        "  gensig transmission-error gear=xiamen_23_84 operating.torque_nm=20 --json te.json",
+        "gensig.commands.flanks:transmission_error",
+        _stiffness,
+    ),
+    "modify-flank": Verb(
+        "reliefs and crowning that are best for your torques and misalignments",
+        "gensig modify-flank system=helical_pair --out mine/modification/best.yaml\n"
+        "  gensig modify-flank system=helical_pair --torques 100 178 --misalignments -5 0 5 --points 5 "
+        "--out mine/modification/robust.yaml --plot front.png",
+        "gensig.commands.modify:modify_flank",
+        _modify_flank,
     ),
     "simulate": Verb(
         "one record: signal, spectrum, figure",

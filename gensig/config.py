@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import copy
 import difflib
 import warnings
 from collections.abc import Mapping, Sequence
@@ -76,7 +77,10 @@ def read_request(overrides: Sequence[str], *, config_dir: str | Path | None = No
         return {**fault, "vary": {key: spec for key, spec in vary.items() if f"fault.{key}" not in mine}}
 
     selected = _with_whole_parts(class_fault(None), config_dir)
-    classes = {name: _with_whole_parts(class_fault(name), config_dir) for name in names}
+    if "fault" in typed or not plan["classes"]:  # composing anew would give the same, as slowly
+        classes = {name: copy.deepcopy(selected) for name in names}
+    else:
+        classes = {name: _with_whole_parts(class_fault(name), config_dir) for name in names}
     if unused:
         raise ConfigError(_no_such_fault_key(sorted(unused)[0], selected))
     plan["classes"] = names
@@ -103,7 +107,7 @@ def _with_whole_parts(fault: dict[str, Any], config_dir: str | Path | None) -> d
 
 
 SECTIONS = (
-    "system", "gear", "material", "fault", "operating", "sensing", "plan", "executor",
+    "system", "gear", "material", "modification", "fault", "operating", "sensing", "plan", "executor",
     "mesh", "solver", "quality", "dataset",
 )  # fmt: skip
 PLAIN_KEYS = ("seed", "out")

@@ -263,7 +263,7 @@ def record_bytes(config: Mapping[str, Any], *, as_stored: bool = False) -> int:
 
 def check_switches(config: Mapping[str, Any]) -> None:
     """Raise ConfigError for a switch of ``dataset`` that is neither true nor false."""
-    switches = ("clean", "source", "operating", "mesh_state", "detectability")
+    switches = ("clean", "source", "operating", "mesh_state", "detectability", "healthy_twin")
     for key in (*(f"store_{switch}" for switch in switches), *SWITCHES):
         if not isinstance(config["dataset"][key], bool):
             raise ConfigError(f"dataset.{key} = {config['dataset'][key]!r} must be true or false")

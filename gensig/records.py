@@ -16,6 +16,7 @@ from gensig.rows import (
     MISSING,
     record_system,
     row_clean,
+    row_healthy_twin,
     row_instrument,
     row_noisy,
     row_run,
@@ -24,7 +25,8 @@ from gensig.rows import (
     shaken,
     twin_start,
 )
-from gensig.sensing.chain import detectability
+from gensig.sensing.chain import Sensing, detectability
+from gensig.sensing.instrument import Instrument
 from gensig.systems.lead_in import simulate_with_lead_in
 from gensig.systems.mesh_signals import mesh_signals
 from gensig.systems.operation import operating_signals
@@ -66,7 +68,7 @@ def simulate_records(config: Mapping[str, Any], rows: Sequence[Mapping[str, Any]
     keys = _twin_keys(config, rows)
     places, further = _missing_twins(config, runs, rows, keys)
     # the same machines without their faults, to see what the faults change
-    asked = config["dataset"]["store_detectability"]
+    asked = config["dataset"]["store_detectability"] or config["dataset"]["store_healthy_twin"]
     sound = {place: replace(run, faults=(), tell_mesh=False) for place, run in enumerate(runs) if asked and run.faults}
     everything = [*runs, *further, *sound.values()]
     results = simulate_with_lead_in(everything)
@@ -101,15 +103,20 @@ def _finish(
     sensing, instrument = system.sensing, row_instrument(config, system, row)
     n_sensors, n_samples = len(sensing.channel_names), round(system.operating.duration * sensing.sampling_rate)
     measured = None if isinstance(result, SimulationError) else row_clean(config, row, instrument, result.acceleration)
-    noise_power: Array | SimulationError = np.zeros(n_sensors)
-    if sensing.snr is not None and measured is not None:
-        reference = _TWINS[twin] if sensing.snr_reference == "healthy_twin" else instrument.power(measured)
-        factor = sensing.noise_factor(sensing.snr)
-        noise_power = reference if isinstance(reference, SimulationError) else reference * factor
-    problem = next((one for one in (result, noise_power) if isinstance(one, SimulationError)), None)
-    if isinstance(result, SimulationError) or isinstance(noise_power, SimulationError) or measured is None:
+    noise_power = None if measured is None else _noise_power(sensing, twin, instrument, measured)
+    healthy: Array | SimulationError | None = None
+    if config["dataset"]["store_healthy_twin"]:
+        healthy = _healthy_twin(config, row, twin, instrument, sound)
+    problem = next((one for one in (result, noise_power, healthy) if isinstance(one, SimulationError)), None)
+    if (
+        problem is not None
+        or not isinstance(result, CleanRecord)
+        or not isinstance(noise_power, np.ndarray)
+        or measured is None
+    ):
         source = np.full((len(sensing.channels), n_samples), MISSING)
         noisy = clean = np.full((n_sensors, n_samples), MISSING)
+        healthy = None if healthy is None else clean
         noise_power = np.full(n_sensors, MISSING)
         told = {"status": "failed", "status_reason": str(problem), "speed_rpm": MISSING, "mesh_frequency_hz": MISSING}
     else:
@@ -127,7 +134,8 @@ def _finish(
             "integration_check": result.integration_check,
             **recorded,
         }
-        if isinstance(sound, CleanRecord) and sensing.has_white_noise:
+        wanted = config["dataset"]["store_detectability"] and sensing.has_white_noise
+        if wanted and isinstance(sound, CleanRecord):
             told["detectability"] = detectability(
                 clean - row_clean(config, row, instrument, sound.acceleration), noise_power
             )
@@ -139,6 +147,8 @@ def _finish(
     }
     if config["dataset"]["store_clean"]:
         signals["acceleration_clean"] = clean.astype(np.float32)
+    if isinstance(healthy, np.ndarray):
+        signals["healthy_twin"] = healthy.astype(np.float32)
     if config["dataset"]["store_source"]:
         signals["acceleration_source"] = source.astype(np.float32)
     if config["dataset"]["store_operating"]:
@@ -149,6 +159,29 @@ def _finish(
         signals |= mesh_signals(result.mesh if isinstance(result, CleanRecord) else None, n_samples)
     columns = {key: value for key, value in row.items() if key not in ("shard", "row")}
     return Record(signals=signals, values={**columns, **told})
+
+
+def _noise_power(sensing: Sensing, twin: TwinKey, instrument: Instrument, signal: Array) -> Array | SimulationError:
+    """Mean square of the noise that a signal gets, (sensor,)."""
+    if sensing.snr is None:
+        return np.zeros(len(signal))
+    reference = _TWINS[twin] if sensing.snr_reference == "healthy_twin" else instrument.power(signal)
+    return reference if isinstance(reference, SimulationError) else reference * sensing.noise_factor(sensing.snr)
+
+
+def _healthy_twin(
+    config: Mapping[str, Any],
+    row: Mapping[str, Any],
+    twin: TwinKey,
+    instrument: Instrument,
+    sound: CleanRecord | SimulationError | None,
+) -> Array | SimulationError | None:
+    """What the sensors report of the same record without its faults; nothing in it depends on the fault."""
+    if not isinstance(sound, CleanRecord):
+        return sound
+    clean = instrument.measure(sound.acceleration)
+    power = _noise_power(instrument.sensing, twin, instrument, clean)
+    return power if isinstance(power, SimulationError) else row_healthy_twin(config, row, instrument, clean, power)
 
 
 def signal_shapes(config: Mapping[str, Any], system: SpurPair) -> dict[str, tuple[int, ...]]:
@@ -163,6 +196,8 @@ def signal_shapes(config: Mapping[str, Any], system: SpurPair) -> dict[str, tupl
     }
     if dataset["store_clean"]:
         shapes["acceleration_clean"] = (n_channels, n_samples)
+    if dataset["store_healthy_twin"]:
+        shapes["healthy_twin"] = (n_channels, n_samples)
     if dataset["store_source"]:
         shapes["acceleration_source"] = (len(system.sensing.channels), n_samples)
     if dataset["store_operating"]:

@@ -6,6 +6,7 @@ import copy
 import json
 from collections.abc import Mapping
 from enum import IntEnum
+from functools import lru_cache
 from typing import Any
 
 import numpy as np
@@ -14,8 +15,9 @@ from numpy.typing import NDArray
 from gensig.errors import ConfigError, SimulationError
 from gensig.faults.base import Fault
 from gensig.faults.registry import read_faults
+from gensig.geometry.gear import Gear
 from gensig.sensing.instrument import Instrument, draw_instrument
-from gensig.sensing.manufacturing import Gearbox, Specimen, draw_gearbox, draw_specimen, with_damping_ratio
+from gensig.sensing.manufacturing import Gearbox, Quality, Specimen, draw_gearbox, draw_specimen, with_damping_ratio
 from gensig.systems.nuisances import with_nuisances
 from gensig.systems.registry import read_system
 from gensig.systems.shaft_sensors import shaft_signals
@@ -60,6 +62,7 @@ class Stream(IntEnum):
     SUPPORT = 14
     DROPPED = 15
     TACHO = 16
+    HEALTHY_TWIN = 17
 
 
 def stream(seed: int, cause: Stream, index: int = 0) -> np.random.Generator:
@@ -103,6 +106,19 @@ def row_noisy(
     sensor = instrument.sensing.sensor
     too_many = int(sensor is not None and clipped > sensor.max_clipped_fraction)
     return sent, {"clipped_fraction": clipped, "clipped": too_many, "dropped_fraction": dropped}
+
+
+def row_healthy_twin(
+    config: Mapping[str, Any], row: Mapping[str, Any], instrument: Instrument, clean: Array, noise_power: Array
+) -> Array:
+    """What the sensors of a row report of its machine without faults, with drift, noise and losses of its own.
+
+    ``clean`` (sensor, sample) m/s2 is before drift. No draw is shared with the record: else their difference would be
+    free of noise.
+    """
+    drift, noise, dropped = _row_stream(config, row, Stream.HEALTHY_TWIN).spawn(3)
+    noisy, _ = instrument.record(clean * instrument.drift(clean.shape[1], drift), noise_power, noise)
+    return instrument.sent(noisy, dropped)[0]
 
 
 def _row_stream(config: Mapping[str, Any], row: Mapping[str, Any], cause: Stream) -> np.random.Generator:
@@ -200,9 +216,14 @@ def _unit(config: Mapping[str, Any], system: SpurPair, row: Mapping[str, Any]) -
         stream(seed, Stream.GEARBOX, gearbox), len(system.sensing.channels), quality, system.sensing.gain_scatter
     )
     return (
-        draw_specimen(stream(seed, Stream.SPECIMEN, specimen), system.pair.pinion, system.pair.wheel, quality),
+        _specimen(seed, specimen, system.pair.pinion, system.pair.wheel, quality),
         with_damping_ratio(box, stream(seed, Stream.SUPPORT, gearbox), quality),
     )
+
+
+@lru_cache(maxsize=32)  # the records of a unit share it
+def _specimen(seed: int, number: int, pinion: Gear, wheel: Gear, quality: Quality) -> Specimen:
+    return draw_specimen(stream(seed, Stream.SPECIMEN, number), pinion, wheel, quality)
 
 
 def replace_key(config: dict[str, Any], key: str, value: float) -> None:

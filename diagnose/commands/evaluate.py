@@ -17,12 +17,14 @@ Evaluate a trained network on a data set.
   out=DIR          optional: receives metrics.json and confusion.png; must not exist or be empty
   protocol=NAME    optional: judge on a part of this split of the data set
   subset=NAME      optional: which part (train, validation, test); default test
+  channels=A,B     optional: channels in place of those it was trained on, as many, in their order
 
 Without protocol: the test part of the network's own split on the data set it was trained on, all records elsewhere."""
 EXAMPLE = """\
-example:
-  diagnose evaluate data=runs/other model_dir=runs/report/models/by_unit-seed0"""
-KEYS = ("data", "model_dir", "out", "protocol", "subset")
+examples:
+  diagnose evaluate data=runs/other model_dir=runs/report/models/by_unit-seed0
+  diagnose evaluate data=runs/other model_dir=runs/report/models/by_unit-seed0 channels=wheel_x,wheel_y"""
+KEYS = ("data", "model_dir", "out", "protocol", "subset", "channels")
 
 
 def run(words: Sequence[str]) -> int:
@@ -41,8 +43,10 @@ def run(words: Sequence[str]) -> int:
     model, description = load_model(values["model_dir"])
     dataset = open_dataset(values["data"])
     protocol, subset = values.get("protocol"), values.get("subset")
-    result = evaluate_model(model, description, dataset, protocol=protocol, subset=subset)
+    channels = values["channels"].strip("[]").split(",") if "channels" in values else None
+    result = evaluate_model(model, description, dataset, protocol=protocol, subset=subset, channels=channels)
     print(f"{result['n_records']} records of {result['n_units']} unit(s): {result['part']}")
+    print(f"channels {', '.join(result['channel_names'])}")
     for name in ("balanced_accuracy", "macro_f1"):
         score = result[name]
         print(f"{name} {score['mean']:.3f}, 95 % interval over units {score['low']:.3f} to {score['high']:.3f}")

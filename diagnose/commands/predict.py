@@ -9,16 +9,20 @@ from diagnose.commands.parser import verb_parser
 HELP = """\
 Class probabilities of one recording, with a flag for what is unlike the training data.
 
-The recording is resampled to the model's rate; one with less bandwidth is refused. It is judged in windows of the
-model's length; order tracking is not there yet: take a constant speed."""
+A model listens in time: to windows of its length, at its rate, of a speed that does not change within them. The
+recording is resampled to that rate; one with less bandwidth is refused. Where the speed wanders, order tracking plays
+the recording at one speed, its own mean or --to-speed: with --tacho by the pulses of the driving shaft, with --teeth
+and --speed-rpm by the mesh."""
 EXAMPLE = """\
 exit status:
   0    predicted, and like the training data (or the model is too old to tell)
   2    a mistake: one line says which
   3    predicted, but out of distribution: do not rely on the class
 
-example:
-  diagnose predict --model runs/report/models/by_unit-seed0 housing.wav --channels channel_1 --speed-rpm 1500"""
+examples:
+  diagnose predict --model runs/report/models/by_unit-seed0 housing.wav --channels channel_1 --speed-rpm 1500
+  diagnose predict --model runs/report/models/by_unit-seed0 runup.csv --tacho pulses
+  diagnose predict --model runs/report/models/by_unit-seed0 bench.csv --teeth 23 84 --speed-rpm 1500"""
 OUT_OF_DISTRIBUTION = 3
 
 
@@ -29,6 +33,11 @@ def run(words: Sequence[str]) -> int:
     parser.add_argument("--model", required=True, metavar="DIR", help="folder that diagnose train wrote below models/")
     parser.add_argument("--sampling-rate", type=float, metavar="HZ", help="samples a second, where the file is silent")
     parser.add_argument("--speed-rpm", type=float, metavar="RPM", help="of the driving shaft: was it trained at such?")
+    parser.add_argument("--teeth", nargs=2, type=int, metavar=("DRIVING", "DRIVEN"), help="was it trained at such?")
+    parser.add_argument("--tacho", metavar="CHANNEL", help="pulses of the driving shaft, to follow its speed")
+    parser.add_argument("--pulses-per-turn", type=int, default=1, metavar="N", help="of --tacho (default: 1)")
+    parser.add_argument("--to-speed", type=float, metavar="RPM", help="play it at this speed of the training instead")
+    parser.add_argument("--as-recorded", action="store_true", help="no order tracking, even with --teeth or --tacho")
     parser.add_argument("--channels", nargs="+", metavar="NAME", help="for the model's channels, in their order")
     parser.add_argument("--unit", default="m/s2", help="m/s2 or g, where the column does not say (default: m/s2)")
     parser.add_argument("--array", metavar="NAME", help="array of a .npz, .h5 or .mat file (default: acceleration)")
@@ -41,6 +50,11 @@ def run(words: Sequence[str]) -> int:
         file=arguments.recording,
         sampling_rate=arguments.sampling_rate,
         speed_rpm=arguments.speed_rpm,
+        teeth=None if arguments.teeth is None else tuple(arguments.teeth),
+        tacho=arguments.tacho,
+        pulses_per_turn=arguments.pulses_per_turn,
+        as_recorded=arguments.as_recorded,
+        to_speed_rpm=arguments.to_speed,
         channels=None if arguments.channels is None else tuple(arguments.channels),
         unit=arguments.unit,
         array=arguments.array,

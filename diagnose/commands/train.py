@@ -23,6 +23,7 @@ examples:
   diagnose train data=runs/quickstart out=runs/report
   diagnose train data=runs/quickstart out=runs/report protocols=[by_unit] seeds=[0,1,2,3,4] epochs=30
   diagnose train data=runs/quickstart out=runs/cross protocols=[cross_speed,cross_torque,unseen_severity_outer]
+  diagnose train data=runs/quickstart out=runs/novelty protocols=[healthy_only,open_set,cross_sensor]
   diagnose train -m data=runs/quickstart out=runs/levels normalise=rms,none"""
 
 
@@ -66,6 +67,7 @@ def _train_one(config: dict[str, Any]) -> None:
     settings = settings_from(config)
     out = Path(settings.out)
     refuse_existing(out)
+    from diagnose.novelty_report import novelty_tables
     from diagnose.progress import progress
     from diagnose.protocols import choose_protocols
     from diagnose.report import result_table, write_report
@@ -75,11 +77,11 @@ def _train_one(config: dict[str, Any]) -> None:
     task = task_from(open_dataset(settings.data), settings)
     settings = settings_for(task.dataset, settings)
     protocols, jobs = plan_study(task, settings)
-    for name, reason in choose_protocols(task.dataset, settings.protocols)[1].items():
+    for name, reason in choose_protocols(task, settings.protocols)[1].items():
         print(f"protocol {name} is left out: {reason}", file=sys.stderr, flush=True)
     out.mkdir(parents=True, exist_ok=True)
     with progress(len(jobs)) as on_done:
         metrics = run_study(task, settings, out, protocols=protocols, jobs=jobs, on_done=on_done)
     page = write_report(out, metrics)
-    print("\n".join(result_table(metrics)))
+    print("\n".join([*result_table(metrics), *novelty_tables(metrics["novelty"])]))
     print(f"report: {page}")

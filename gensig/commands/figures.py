@@ -34,7 +34,7 @@ def plot_stiffness(system: SpurPair, curves: StiffnessCurves, faults: Sequence[F
         f"{pair.pinion.n_teeth}/{pair.wheel.n_teeth} teeth, contact ratio {pair.transverse_contact_ratio:.3f}, "
         f"{system.operating.torque:g} N m, mesh.law={system.mesh.law}, pair_coupling={system.mesh.pair_coupling}"
     )
-    _save(figure, path)
+    save(figure, path)
 
 
 def _single_pair(axes: Any, curves: StiffnessCurves, faults: Sequence[Fault]) -> None:
@@ -145,10 +145,11 @@ def plot_record(system: SpurPair, acceleration: NDArray[np.float32], values: dic
         f"{values['label_name']}, severity {values['severity']:.2f}: {values['speed_rpm']:.1f} r/min, "
         f"{values['torque_nm']:.3g} N m"
     )
-    _save(figure, path)
+    save(figure, path)
 
 
-def _save(figure: Any, path: Path) -> None:
+def save(figure: Any, path: Path) -> None:
+    """Write a figure and forget it."""
     figure.savefig(path, dpi=130)
     pyplot.close(figure)
 

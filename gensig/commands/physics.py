@@ -15,7 +15,7 @@ from gensig.commands.console import replaced_file
 from gensig.config import read_request
 from gensig.errors import ConfigError
 from gensig.faults.registry import read_faults, without_vary
-from gensig.systems.registry import read_system
+from gensig.systems.registry import SLICED, read_system
 from gensig.systems.spur_pair import SpurPair, StiffnessCurves
 
 if TYPE_CHECKING:
@@ -38,6 +38,10 @@ def stiffness(arguments: Namespace) -> int:
     """Mesh stiffness of a gear pair: curves to JSON, a figure, or a summary."""
     _check_file("--plot", arguments.plot, FIGURE_TYPES)
     request = read_request(arguments.overrides, config_dir=arguments.config_dir)
+    if request.config["system"].get("kind") == SLICED:
+        from gensig.commands.flanks import sliced_stiffness
+
+        return sliced_stiffness(request.config, arguments)
     system = read_system(request.config)
     faults = read_faults(request.config["fault"])
     curves = system.stiffness_curves(faults)

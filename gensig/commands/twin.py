@@ -10,13 +10,14 @@ from typing import Any
 
 from gensig.config import read_request
 from gensig.errors import ConfigError
+from gensig.signals.mesh_motion import Teeth
 from gensig.signals.recording import Recording
 from gensig.systems.registry import read_system
 from gensig.twin.check import check, held_out_duration
 from gensig.twin.fitting import Fit, fit
 from gensig.twin.recording import read_recording
 from gensig.twin.report import check_summary, fitted_rows, report_text, verdict
-from gensig.twin.speed import Teeth, find_motion
+from gensig.twin.speed import find_motion
 from gensig.twin.writing import option_name, write_options
 
 FACE_WIDTH_IN_MODULES = 10.0

@@ -10,6 +10,8 @@ from gensig.dataset.splits import SUBSETS, SplitTable
 
 TRAIN, VALIDATION, TEST = range(len(SUBSETS))
 VALIDATION_SHARE = 0.2
+MIN_TESTED = 10  # groups: an interval over fewer is too narrow
+MAX_FOR_TESTS = 0.25  # of the groups, so that training keeps more than half
 _ATTEMPTS = 200
 
 
@@ -22,7 +24,7 @@ class Deal:
     column : text                         plan column of the groups; none of them is on two sides
     usable : (subset, record) bool        whether a record is used if its group is dealt to that subset
     min_groups : int                      fewer groups are no deal
-    test_share : float                    of the groups
+    test_share : float                    of the groups; `MIN_TESTED` where that is no more than `MAX_FOR_TESTS`
     for_test : (record,) float or None    groups of the largest sum are tested on, as long as all classes are there
     every_class : bool                    whether a subset needs every class of the plan, or only those it may use
     """
@@ -53,6 +55,8 @@ def deal_groups(plan: Plan, deal: Deal, rng: np.random.Generator) -> SplitTable 
     if lacking := [name for name, found in zip(SUBSETS, holds.any(axis=1) >= needed, strict=True) if not found.all()]:
         return f"a class has no record that may be used for {lacking[0]}"
     n_validation, n_test = (max(1, round(share * len(names))) for share in (VALIDATION_SHARE, deal.test_share))
+    if MAX_FOR_TESTS * len(names) >= MIN_TESTED:
+        n_test = max(n_test, MIN_TESTED)
     in_order = np.repeat(np.arange(len(SUBSETS)), [len(names) - n_validation - n_test, n_validation, n_test])
     worth = None if deal.for_test is None else np.bincount(group, weights=deal.for_test).astype(float)
     for attempt in range(_ATTEMPTS):

@@ -174,7 +174,7 @@ class Dataset:
         record_index : int     0 to n_records - 1, in plan order
         start, stop : int      samples, stop exclusive; None is the end
         channels : sequence    names or numbers; None is all, in their order
-        name : str             'acceleration' or 'acceleration_clean'
+        name : str             'acceleration', 'acceleration_clean' or 'healthy_twin'
         """
         stop = self.n_samples if stop is None else stop
         if name not in SCALES or name not in self.signal_names:

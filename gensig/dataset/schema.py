@@ -140,12 +140,16 @@ SIGNALS: dict[str, Column] = {
                description="what the sensors report, noise included"),
         Column(name="acceleration_clean", dtype="float32", unit="m/s^2", role="result", axes=("channel", "sample"),
                description="the same without noise, offset and converter (optional)"),
+        Column(name="healthy_twin", dtype="float32", unit="m/s^2", role="result", axes=("channel", "sample"),
+               description="acceleration of the same record without its faults, with noise of its own (optional)"),
         Column(name="acceleration_source", dtype="float32", unit="m/s^2", role="result", axes=("source", "sample"),
                description="accelerations at the bearings, before path and sensor, by source_names (optional)"),
         Column(name="acceleration_scale", dtype="float64", unit="m/s^2", role="result", axes=("channel",),
                description="value of one count of acceleration, NaN in a failed record (only where that is int16)"),
         Column(name="acceleration_clean_scale", dtype="float64", unit="m/s^2", role="result", axes=("channel",),
                description="the same for acceleration_clean"),
+        Column(name="healthy_twin_scale", dtype="float64", unit="m/s^2", role="result", axes=("channel",),
+               description="the same for healthy_twin"),
         Column(name="tacho", dtype="float32", unit="1", role="result", axes=("sample",),
                description="tachometer: 1 in a pulse, 0 between, at an edge the share of the sample (optional)"),
         Column(name="encoder_angle", dtype="float64", unit="rad", role="result", axes=("sample",),
@@ -179,7 +183,11 @@ SIGNALS: dict[str, Column] = {
 
 # How time signals with a scale may be stored, and the column that holds the scale of each.
 SAMPLE_TYPES = ("float32", "int16")
-SCALES = {"acceleration": "acceleration_scale", "acceleration_clean": "acceleration_clean_scale"}
+SCALES = {
+    "acceleration": "acceleration_scale",
+    "acceleration_clean": "acceleration_clean_scale",
+    "healthy_twin": "healthy_twin_scale",
+}
 
 # What a reader of version 1 may rely on; this list never grows, so that adding a column is no new version.
 REQUIRED = (

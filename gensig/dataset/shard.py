@@ -169,7 +169,7 @@ class ShardWriter:
                 f"declared is {shape} of {column.dtype}"
             )
         with np.errstate(over="ignore"):  # beyond float32 becomes inf, refused below
-            array = given.astype(column.storage_dtype)
+            array = given.astype(column.storage_dtype, copy=False)
         if column.is_bulk and not failed and not np.isfinite(array).all():
             raise DatasetError(f"{self.path.name}: {name} is not finite; write the record with status 'failed'")
         return array

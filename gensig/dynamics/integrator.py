@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import math
 import warnings
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 
 import numpy as np
@@ -22,10 +22,13 @@ from gensig.errors import ConfigError, SimulationError
 Array = NDArray[np.float64]
 
 LONGEST_SETTLING = 0.45  # s
-# the slow transient of the drive takes nearly all of the settling; coarse steps carry it, fine ones end it
-COARSE_OVERSAMPLING = 3
-FINE_SETTLING = 0.02  # s
-CHECKED = 0.05  # s at the beginning of a record, integrated again at half the step
+# steps per sample of the settling, and how long before the record the next ones take over, s: the slow transient of
+# the drive takes nearly all of it; what coarse steps do to it wears off in finer ones, and the record's own end it
+COARSE_STABILITY = 0.6  # of the limit: tables may be stiffer than their mean
+COARSE = ((1, 0.2), (2, 0.1), (3, 0.02))
+# of that time without contact above which it is settled anew in so many steps a sample: hard landings are stiff
+BOUNCING, CAREFUL = 0.01, 3
+CHECKED = 0.03  # s at the beginning of a record, integrated again at half the step
 FINEST = 64  # steps per sample that are tried where the error is too large
 SETTLED = 1e-4  # what is left of the start's transient, as a share
 STABILITY_LIMIT = 2.6  # |lambda| h of the classical RK4 on the imaginary axis is 2.83, on the real axis 2.79
@@ -101,7 +104,15 @@ class _Run:
         """Put one lane at rest at a deflection (dof,)."""
         self.state[:, :, lane] = 0.0
         self.state[0, :, lane] = deflection - group.rest[:, lane]
-        self.center[lane], self.fresh[lane] = 0.0, 1.0
+        self.center[lane], self.fresh[lane], self.lost[lane] = 0.0, 1.0, 0.0
+
+    def take(self, other: _Run, lanes: NDArray[np.bool_]) -> None:
+        """Go on from where another run has brought some lanes, (lane,); ``again`` must follow."""
+        self.state[:, :, lanes], self.center[lanes], self.fresh[lanes] = (
+            other.state[:, :, lanes],
+            other.center[lanes],
+            1.0,
+        )
 
     def again(self) -> _Run:
         """The same state, to be integrated otherwise."""
@@ -166,32 +177,30 @@ def integrate(
     check_channels(channels, machines[0].dofs)
     precision, fine, low_pass = solver.precision, solver.oversampling, decimator(solver.oversampling)
     lanes = fill_lanes(machines, precision)
-    n_samples, n_fine = count_samples(duration, sampling_rate), math.ceil(FINE_SETTLING * sampling_rate)
-    end = -low_pass.margin - n_fine  # output samples; time 0 is the first recorded one
+    n_samples = count_samples(duration, sampling_rate)
+    stages = [
+        (steps, -low_pass.margin - left)  # output samples; time 0 is the first recorded one
+        for steps, left in settling_stages(machines[0], solver, sampling_rate)
+    ]
+    end = stages[-1][1]
     # every lane begins in its own time; until then it integrates what nobody looks at
-    begins = [min(end, end + n_fine - math.ceil(settling_time(machine) * sampling_rate)) for machine in lanes]
+    begins = [min(end - 1, -low_pass.margin - math.ceil(settling_time(machine) * sampling_rate)) for machine in lanes]
     span = min(begins) / sampling_rate, duration + low_pass.margin / sampling_rate
-    run = _Run(lanes, np.array([machines[0].dofs.index(name) for name in channels], dtype=np.int64), precision)
-
-    coarse = settling_oversampling(machines[0], solver, sampling_rate)
-    step = 1.0 / (sampling_rate * coarse)
-    settling = pack(machines, step, precision, span), step
+    packed = 1.0 / (sampling_rate * fine)
+    group = pack(machines, packed, precision, span)
 
     def at(oversampling: int) -> tuple[Group, float]:
-        other = 1.0 / (sampling_rate * oversampling)
-        return at_step(settling[0], step, other), other
+        step = 1.0 / (sampling_rate * oversampling)
+        return at_step(group, packed, step), step
 
-    now = min(begins)
-    for begin in sorted(set(begins)):
-        run.advance(*settling, now * coarse, (begin - now) * coarse)
-        for lane, dynamics in enumerate(lanes):
-            if begins[lane] == begin:
-                run.begin(settling[0], lane, dynamics.static_start(begin / sampling_rate))
-        now = begin
-    run.advance(*settling, now * coarse, (end - now) * coarse)
+    run = _Run(lanes, np.array([machines[0].dofs.index(name) for name in channels], dtype=np.int64), precision)
+    run, bounced = _settled(run, lanes, begins, stages, at)
+    careful = [(min(fine, max(CAREFUL, steps)), until) for steps, until in stages]
+    if bounced.any() and careful != stages:
+        run.take(_settled(run, lanes, begins, careful, at)[0], bounced)
     recording = at(fine)
     run = run.again()
-    run.advance(*recording, end * fine, n_fine * fine - 1)
+    run.advance(*recording, end * fine, (-low_pass.margin - end) * fine - 1)
     checking = run.again()
     run.lost[:] = 0.0
     acceleration, angle, seen = run.record(*recording, low_pass, n_samples, tell_mesh=tell_mesh)
@@ -215,17 +224,54 @@ def integrate(
     )
 
 
+def _settled(
+    run: _Run,
+    lanes: Sequence[PairDynamics],
+    begins: Sequence[int],
+    stages: Sequence[tuple[int, int]],
+    at: Callable[[int], tuple[Group, float]],
+) -> tuple[_Run, NDArray[np.bool_]]:
+    """The machines at the end of the last stage, and which of them were out of contact or bounds on the way, (lane,).
+
+    Each begins at rest at its own output sample; stages are steps per sample and the sample that they lead to.
+    """
+    now, lost = min(begins), np.zeros(len(lanes))
+    for steps, until in stages:
+        run, (group, step) = run.again(), at(steps)
+        for begin in sorted({begin for begin in begins if now <= begin < until}):
+            run.advance(group, step, now * steps, (begin - now) * steps)
+            for lane, dynamics in enumerate(lanes):
+                if begins[lane] == begin:
+                    run.begin(group, lane, dynamics.static_start(begin * steps * step))
+                    lost[lane] = 0.0
+            now = begin
+        if now < until:
+            run.advance(group, step, now * steps, (until - now) * steps)
+            now = until
+        lost += run.lost / steps
+    is_wild = ~(np.abs(run.state) < OUT_OF_BOUNDS).all(axis=(0, 1))
+    return run, is_wild | (lost > BOUNCING * (now - np.array(begins)))
+
+
 def settling_oversampling(dynamics: PairDynamics, solver: Solver, sampling_rate: float) -> int:
-    """Steps per sample in which a machine settles: few where they are stable, else those of the record.
+    """Steps per sample in which a machine begins to settle: as few as are stable, at most those of the record.
 
     Raises
     ------
     SimulationError    where even the record's step is too long for the stiffest motion
     """
-    fine = solver.oversampling
-    check_step(dynamics, sampling_rate, fine)
-    stable = float(np.abs(dynamics.stiff_rates).max()) / (sampling_rate * COARSE_OVERSAMPLING) < 0.5 * STABILITY_LIMIT
-    return COARSE_OVERSAMPLING if stable and fine > COARSE_OVERSAMPLING else fine
+    check_step(dynamics, sampling_rate, solver.oversampling)
+    fastest = float(np.abs(dynamics.stiff_rates).max()) / sampling_rate
+    return min(solver.oversampling, math.ceil(fastest / (COARSE_STABILITY * STABILITY_LIMIT)))
+
+
+def settling_stages(dynamics: PairDynamics, solver: Solver, sampling_rate: float) -> list[tuple[int, int]]:
+    """Steps per sample, and how many samples before the record they end, of the stages of settling."""
+    least = settling_oversampling(dynamics, solver, sampling_rate)
+    return [
+        (min(max(oversampling, least), solver.oversampling), math.ceil(left * sampling_rate))
+        for oversampling, left in COARSE
+    ]
 
 
 def count_samples(duration: float, sampling_rate: float) -> int:

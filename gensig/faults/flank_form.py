@@ -121,7 +121,7 @@ class Runout(FlankForm):
             return tooth
         assert isinstance(self.tooth, int)
         gear = tooth.gear
-        roll = tooth.profile.curvature_radius / gear.base_radius - np.tan(gear.pressure_angle)
+        roll = tooth.profile.curvature_radius / gear.base_radius - np.tan(gear.transverse_pressure_angle)
         turn = 2.0 * np.pi / gear.n_teeth * (number - self.tooth)
         angle = roll + (turn if self.gear == "pinion" else -turn)
         return tooth.with_deviation(self.eccentricity * np.cos(angle))

@@ -21,7 +21,7 @@ Array = NDArray[np.float64]
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class GearPair:
-    """A pinion that drives a wheel at the centre distance at which they mesh without play.
+    """A pinion that drives a wheel at the centre distance at which they mesh without play, in the transverse section.
 
     ``backlash`` is the play along the line of action that is left to the coast flank, m.
     """
@@ -35,6 +35,12 @@ class GearPair:
         for key in same:
             if getattr(self.pinion, key) != getattr(self.wheel, key):
                 raise GeometryError(f"pinion and wheel cannot mesh: their {key} differs")
+        if self.pinion.helix_angle != -self.wheel.helix_angle:
+            raise GeometryError(
+                f"pinion and wheel cannot mesh on parallel shafts: helix_angle_deg = "
+                f"{math.degrees(self.pinion.helix_angle):g} and {math.degrees(self.wheel.helix_angle):g} must be equal "
+                f"and of opposite hand (sign)"
+            )
         if self.backlash < 0.0:
             raise GeometryError(f"gear.backlash_um = {self.backlash * 1e6:g} must not be negative")
         if self.path_of_contact <= 0.0:
@@ -64,18 +70,18 @@ class GearPair:
 
     @property
     def base_pitch(self) -> float:
-        """Base pitch, m."""
+        """Transverse base pitch, m."""
         return self.pinion.base_pitch
 
     @property
     def working_pressure_angle(self) -> float:
-        """Pressure angle at the working centre distance."""
+        """Transverse pressure angle at the working centre distance."""
         shift = self.pinion.profile_shift + self.wheel.profile_shift
         teeth = self.pinion.n_teeth + self.wheel.n_teeth
-        alpha = self.pinion.pressure_angle
+        alpha = self.pinion.transverse_pressure_angle
         if shift == 0.0:
             return alpha
-        return inverse_involute(involute(alpha) + 2.0 * shift * math.tan(alpha) / teeth)
+        return inverse_involute(involute(alpha) + 2.0 * shift * math.tan(self.pinion.pressure_angle) / teeth)
 
     @property
     def center_distance(self) -> float:
@@ -106,6 +112,26 @@ class GearPair:
     def transverse_contact_ratio(self) -> float:
         """Mean number of pairs in contact, eps_alpha."""
         return self.path_of_contact / self.base_pitch
+
+    @property
+    def face_width(self) -> float:
+        """Width that both gears share, m."""
+        return min(self.pinion.face_width, self.wheel.face_width)
+
+    @property
+    def base_helix_angle(self) -> float:
+        """Helix angle on the base cylinders without its sign, rad."""
+        return abs(self.pinion.base_helix_angle)
+
+    @property
+    def overlap_ratio(self) -> float:
+        """Overlap ratio eps_beta = b sin(beta) / (pi m_n)."""
+        return self.face_width * math.sin(abs(self.pinion.helix_angle)) / (math.pi * self.pinion.normal_module)
+
+    @property
+    def total_contact_ratio(self) -> float:
+        """Total contact ratio eps_gamma = eps_alpha + eps_beta."""
+        return self.transverse_contact_ratio + self.overlap_ratio
 
     @property
     def pitch_point(self) -> float:

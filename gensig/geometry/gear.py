@@ -1,4 +1,4 @@
-"""One spur gear as a rack-type cutter makes it."""
+"""One spur or helical gear as a rack-type cutter makes it, in the transverse section."""
 
 from __future__ import annotations
 
@@ -9,13 +9,22 @@ from gensig.errors import GeometryError
 from gensig.geometry.involute import involute
 from gensig.units import from_si, unit
 
+LARGEST_HELIX = 45.0  # degrees; beyond, the slices of a tooth are no spur teeth any more
+
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Gear:
-    """Geometry of one external spur gear, lengths in m, angles in rad.
+    """Geometry of one external gear, lengths in m, angles in rad.
 
-    ``cutter_tip_radius_coefficient`` is the rounding of the rack's tip over the module: it makes the root curve.
+    ``pressure_angle`` and ``normal_module`` are those of the basic rack, so of the normal section; coefficients count
+    normal modules. All radii and half angles are of the transverse section, which for ``helix_angle`` 0 is the same.
+    ``helix_angle`` is that on the reference cylinder, positive for a right-handed gear.
+
+    ``cutter_tip_radius_coefficient`` is the rounding of the rack's tip over the module: it makes the root curve. In the
+    transverse section of a helical gear the rounding is an ellipse; a circle of the same radius is taken for it.
     ``name`` ("pinion" or "wheel") only serves messages.
+
+    Source: ISO 21771-1:2024, with x tan(alpha_n) = x cos(beta) tan(alpha_t).
     """
 
     name: str
@@ -28,12 +37,15 @@ class Gear:
     profile_shift: float
     face_width: float = unit("mm")
     bore_radius: float = unit("mm")
+    helix_angle: float = unit("deg", default=0.0)
 
     def __post_init__(self) -> None:
         self._check_ranges()
         if self.junction_curvature_radius <= 0.0:
             limit = math.ceil(
-                2.0 * (self.straight_flank_depth / self.normal_module) / math.sin(self.pressure_angle) ** 2
+                2.0
+                * (self.straight_flank_depth / self.transverse_module)
+                / math.sin(self.transverse_pressure_angle) ** 2
             )
             raise GeometryError(
                 f"{self.name}: {self.n_teeth} teeth with profile shift {self.profile_shift:g} are undercut; use at "
@@ -67,10 +79,15 @@ class Gear:
             raise GeometryError(
                 f"{self.name}: pressure_angle_deg = {math.degrees(self.pressure_angle):g} must lie between 10 and 35"
             )
+        if not abs(self.helix_angle) <= math.radians(LARGEST_HELIX):
+            raise GeometryError(
+                f"{self.name}: helix_angle_deg = {math.degrees(self.helix_angle):g} must lie between "
+                f"-{LARGEST_HELIX:g} and {LARGEST_HELIX:g}"
+            )
         if not 0.0 <= self.clearance_coefficient <= 1.0:
             raise GeometryError(f"{self.name}: clearance_coefficient = {self.clearance_coefficient:g} must lie in 0..1")
         rounding = self.cutter_tip_radius_coefficient
-        room = self.clearance_coefficient / (1.0 - math.sin(self.pressure_angle))
+        room = self.clearance_coefficient / (1.0 - math.sin(self.transverse_pressure_angle))
         if not 0.0 < rounding <= room * 1.001:
             raise GeometryError(
                 f"{self.name}: cutter_tip_radius_coefficient = {rounding:g} must be positive and at most "
@@ -78,14 +95,31 @@ class Gear:
             )
 
     @property
+    def transverse_module(self) -> float:
+        """Transverse module m_t = m_n / cos(beta)."""
+        return self.normal_module / math.cos(self.helix_angle)
+
+    @property
+    def transverse_pressure_angle(self) -> float:
+        """Transverse pressure angle, tan(alpha_t) = tan(alpha_n) / cos(beta)."""
+        if self.helix_angle == 0.0:  # to the bit
+            return self.pressure_angle
+        return math.atan(math.tan(self.pressure_angle) / math.cos(self.helix_angle))
+
+    @property
+    def base_helix_angle(self) -> float:
+        """Helix angle on the base cylinder, sin(beta_b) = sin(beta) cos(alpha_n)."""
+        return math.asin(math.sin(self.helix_angle) * math.cos(self.pressure_angle))
+
+    @property
     def pitch_radius(self) -> float:
-        """Reference pitch radius r = m z / 2."""
-        return 0.5 * self.normal_module * self.n_teeth
+        """Reference pitch radius r = m_t z / 2."""
+        return 0.5 * self.transverse_module * self.n_teeth
 
     @property
     def base_radius(self) -> float:
-        """Base radius r_b = r cos(alpha)."""
-        return self.pitch_radius * math.cos(self.pressure_angle)
+        """Base radius r_b = r cos(alpha_t)."""
+        return self.pitch_radius * math.cos(self.transverse_pressure_angle)
 
     @property
     def tip_radius(self) -> float:
@@ -100,7 +134,7 @@ class Gear:
 
     @property
     def base_pitch(self) -> float:
-        """Base pitch p_b, m."""
+        """Transverse base pitch p_bt, m."""
         return 2.0 * math.pi * self.base_radius / self.n_teeth
 
     @property
@@ -109,7 +143,7 @@ class Gear:
         return (
             math.pi / (2.0 * self.n_teeth)
             + 2.0 * self.profile_shift * math.tan(self.pressure_angle) / self.n_teeth
-            + involute(self.pressure_angle)
+            + involute(self.transverse_pressure_angle)
         )
 
     def half_tooth_angle_at(self, radius: float) -> float:
@@ -130,9 +164,14 @@ class Gear:
     @property
     def rounding_center_offset(self) -> float:
         """Distance b_1 along the pitch line from the tooth centreline to the centre of the rounding."""
-        alpha, m, rounding = self.pressure_angle, self.normal_module, self.cutter_tip_radius
-        depth = (self.addendum_coefficient + self.clearance_coefficient) * m
-        return math.pi * m / 4.0 + depth * math.tan(alpha) - rounding * math.tan(alpha) + rounding / math.cos(alpha)
+        alpha, rounding = self.transverse_pressure_angle, self.cutter_tip_radius
+        depth = (self.addendum_coefficient + self.clearance_coefficient) * self.normal_module
+        return (
+            math.pi * self.transverse_module / 4.0
+            + depth * math.tan(alpha)
+            - rounding * math.tan(alpha)
+            + rounding / math.cos(alpha)
+        )
 
     @property
     def root_half_angle(self) -> float:
@@ -142,10 +181,10 @@ class Gear:
     @property
     def straight_flank_depth(self) -> float:
         """Depth below the pitch line at which the rack's straight flank ends, m."""
-        return self.rounding_center_depth + self.cutter_tip_radius * math.sin(self.pressure_angle)
+        return self.rounding_center_depth + self.cutter_tip_radius * math.sin(self.transverse_pressure_angle)
 
     @property
     def junction_curvature_radius(self) -> float:
         """Curvature radius of the involute where the root curve joins it; not positive when undercut."""
-        alpha = self.pressure_angle
+        alpha = self.transverse_pressure_angle
         return self.base_radius * math.tan(alpha) - self.straight_flank_depth / math.sin(alpha)

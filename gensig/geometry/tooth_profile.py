@@ -70,7 +70,7 @@ N_FLANK_CELLS = 384
 
 def tooth_profile(gear: Gear, *, n_root_cells: int = N_ROOT_CELLS, n_flank_cells: int = N_FLANK_CELLS) -> ToothProfile:
     """Sample the outline: cells uniform in gamma on the root curve, in curvature radius on the involute."""
-    gamma = np.linspace(0.5 * np.pi, gear.pressure_angle, n_root_cells + 1)
+    gamma = np.linspace(0.5 * np.pi, gear.transverse_pressure_angle, n_root_cells + 1)
     tip = np.sqrt(gear.tip_radius**2 - gear.base_radius**2)
     curvature = np.linspace(gear.junction_curvature_radius, tip, n_flank_cells + 1)
     x_root, y_root = root_curve(gear, gamma)
@@ -92,8 +92,8 @@ def root_curve_middle(gear: Gear, where: str) -> float:
     where : ``"gamma_mid"`` halves the range of gamma, ``"arc_mid"`` the arc length
     """
     if where == "gamma_mid":
-        return 0.5 * (0.5 * np.pi + gear.pressure_angle)
-    gamma = np.linspace(0.5 * np.pi, gear.pressure_angle, 4001)
+        return 0.5 * (0.5 * np.pi + gear.transverse_pressure_angle)
+    gamma = np.linspace(0.5 * np.pi, gear.transverse_pressure_angle, 4001)
     x, y = root_curve(gear, gamma)
     arc = np.concatenate([[0.0], np.cumsum(np.hypot(np.diff(x), np.diff(y)))])
     return float(np.interp(0.5 * arc[-1], arc, gamma))

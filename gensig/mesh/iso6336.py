@@ -41,9 +41,9 @@ def single_stiffness(
     ConfigError           for a load, factor or modulus that is not positive
     ExtrapolationError    for profile shifts outside x1 >= x2, -0.5 <= x1 + x2 <= 2, unless allowed
 
-    Source: ISO 6336-1, Method B, c' = c'_th C_M C_R C_B cos(beta) with beta = 0, solid discs (C_R = 1) and
-    (F_t K_A / b / 100 N/mm)^0.25 below 100 N/mm. One N/(mm um) of the standard is 1e9 N/m/m. The body down to the
-    bore, which makes thin-rimmed gears softer, is not in it.
+    Source: ISO 6336-1, Method B, c' = c'_th C_M C_R C_B cos(beta), virtual teeth z / (cos^2(beta_b) cos(beta)), solid
+    discs (C_R = 1) and (F_t K_A / b / 100 N/mm)^0.25 below 100 N/mm. One N/(mm um) of the standard is 1e9 N/m/m. The
+    body down to the bore, which makes thin-rimmed gears softer, is not in it.
     """
     for name, value in (
         ("line_load", line_load),
@@ -61,7 +61,8 @@ def single_stiffness(
         )
     rack = 0.5 * (basic_rack_factor(pair.pinion) + basic_rack_factor(pair.wheel))
     load = 1.0 if line_load is None else min(1.0, line_load / LINEAR_LINE_LOAD) ** 0.25
-    return correction_factor * rack * load * youngs_modulus / STEEL_YOUNGS_MODULUS / flexibility(pair)
+    helix = math.cos(pair.pinion.helix_angle)
+    return correction_factor * rack * helix * load * youngs_modulus / STEEL_YOUNGS_MODULUS / flexibility(pair)
 
 
 def mesh_stiffness(
@@ -96,7 +97,8 @@ def mesh_stiffness(
 
 def flexibility(pair: GearPair) -> float:
     """Least flexibility q' of a pair of steel teeth per face width, m2/N."""
-    z1, z2 = pair.pinion.n_teeth, pair.wheel.n_teeth
+    virtual = math.cos(pair.base_helix_angle) ** 2 * math.cos(pair.pinion.helix_angle)
+    z1, z2 = pair.pinion.n_teeth / virtual, pair.wheel.n_teeth / virtual
     x1, x2 = pair.pinion.profile_shift, pair.wheel.profile_shift
     terms = (1.0, 1.0 / z1, 1.0 / z2, x1, x1 / z1, x2, x2 / z2, x1**2, x2**2)
     return FLEXIBILITY_UNIT * math.fsum(c * term for c, term in zip(FLEXIBILITY, terms, strict=True))

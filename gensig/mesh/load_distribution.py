@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Mapping
 from dataclasses import dataclass
+from functools import lru_cache
 
 import numpy as np
 from numpy.typing import NDArray
@@ -59,6 +60,10 @@ def pair_states(
     newest = np.floor(roll / pitch).astype(np.int64)
     index = newest[:, None] + 1 - np.arange(N_PAIRS)
     position = roll[:, None] - index * pitch
+    nodes, n_cells = table.position, len(table.position) - 1
+    place = np.clip((position - nodes[0]) * (n_cells / (nodes[-1] - nodes[0])), 0.0, n_cells)
+    cell = np.minimum(place.astype(np.int64), n_cells - 1)
+    part = place - cell
     compliance = np.full(position.shape, -table.shared_compliance)
     gap = np.zeros(position.shape)
     sides = (
@@ -72,12 +77,9 @@ def pair_states(
             gap += error[teeth]
         if tilt is not None:
             gap += tilt[teeth] * (position - table.pair.pitch_point)
-        for kind in np.unique(kinds):
-            here = kinds == kind
-            compliance[here] += np.interp(position[here], table.position, side.compliance[kind])
-            gap[here] += np.interp(position[here], table.position, side.gap[kind])
-            if not side.present[kind]:
-                gap[here] = np.inf
+        compliance += (1.0 - part) * side.compliance[kinds, cell] + part * side.compliance[kinds, cell + 1]
+        gap += (1.0 - part) * side.gap[kinds, cell] + part * side.gap[kinds, cell + 1]
+        gap[~side.present[kinds]] = np.inf
     return PairStates(compliance=compliance, gap=gap, position=position)
 
 
@@ -122,17 +124,25 @@ def loaded_pair_table(
     *,
     force: float,
 ) -> PairTable:
-    """Table whose contact term is the secant at the quasi-static load of sound pairs under a total force in N.
+    """Table whose contact term is the secant at the quasi-static load of sound pairs under a total force in N."""
+    load = force if options.contact == "linear" else sound_load(pair, material, options, force)
+    return pair_table(pair, material, options, teeth, load=load)
+
+
+@lru_cache(maxsize=32)  # the records of a condition share it, whatever their faults
+def sound_load(pair: GearPair, material: Material, options: MeshOptions, force: float) -> Array:
+    """Quasi-static load of a sound pair at every node under a total force in N, (node,) N; not to be written to.
 
     Load sharing and local compliance depend on each other; the sharing moves by less than 1e-3 after three rounds.
     """
     load: Array | float = force
-    if options.contact != "linear":
-        for _ in range(LOAD_ROUNDS):
-            sound = pair_table(pair, material, options, load=load)
-            shares = static_mesh(sound, _sound_states(sound), force).load
-            load = np.maximum(np.append(shares.T.ravel(), 0.0), LEAST_LOAD_SHARE * force)
-    return pair_table(pair, material, options, teeth, load=load)
+    for _ in range(LOAD_ROUNDS):
+        sound = pair_table(pair, material, options, load=load)
+        shares = static_mesh(sound, _sound_states(sound), force).load
+        load = np.maximum(np.append(shares.T.ravel(), 0.0), LEAST_LOAD_SHARE * force)
+    loads = np.asarray(load)
+    loads.flags.writeable = False
+    return loads
 
 
 def _sound_states(table: PairTable) -> PairStates:

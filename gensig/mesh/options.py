@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Mapping
-from dataclasses import dataclass
+from dataclasses import dataclass, fields
 from typing import Any
 
 from gensig.errors import ConfigError
@@ -20,6 +20,8 @@ CHOICES = {
     "bending": ("by_slice", "whole"),
     "roll_torque": ("consistent", "classical"),
 }
+
+SLICE_COUPLINGS = ("coupled", "independent")
 
 # what null stands for: the paper's law comes with the paper's conventions
 CONVENTIONS = {
@@ -92,7 +94,40 @@ class MeshOptions:
                 raise ConfigError(f"mesh.{key} = {value:g} must lie in {low:g}..{high:g}")
 
 
+@dataclass(frozen=True, slots=True, kw_only=True)
+class SliceOptions:
+    """How the face of a pair is cut into slices, and what ties them together.
+
+    n_slices : slices of equal width over the common face
+    slice_coupling : ``coupled`` lets a slice's load bend its neighbours, ``independent`` makes each a gear of its own
+    coupling_modules : length over which slices couple, in normal modules
+    slices_in_phase : True leaves out the helix of the contact lines but not that of the geometry (for comparison only)
+    """
+
+    n_slices: int
+    slice_coupling: str
+    coupling_modules: float
+    slices_in_phase: bool
+
+    def __post_init__(self) -> None:
+        if self.slice_coupling not in SLICE_COUPLINGS:
+            raise ConfigError(f"mesh.slice_coupling = {self.slice_coupling!r}; allowed: {', '.join(SLICE_COUPLINGS)}")
+        for key, low, high in (("n_slices", 1, 1000), ("coupling_modules", 0.0, 10.0)):
+            value = getattr(self, key)
+            if not low <= value <= high:
+                raise ConfigError(f"mesh.{key} = {value:g} must lie in {low:g}..{high:g}")
+
+
+SLICE_KEYS = frozenset(field.name for field in fields(SliceOptions))
+
+
+def read_slice_options(values: Mapping[str, Any]) -> SliceOptions:
+    """Slices from the boundary keys of ``mesh``."""
+    return read(SliceOptions, {key: value for key, value in values.items() if key in SLICE_KEYS}, "mesh")
+
+
 def read_mesh_options(values: Mapping[str, Any]) -> MeshOptions:
     """Options from boundary keys; a convention that is null follows ``law``."""
     convention = CONVENTIONS.get(str(values.get("law")), {})
-    return read(MeshOptions, {**values, **{k: v for k, v in convention.items() if values.get(k) is None}}, "mesh")
+    own = {key: value for key, value in values.items() if key not in SLICE_KEYS}
+    return read(MeshOptions, {**own, **{k: v for k, v in convention.items() if values.get(k) is None}}, "mesh")

@@ -197,4 +197,9 @@ def detectability(residual: Array, noise_power: Array) -> float:
 
 def add_noise(clean: Array, noise_power: Array, rng: np.random.Generator) -> Array:
     """Add white Gaussian noise of the given power to each channel, (channel, sample)."""
-    return clean + np.sqrt(noise_power)[:, None] * rng.standard_normal(clean.shape)
+    noisy = np.empty_like(clean)
+    for own, signal, power_of_noise in zip(noisy, clean, noise_power, strict=True):  # a channel stays in the cache
+        rng.standard_normal(out=own)
+        own *= math.sqrt(power_of_noise)
+        own += signal
+    return noisy

@@ -205,7 +205,7 @@ def _scaled_index(
     for once in (np.cos(turn), np.sin(turn)):
         random = random - 2.0 / gear.n_teeth * (random @ once) * once
     once = np.cos(turn - angle)
-    arc = share * math.cos(gear.pressure_angle)
+    arc = share * math.cos(gear.transverse_pressure_angle)
     step, total = arc * single_pitch_limit(gear, grade), arc * cumulative_pitch_limit(gear, grade)
     steps, steps_once = (np.diff(part, append=part[0]) for part in (random, once))
     tried = np.linspace(0.5 * runout_share * share * runout_limit(gear, grade), 0.0, RUNOUT_STEPS + 1)

@@ -11,10 +11,12 @@ from gensig.errors import ConfigError
 from gensig.geometry.contact import GearPair
 from gensig.geometry.gear import Gear
 from gensig.material import Material
-from gensig.mesh.options import read_mesh_options
+from gensig.mesh.modification import FlankModification, PairModification
+from gensig.mesh.options import read_mesh_options, read_slice_options
 from gensig.sensing.manufacturing import Quality
 from gensig.sensing.reading import read_sensing
 from gensig.systems.operation import read_operating
+from gensig.systems.sliced_pair import SlicedPair
 from gensig.systems.spur_pair import SpurPair
 from gensig.systems.supports import AS_GIVEN, on_bearings, put_on_bearings, read_holding
 from gensig.units import read, to_si
@@ -28,6 +30,7 @@ COMMON_GEAR_KEYS = (
     "cutter_tip_radius_coefficient",
 )
 BODY_KEYS = ("mass_kg", "inertia_kg_m2", "support", "bearing", "shaft")
+SLICED = "helical_pair"
 SYSTEM_KEYS = ("kind", "supports", "motor", "load")
 
 
@@ -35,16 +38,23 @@ def read_spur_pair(config: Mapping[str, Any]) -> SpurPair:
     """Build a spur pair from the boundary keys of a configuration."""
     gear = section(config, "gear")
     if _number("gear.helix_angle_deg", gear["helix_angle_deg"]) != 0.0:
-        raise ConfigError(f"gear.helix_angle_deg = {gear['helix_angle_deg']:g}: system=spur_pair takes spur gears, 0")
-    material = read(Material, section(config, "material"), "material")
-    if material.poisson_ratio >= 0.5:
-        raise ConfigError(f"material.poisson_ratio = {material.poisson_ratio:g} must be below 0.5")
+        raise ConfigError(
+            f"gear.helix_angle_deg = {gear['helix_angle_deg']:g}: system=spur_pair takes spur gears, 0; helical ones "
+            f"have system=helical_pair, with gensig stiffness and gensig transmission-error"
+        )
+    if read_modification(config).is_any:
+        raise ConfigError(
+            "modification: system=spur_pair has its reliefs as faults (fault=tip_relief, fault=misalignment); a "
+            "modification is taken by gensig transmission-error, and by gensig stiffness with system=helical_pair"
+        )
+    material = read_material(config)
     sides = {name: section(config, "gear", name) for name in SIDES}
     machine = section(config, "system")
     for key in machine:
         if key not in SYSTEM_KEYS:
             raise ConfigError(f"system: unknown key '{key}'; known: {', '.join(SYSTEM_KEYS)}")
-    gears = {name: _read_gear(name, gear) for name in SIDES}
+    pair = read_pair(config)
+    gears = {"pinion": pair.pinion, "wheel": pair.wheel}
     operating, quality = (
         read_operating(section(config, "operating")),
         read(Quality, section(config, "quality"), "quality"),
@@ -55,7 +65,7 @@ def read_spur_pair(config: Mapping[str, Any]) -> SpurPair:
         force = operating.torque / gears["pinion"].base_radius
         bodies = {name: put_on_bearings(bodies[name], gears[name], held[name], material, force) for name in SIDES}
     return SpurPair(
-        pair=GearPair(**gears, backlash=_number("gear.backlash_um", gear["backlash_um"])),
+        pair=pair,
         material=material,
         mesh=read_mesh_options(section(config, "mesh")),
         pinion=bodies["pinion"],
@@ -69,6 +79,48 @@ def read_spur_pair(config: Mapping[str, Any]) -> SpurPair:
     )
 
 
+def read_sliced_pair(config: Mapping[str, Any]) -> SlicedPair:
+    """Build a spur or helical pair cut into slices from the boundary keys of a configuration, whatever its system."""
+    mesh = section(config, "mesh")
+    return SlicedPair(
+        pair=read_pair(config),
+        material=read_material(config),
+        mesh=read_mesh_options(mesh),
+        slices=read_slice_options(mesh),
+        modification=read_modification(config),
+        torque=_number("operating.torque_nm", section(config, "operating")["torque_nm"]),
+    )
+
+
+def read_pair(config: Mapping[str, Any]) -> GearPair:
+    """The two gears of a configuration; a wheel has the opposite hand unless it says otherwise."""
+    gear = section(config, "gear")
+    helix = _number("gear.helix_angle_deg", gear["helix_angle_deg"])
+    gears = {name: _read_gear(name, gear, hand * helix) for name, hand in zip(SIDES, (1.0, -1.0), strict=True)}
+    return GearPair(**gears, backlash=_number("gear.backlash_um", gear["backlash_um"]))
+
+
+def read_material(config: Mapping[str, Any]) -> Material:
+    """The material of a configuration."""
+    material = read(Material, section(config, "material"), "material")
+    if material.poisson_ratio >= 0.5:
+        raise ConfigError(f"material.poisson_ratio = {material.poisson_ratio:g} must be below 0.5")
+    return material
+
+
+def read_modification(config: Mapping[str, Any]) -> PairModification:
+    """What is ground off the flanks of a configuration's gears."""
+    sides = {}
+    for name in SIDES:
+        try:
+            sides[name] = read(FlankModification, section(config, "modification", name), f"modification.{name}")
+        except ConfigError as error:
+            text = str(error)
+            raise ConfigError(text if text.startswith("modification") else f"modification.{name}.{text}") from None
+    own = {key: value for key, value in section(config, "modification").items() if key not in SIDES}
+    return read(PairModification, own, "modification", **sides)
+
+
 SYSTEMS: dict[str, Callable[[Mapping[str, Any]], SpurPair]] = {"spur_pair": read_spur_pair}
 
 
@@ -80,8 +132,13 @@ def read_system(config: Mapping[str, Any]) -> SpurPair:
     ConfigError, GeometryError    for keys or values that make no machine
     """
     kind = section(config, "system").get("kind")
+    if kind == SLICED:
+        raise ConfigError(
+            f"system={kind} has statics so far: take gensig stiffness or gensig transmission-error; records "
+            f"are made by system={', '.join(SYSTEMS)}"
+        )
     if kind not in SYSTEMS:
-        raise ConfigError(f"system.kind = {kind!r}; allowed: {', '.join(SYSTEMS)}")
+        raise ConfigError(f"system.kind = {kind!r}; allowed: {', '.join((*SYSTEMS, SLICED))}")
     return SYSTEMS[kind](config)
 
 
@@ -96,9 +153,10 @@ def section(config: Mapping[str, Any], *path: str) -> Mapping[str, Any]:
     return node
 
 
-def _read_gear(name: str, gear: Mapping[str, Any]) -> Gear:
+def _read_gear(name: str, gear: Mapping[str, Any], helix_angle: float) -> Gear:
     own = {key: value for key, value in section(gear, name).items() if key not in BODY_KEYS}
-    return read(Gear, {**{key: gear[key] for key in COMMON_GEAR_KEYS}, **own}, f"gear.{name}", name=name)
+    given = {} if "helix_angle_deg" in own else {"helix_angle": helix_angle}
+    return read(Gear, {**{key: gear[key] for key in COMMON_GEAR_KEYS}, **own}, f"gear.{name}", name=name, **given)
 
 
 def _read_body(gear: Gear, values: Mapping[str, Any], material: Material) -> Body:

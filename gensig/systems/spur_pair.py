@@ -12,6 +12,7 @@ from numpy.typing import NDArray
 from gensig.dynamics._vector import n_lanes
 from gensig.dynamics.decimation import in_band_error
 from gensig.dynamics.integrator import (
+    BOUNCING,
     FINEST,
     Motions,
     Solver,
@@ -53,7 +54,6 @@ class Start:
 # What an integration at half the step says of a record: its error is below the limit; teeth bounce, which makes point
 # values mean little, but band levels and indicators agree; neither; nobody looked.
 CHECKS = ("error", "levels", "unresolved", "none")
-BOUNCING = 0.01  # share of the time without contact above which levels may stand in for the error
 FINEST_BOUNCING = 20  # steps per sample above which what bounces does not come nearer to anything
 
 

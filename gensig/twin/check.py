@@ -14,10 +14,10 @@ from gensig.planning import make_plan
 from gensig.records import simulate_records
 from gensig.sensing.agreement import third_octave_bands, third_octave_power
 from gensig.signals.indicators import crest_factor, kurtosis, rms
+from gensig.signals.mesh_motion import Motion, Teeth
 from gensig.signals.recording import Recording
 from gensig.twin.grade import sideband_ratios
 from gensig.twin.lines import find_lines
-from gensig.twin.speed import Motion, Teeth
 
 Array = NDArray[np.float64]
 
@@ -110,7 +110,8 @@ def _healthy_records(config: Mapping[str, Any]) -> tuple[Sequence[Array], Sequen
         "n_records": N_RECORDS, "n_units": N_RECORDS, "n_gearboxes": 1, "conditions_per_unit": None, "n_repeats": 1,
         "classes": ["healthy"], "design": "latin_hypercube", "vary": {}, "sham": False,
     }  # fmt: skip
-    dataset = {**config["dataset"], "store_shaft_angle": True, "store_mesh_state": False, "store_detectability": False}
+    unused = dict.fromkeys(("store_mesh_state", "store_detectability", "store_healthy_twin"), False)
+    dataset = {**config["dataset"], **unused, "store_shaft_angle": True}
     whole = {**config, "plan": plan, "dataset": dataset}
     whole["classes"] = {"healthy": {"kind": "healthy", "vary": {}}}
     drawn = make_plan(whole)

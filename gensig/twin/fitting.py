@@ -10,11 +10,12 @@ import numpy as np
 from numpy.typing import NDArray
 
 from gensig.errors import ConfigError
+from gensig.signals.mesh_motion import Motion, Teeth
 from gensig.signals.recording import Recording
 from gensig.systems.spur_pair import CleanRecord, SpurPair
 from gensig.twin.grade import GRADES, N_SPECIMENS, Grade, fit_grade, simulated_lines, simulated_records
 from gensig.twin.lines import Lines, band_centers, band_sums, find_lines
-from gensig.twin.speed import Motion, Teeth, find_motion
+from gensig.twin.speed import find_motion
 from gensig.units import from_si, to_si
 
 Array = NDArray[np.float64]

@@ -10,9 +10,9 @@ from numpy.typing import NDArray
 
 from gensig.errors import SimulationError
 from gensig.sensing.manufacturing import draw_specimen
+from gensig.signals.mesh_motion import Teeth
 from gensig.systems.spur_pair import CleanRecord, Run, SpurPair, Start, simulate_together
 from gensig.twin.lines import Lines, find_lines
-from gensig.twin.speed import Teeth
 
 Array = NDArray[np.float64]
 

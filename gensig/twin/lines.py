@@ -9,7 +9,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from gensig.dynamics.decimation import usable_band
-from gensig.twin.speed import Teeth
+from gensig.signals.mesh_motion import Teeth
 
 Array = NDArray[np.float64]
 

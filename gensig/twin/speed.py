@@ -1,198 +1,25 @@
-"""Speed from the mesh: where its harmonics stand, and how their phase wanders.
-
-Search over a comb of harmonics, then demodulation of the phase: R. B. Randall (2011), "Vibration-based condition
-monitoring", Wiley, sections 3.3 and 3.6.2; several harmonics weighted as by F. Bonnardot, M. El Badaoui, R. B. Randall,
-J. Daniere & F. Guillet (2005), Mechanical Systems and Signal Processing 19 (4), 766-785.
-"""
+"""Where the lines of the gears stand in a recording of a twin, and how their phase wanders."""
 
 from __future__ import annotations
 
-import math
-from dataclasses import dataclass
-
-import numpy as np
-from numpy.typing import NDArray
-
 from gensig.dynamics.decimation import usable_band
-from gensig.errors import ConfigError
+from gensig.signals import mesh_motion
+from gensig.signals.mesh_motion import Motion, Teeth
 from gensig.signals.recording import Recording
-
-Array = NDArray[np.float64]
-
-SEARCH = 0.03  # the mesh frequency is looked for this far from the stated one, relative
-MOST_HARMONICS = 10
-FIRST_HARMONICS = 5  # a line of these must stand out ...
-LEAST_LINE_DB = 6.0  # ... by this much above what is around it,
-FALSE_ALARM = 1e-6  # and by more than noise would at one line with this probability
-TURNS_A_SEGMENT = 4  # of the slower gear, so that its sidebands are told from the mesh
-LEAST_TURNS = 8
-FOLLOWED = 0.4  # share of the slower shaft's frequency up to which the speed is followed
-PASSES = (1, 2, 4, 8)  # harmonics followed in each round: a coarse phase first, then a fine one
-
-
-@dataclass(frozen=True, slots=True, kw_only=True)
-class Teeth:
-    """Teeth of the driving and the driven gear."""
-
-    driving: int
-    driven: int
-
-    @property
-    def most(self) -> int:
-        """Teeth of the slower gear: mesh cycles in its turn."""
-        return max(self.driving, self.driven)
-
-
-@dataclass(frozen=True, slots=True, kw_only=True)
-class Motion:
-    """How the mesh moves through a recording.
-
-    ``mesh_frequency`` Hz, mean; ``cycles`` (sample,) mesh cycles since the first sample. ``scatter`` is the standard
-    deviation of the speed over its mean, ``correlation_time`` s; both None where the speed is steadier than
-    ``detection_limit``, the scatter that would have been seen, which is None where one harmonic alone was heard.
-    ``followed_time`` s is the correlation time that noise has after the lines are followed: a drift has a longer one.
-    ``line_db`` (harmonic,) dB is how far the lines stand out, at the sensor that hears each best.
-    """
-
-    mesh_frequency: float
-    cycles: Array
-    scatter: float | None
-    correlation_time: float | None
-    detection_limit: float | None
-    followed_time: float
-    line_db: Array
 
 
 def find_motion(recording: Recording, teeth: Teeth, speed_rpm: float) -> Motion:
-    """Speed and its drift in a recording, from the harmonics of the mesh.
+    """Speed and its drift, see `gensig.signals.mesh_motion.find_motion`, in the band that the twin has too.
 
     Raises
     ------
-    ConfigError    where the recording is too short or there is no sign of the mesh
+    ConfigError    where the recording is too short to fit or to check, or there is no sign of the mesh
     """
-    nominal = speed_rpm / 60.0 * teeth.driving
-    highest = usable_band(recording.sampling_rate)[1]
-    if nominal * (1.0 + SEARCH) > highest:
-        raise ConfigError(
-            f"the mesh frequency of {nominal:.5g} Hz lies above the usable band of {highest:.5g} Hz of this recording; "
-            "record faster, or check --teeth, --speed and --rate"
-        )
-    turns = recording.duration * nominal / teeth.most
-    if turns < LEAST_TURNS:
-        raise ConfigError(
-            f"too short: {recording.duration:.3g} s are {turns:.1f} turns of the slower gear, at least {LEAST_TURNS} "
-            "are needed to fit and as many to check; record longer, or give another recording with --check"
-        )
-    mesh, line_db = _search(recording, teeth, nominal)
-    least = _least_line_db(turns)
-    heard = np.flatnonzero(line_db >= least) + 1
-    if not np.any(heard <= FIRST_HARMONICS):
-        raise ConfigError(
-            f"no sign of the mesh: none of its first {FIRST_HARMONICS} harmonics within {100 * SEARCH:g} % of "
-            f"{nominal:.5g} Hz stands {least:.1f} dB above its surroundings; check --teeth, --speed and --rate"
-        )
-    return _follow(recording, teeth, mesh, heard, line_db)
-
-
-def _least_line_db(turns: float) -> float:
-    """What a line must stand above the median beside it: in few segments noise alone does so too."""
-    from scipy.stats import gamma
-
-    n_segments = max(1.0, 2.0 * turns / TURNS_A_SEGMENT - 1.0)
-    by_chance = gamma.isf(FALSE_ALARM, n_segments) / gamma.median(n_segments)
-    return max(LEAST_LINE_DB, 10.0 * math.log10(by_chance))
-
-
-def _search(recording: Recording, teeth: Teeth, nominal: float) -> tuple[float, Array]:
-    """Mesh frequency to a fraction of a line, and how far its harmonics stand out, (harmonic,) dB."""
-    from scipy.ndimage import median_filter
-    from scipy.signal import welch
-
-    rate, signal = recording.sampling_rate, recording.acceleration
-    length = min(signal.shape[1], round(TURNS_A_SEGMENT * teeth.most / nominal * rate))
-    padded = 8 * length
-    frequency, density = welch(signal, rate, nperseg=length, noverlap=length // 2, nfft=padded, axis=1)
-    floor = median_filter(density, size=(1, 8 * 4 * TURNS_A_SEGMENT + 1), mode="nearest")
-    standing = np.max(density / np.maximum(floor, 1e-300), axis=0)
-    n_harmonics = max(1, min(MOST_HARMONICS, int(usable_band(rate)[1] / (nominal * (1.0 + SEARCH)))))
-    candidates = np.linspace(1.0 - SEARCH, 1.0 + SEARCH, 4001) * nominal
-    harmonics = np.arange(1, n_harmonics + 1)
-    at_lines = np.interp(harmonics[:, None] * candidates, frequency, standing)
-    best = int(np.argmax(np.log10(np.maximum(at_lines, 1.0)).sum(axis=0)))
-    return float(candidates[best]), 10.0 * np.log10(np.maximum(at_lines[:, best], 1e-300))
-
-
-def _follow(recording: Recording, teeth: Teeth, mesh: float, heard: NDArray[np.intp], line_db: Array) -> Motion:
-    """Phase of the harmonics that are heard, in rounds; then what they agree on beyond their noise."""
-    rate, n_samples = recording.sampling_rate, recording.acceleration.shape[1]
-    cycles: Array = mesh * np.arange(n_samples, dtype=np.float64) / rate
-    slow = mesh / teeth.most
-    fast = mesh / min(teeth.driving, teeth.driven)
-    groups = np.empty((0, n_samples))
-    edge = math.ceil(1.5 / slow * rate)
-    for most in PASSES:
-        used = [int(harmonic) for harmonic in heard if harmonic <= max(most, heard[0])]
-        width = FOLLOWED * (fast if most == PASSES[0] else slow)
-        groups = _deviation(recording.acceleration, cycles, used, width, rate)
-        deviation = groups[0]
-        inner = slice(min(edge, n_samples // 8), n_samples - min(edge, n_samples // 8))
-        deviation = np.concatenate([  # a filter knows nothing beyond the ends
-            np.full(inner.start, deviation[inner.start]), deviation[inner],
-            np.full(n_samples - inner.stop, deviation[inner.stop - 1]),
-        ])  # fmt: skip
-        cycles = cycles + np.concatenate([[0.0], np.cumsum(deviation[:-1])]) / rate
-    mean = float((cycles[-1] - cycles[0]) * rate / (n_samples - 1))
-    instantaneous: Array = np.gradient(cycles[inner]) * rate / mean - 1.0
-    noise = 0.5 * (groups[1, inner] - groups[2, inner]) / mean if len(groups) == 3 else None
-    return _told(instantaneous, noise, mean, cycles, rate, slow, line_db)
-
-
-def _deviation(signal: Array, cycles: Array, used: list[int], width: float, rate: float) -> Array:
-    """What the mesh frequency is above that of ``cycles``, (group, sample) Hz: of all lines, then of every other one.
-
-    Each line is shifted to rest and kept within ``width`` Hz; its frequency is Im(z* dz/dt) / |z|^2. Lines are averaged
-    with the weight harmonic^2 power / noise, which is that of the least squares fit of one common frequency.
-    """
-    n_samples = signal.shape[1]
-    frequency = np.fft.fftfreq(n_samples, 1.0 / rate)
-    keep = np.exp(-0.5 * (frequency / (0.5 * width)) ** 2)
-    beside = (np.abs(frequency) > 1.5 * width) & (np.abs(frequency) < 2.5 * width)
-    parts = []
-    for harmonic in used:
-        shifted = np.fft.fft(signal * np.exp(-2j * np.pi * harmonic * cycles), axis=1)
-        line = np.fft.ifft(shifted * keep, axis=1)
-        turning = np.fft.ifft(shifted * keep * 2j * np.pi * frequency, axis=1)
-        noise = np.median(np.abs(shifted[:, beside]) ** 2, axis=1) + 1e-300
-        top = np.sum((line.conj() * turning).imag / noise[:, None], axis=0) * harmonic
-        bottom = np.sum(np.abs(line) ** 2 / noise[:, None], axis=0) * harmonic**2
-        parts.append((top, bottom))
-    parts.sort(key=lambda part: -float(part[1].mean()))
-    groups = [parts, parts[::2], parts[1::2]] if len(parts) > 1 else [parts]
-    return np.stack(
-        [sum(top for top, _ in some) / sum(bottom for _, bottom in some) / (2.0 * np.pi) for some in groups]
-    )
-
-
-def _told(
-    deviation: Array, noise: Array | None, mean: float, cycles: Array, rate: float, slow: float, line_db: Array
-) -> Motion:
-    """Drift where it is above the noise of the lines; its correlation time is where the correlation falls to 1/e."""
-    variance = float(np.var(deviation))
-    limit = None if noise is None else float(np.sqrt(np.mean(noise**2)))
-    scatter = correlation = None
-    if limit is not None and variance > (2.0 * limit) ** 2:
-        scatter = math.sqrt(variance - limit**2)
-        step = max(1, int(rate / (20.0 * slow)))
-        coarse = deviation[::step] - deviation.mean()
-        lags = np.correlate(coarse, coarse, "full")[len(coarse) - 1 :] / np.arange(len(coarse), 0, -1)
-        below = np.flatnonzero(lags[: len(coarse) // 2] < lags[0] / math.e)
-        correlation = float(below[0] if len(below) else len(coarse) // 2) * step / rate
-    return Motion(
-        mesh_frequency=mean,
-        cycles=cycles,
-        scatter=scatter,
-        correlation_time=correlation,
-        detection_limit=None if limit is None else 2.0 * limit,
-        followed_time=1.0 / (math.pi * 0.5 * FOLLOWED * slow),
-        line_db=line_db,
+    return mesh_motion.find_motion(
+        recording,
+        teeth,
+        speed_rpm,
+        highest=usable_band(recording.sampling_rate)[1],
+        options="--teeth, --speed and --rate",
+        longer="as many again to check: record longer, or give another recording with --check",
     )

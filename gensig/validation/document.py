@@ -11,6 +11,9 @@ from gensig.validation.rows import DIFFERS, FAILS, VERDICTS, Result
 SOURCE_TITLES = {
     "spur_reference": "Reference numbers for the spur pair",
     "spur_paper": "What the spur paper prints and claims",
+    "helical_reference": "Reference numbers for both helical pairs",
+    "helical_error_paper": "What the paper on transmission error and flank modification prints",
+    "helical_heat_paper": "What the paper on helical stiffness with temperature prints: cold gears",
 }
 SOURCE_TEXTS = {
     "spur_reference": "Computed independently of this project (rack geometry, potential-energy method, 2-D finite "
@@ -26,6 +29,17 @@ SOURCE_TEXTS = {
     "law with all that gensig takes by default (`one_sided`). Records are 15 turns of the pinion, perfect teeth, no "
     "noise, 20 N m (assumed), acceleration of the pinion's bearing along the line of action. Lines without a "
     "criterion show numbers that belong to the claims.",
+    "helical_reference": "Computed independently of this project by transverse slices with the potential-energy "
+    "method, Sainsot's body, linear Hertz, bores of half the pitch radius, plain sum of pairs, contact on the path "
+    "only. That model takes the involute down to the root circle, and so do these lines, by a rack with a nearly sharp "
+    "tip (cutter_tip_radius_coefficient=0.02); beside them stand a rounded rack and what gensig takes by default "
+    "(`rounded`, `ours`): a root that a rounded rack cuts makes teeth stiffer, and contact at the tips' corners "
+    "carries load beyond the path.",
+    "helical_error_paper": "Liu, Lai, Yue, Xu & Li (2016), gears 61/132, 178 N m. Lines `in_phase` leave out the helix "
+    "of the contact lines, `misaligned` have 5.2 um over the face. No line was tuned; the addendum is the one with "
+    "which the printed contact ratio comes out.",
+    "helical_heat_paper": "Gears 40/162, 24.351 kN m; bores of half the pitch radius, an even split of the profile "
+    "shift and the rack's rounding are assumed, the paper prints none of them. Hot gears are not computed yet.",
 }
 TITLES = {
     "geometry": "Teeth and root transition curve",
@@ -84,6 +98,14 @@ TITLES = {
     "severity": "Severity series",
     "root_curve": "What the root transition curve buys",
     "roll_torque": "Torque that keeps the energy balance",
+    "helical_geometry": "Geometry",
+    "slices": "Loaded slices",
+    "schemes_aligned": "The three modifications, aligned",
+    "schemes_misaligned": "The three modifications, 5.2 um misaligned",
+    "printed_geometry": "Geometry and load",
+    "printed_error": "Transmission error and line load",
+    "printed_schemes": "Tables 3 to 5",
+    "cold": "Cold stiffness",
 }
 INTRO = """# Validation
 

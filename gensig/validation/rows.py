@@ -18,7 +18,7 @@ from importlib import resources
 
 from gensig.errors import ConfigError
 
-SOURCES = ("spur_reference", "spur_paper")
+SOURCES = ("spur_reference", "spur_paper", "helical_reference", "helical_error_paper", "helical_heat_paper")
 REPRODUCED, DIFFERS = "reproduced", "differs"
 HOLDS, FAILS = "claim holds", "claim does not hold"
 NOT_PRINTED = "not printed"
@@ -35,6 +35,9 @@ UNITS = {
     "1e8 N/m": 1e8,
     "1e-12 m/N": 1e-12,
     "N/mm": 1e3,
+    "N": 1.0,
+    "MPa": 1e6,
+    "1e9 N/m": 1e9,
     "N/(mm um)": 1e9,  # per face width
     "mm um/N": 1e-9,
     "kg": 1.0,

@@ -1,5 +1,6 @@
 """A data set in memory with the interface of `gensig.dataset.reader.Dataset`: mesh tone plus impulses once a turn."""
 
+import json
 from pathlib import Path
 
 import numpy as np
@@ -25,6 +26,8 @@ class FakeDataset:
         strength=1.0,
         noise=0.5,
         seed=0,
+        twins=False,
+        sham=False,
     ):
         self.folder = Path("fake")
         self.n_records = n_units * records_per_unit
@@ -32,6 +35,9 @@ class FakeDataset:
         self.class_names = tuple(classes)
         self.channel_names = tuple(f"channel_{index}" for index in range(n_channels))
         self.attributes = {"schema_version": 1, "sampling_rate_hz": sampling_rate, **N_TEETH}
+        self.attributes["config_json"] = json.dumps({"plan": {"sham": sham}})
+        self.signal_names = ["acceleration", *(["healthy_twin"] if twins else [])]
+        self.sham = sham
         self.protocols = ("by_unit", "random_window_leaky")
         self.left_out = {"cross_specimen": "1 specimen_id in the plan, and at least 4 are needed"}
         self.usable = np.ones(self.n_records, dtype=bool)
@@ -58,16 +64,19 @@ class FakeDataset:
     def column(self, name):
         return self.columns[name]
 
-    def signals(self, record_index, start=0, stop=None, channels=None):
+    def signals(self, record_index, start=0, stop=None, channels=None, *, name="acceleration"):
+        is_twin = self.signal_names.index(name) > 0
         rng = np.random.default_rng([self.seed, record_index])
         time = np.arange(self.n_samples) / self.sampling_rate
         turn = self.columns["speed_rpm"][record_index] / 60
-        name = self.class_names[self.columns["label"][record_index]]
+        fault = self.class_names[self.columns["label"][record_index]]
         phase = rng.uniform()
         mesh = np.sin(2 * np.pi * 23 * (turn * time + phase)) + 0.5 * np.sin(4 * np.pi * 23 * (turn * time + phase))
         since = np.mod(turn * time + phase, 1.0) / turn
-        ringing = np.exp(-since / 8e-4) * np.sin(2 * np.pi * CARRIER_HZ[name] * since)
-        height = self.strength * IMPULSE[name] * (0.5 + self.columns["severity"][record_index])
+        ringing = np.exp(-since / 8e-4) * np.sin(2 * np.pi * CARRIER_HZ[fault] * since)
+        height = self.strength * IMPULSE[fault] * (0.5 + self.columns["severity"][record_index])
+        height = 0.0 if self.sham or is_twin else height
+        rng = np.random.default_rng([self.seed, record_index, 1]) if is_twin else rng
         noise = self.noise * rng.standard_normal((len(self.channel_names), self.n_samples))
         gain = self.columns["unit_gain"][record_index] * np.linspace(1.0, 0.6, len(self.channel_names))[:, None]
         signal = (gain * (mesh + height * ringing) + noise).astype(np.float32)

@@ -62,7 +62,7 @@ def test_train_writes_what_it_promises(trained):
     names = {path.name for path in trained.iterdir()}
     assert names == {
         "metrics.json", "predictions.csv", "report.html", "models", "scores.png",
-        "severity.png", "reliability.png", "confusion_by_unit.png", "confusion_random_window_leaky.png",
+        "reliability.png", "confusion_by_unit.png", "confusion_random_window_leaky.png",
         "detection_by_unit.png", "window_length.png", "scores.csv", "by_severity.csv", "comparisons.csv",
         "confusion_by_unit.csv", "confusion_random_window_leaky.csv",
     }  # fmt: skip
@@ -72,7 +72,8 @@ def test_train_writes_what_it_promises(trained):
     assert "cross_specimen is left out: 1 specimen" in (trained / "report.html").read_text()
     methods = metrics["protocols"]["by_unit"]["methods"]
     assert set(methods) == {
-        "cnn", "label_shuffle", "indicators", "indicators_without_level", "rms_threshold", "chance",
+        "cnn", "label_shuffle", "indicators", "indicators_without_level", "rms_threshold", "metadata_probe",
+        "result_probe", "chance",
     }  # fmt: skip
     for name in ("cnn", "label_shuffle", "indicators", "rms_threshold"):
         value = methods[name]["balanced_accuracy"]
@@ -118,14 +119,19 @@ def test_the_page_stands_alone_and_says_what_matters(trained):
     assert text.index("by_unit") < text.index("random_window_leaky (LEAKY)") < text.index("Which faults are found")
     assert "1-NN" not in text
     sources = re.findall(r'src="([^"]{0,40})', page)
-    assert len(sources) == 7
+    assert len(sources) == 6
     assert all(source.startswith("data:image/png;base64,") for source in sources)
     assert "<script" not in page
 
 
 def test_chosen_baselines_stand_in_the_report(data, tmp_path):
     out = tmp_path / "out"
-    few = ["protocols=[by_unit]", "shuffle_control=false", "baselines=[nearest_spectrum,minirocket]"]
+    few = [
+        "protocols=[by_unit]",
+        "shuffle_control=false",
+        "baselines=[nearest_spectrum,minirocket]",
+        "metadata_probe=false",
+    ]
     words = ["train", "data=good", f"out={out}", *FAST[:2], "epochs=1", "seeds=[0]", *FAST[4:], *few]
     assert main([*words, "minirocket_features=168"]) == 0
     text = visible_text((out / "report.html").read_text())
@@ -175,7 +181,7 @@ def test_evaluate_on_another_data_set_takes_all_records(trained, data, capsys):
 @pytest.mark.parametrize(
     ("changes", "attributes", "message"),
     [
-        ({"sampling_rate": 25600.0}, {}, "sampled at 25600 Hz, trained at 12800 Hz"),
+        ({"sampling_rate": 6400.0}, {}, "sampled at 6400 Hz, trained at 12800 Hz"),
         ({"classes": ("healthy", "crack", "pitting", "broken")}, {}, "its classes are healthy, crack, pitting, broken"),
         ({"classes": ("healthy", "crack")}, {}, "its classes are healthy, crack, the model knows"),
         ({}, {"schema_version": 2}, "data schema 2, trained on schema 1"),
@@ -230,8 +236,9 @@ def test_evaluate_refuses_damaged_models(trained, data, capsys, tmp_path):
         (["train", "data=none", "out=OUT"], "none is no data set"),
         (["train", "data=good", "out=OUT", "protocols=[by_unitt]"], "no protocol 'by_unitt'; did you mean by_unit"),
         (["train", "data=good", "out=OUT", "protocols=[cross_specimen]"], "cross_specimen: 1 specimen_id in the plan"),
-        (["train", "data=good", "out=OUT", "protocols=[by_unit,healthy_only]"], "training has not all classes"),
-        (["train", "data=good", "out=OUT", "protocols=[open_set]"], "protocol open_set: training has not all classes"),
+        (["train", "data=good", "out=OUT", "protocols=[open_set]"], "no protocol 'open_set'"),
+        (["train", "data=good", "out=OUT", "protocols=[cross_sensor]"], "cross_sensor: the data set has 1 channel"),
+        (["train", "data=good", "out=OUT", "test_channels=[channel_0]"], "test_channels needs channels beside it"),
         (["train", "data=good", "out=OUT", "classes=[healthy,crak]"], "no class 'crak'; did you mean crack"),
         (["train", "data=good", "out=OUT", "classes=[crack]"], "one class only (crack)"),
         (["train", "data=good", "out=OUT", "epoch=3"], "epochs"),

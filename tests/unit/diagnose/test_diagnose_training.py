@@ -122,7 +122,8 @@ def test_leaky_protocols_come_last_and_every_job_is_there():
     dataset.protocols = ("random_window_leaky", "by_unit")
     protocols, jobs = plan_study(task_from(dataset, settings), settings)
     assert protocols == ("by_unit", "random_window_leaky")
-    assert len(jobs) == 1 + 2 * (2 + 1)
+    assert len(jobs) == 1 + 2 * (2 + 1) + 1
+    assert jobs[-1].protocols == ("by_unit",)  # controls are for clean protocols alone
 
 
 def test_a_part_with_one_class_is_refused():

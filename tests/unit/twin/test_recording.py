@@ -8,9 +8,10 @@ from numpy.testing import assert_allclose
 
 from gensig.cli import main
 from gensig.errors import ConfigError
+from gensig.signals.mesh_motion import Teeth
 from gensig.signals.recording import STANDARD_GRAVITY
 from gensig.twin.recording import read_recording
-from gensig.twin.speed import Teeth, find_motion
+from gensig.twin.speed import find_motion
 
 RATE = 5120.0
 SIGNAL = np.random.default_rng(1).standard_normal((2, 20_000))

@@ -8,9 +8,10 @@ from machines import GRADE, RATE, SPEED, TEETH, drifting, measured
 from gensig.cli import main
 from gensig.config import read_request
 from gensig.dataset.reader import open_dataset
+from gensig.signals.mesh_motion import Teeth
 from gensig.signals.recording import Recording
 from gensig.twin.fitting import gain_at, minimum_phase
-from gensig.twin.speed import Teeth, find_motion
+from gensig.twin.speed import find_motion
 
 BOTH = Teeth(driving=TEETH[0], driven=TEETH[1])
 WRONG_START = 1.012 * SPEED

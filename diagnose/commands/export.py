@@ -1,0 +1,44 @@
+"""``diagnose export``."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from pathlib import Path
+
+from diagnose.commands.parser import verb_parser
+from gensig.errors import ConfigError, DatasetError
+
+HELP = """\
+Write a trained network for other programs, and check the file against torch.
+
+The file takes windows (window, channel, sample) in m/s2 as float32 and gives log-probabilities (window, class); mean
+and RMS of the windows are taken off inside. Names of classes and channels, rate, window and temperature are in its
+metadata."""
+EXAMPLE = """\
+example:
+  diagnose export --to onnx --model runs/report/models/by_unit-seed0 --out gearbox.onnx"""
+
+
+def run(words: Sequence[str]) -> int:
+    """Write the file, check it, and say how well it agrees."""
+    parser = verb_parser("export", HELP, EXAMPLE)
+    parser.add_argument("--to", required=True, choices=["onnx"], help="format; needs pip install 'gensig[onnx]'")
+    parser.add_argument("--model", required=True, metavar="DIR", help="folder that diagnose train wrote below models/")
+    parser.add_argument("--out", required=True, metavar="FILE", help="file to write, .onnx; must not exist")
+    arguments = parser.parse_args(words)
+    out = Path(arguments.out)
+    if out.suffix != ".onnx":
+        raise ConfigError(f"--out {out}: the name must end in .onnx")
+    if out.exists() or out.is_symlink():
+        raise DatasetError(f"--out {out} exists; choose another or remove it")
+    if not out.parent.is_dir():
+        raise DatasetError(f"--out {out}: there is no folder {out.parent}")
+    from diagnose.model_io import load_model
+    from diagnose.onnx_export import export_onnx, need_packages
+
+    need_packages()
+    model, description = load_model(arguments.model)
+    difference = export_onnx(model, description, out)
+    size = out.stat().st_size / 1e3
+    print(f"{out}: {size:.0f} kB, log-probabilities within {difference:.1g} of torch's on windows of many levels")
+    return 0

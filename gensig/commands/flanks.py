@@ -1,0 +1,135 @@
+"""Verbs on the loaded flanks of a pair, slice by slice: transmission-error, and stiffness of a helical pair."""
+
+from __future__ import annotations
+
+import json
+import sys
+from argparse import Namespace
+from collections.abc import Mapping
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+
+from gensig.commands.console import one_line_warnings, replaced_file
+from gensig.config import read_request
+from gensig.errors import ConfigError
+from gensig.faults.registry import read_faults
+from gensig.systems.registry import read_sliced_pair
+from gensig.systems.sliced_pair import SlicedPair, TransmissionError
+
+FIGURE_TYPES = (".png", ".svg", ".pdf")
+LOST_SHARE = 0.02  # of the bearing field; less is the edge of the reliefs
+
+
+def transmission_error(arguments: Namespace) -> int:
+    """Static transmission error under load over one mesh period: JSON, a figure, or a summary."""
+    if arguments.plot is not None and Path(arguments.plot).suffix not in FIGURE_TYPES:
+        raise ConfigError(f"--plot {arguments.plot}: the name must end in {', '.join(FIGURE_TYPES)}")
+    request = read_request(arguments.overrides, config_dir=arguments.config_dir)
+    with one_line_warnings("gensig"):
+        system = sound_pair(request.config)
+        result = system.transmission_error()
+        _warn_of_lost_contact(system, result)
+    content = transmission_error_content(system, result)
+    if arguments.json:
+        _write_json(arguments.json, content)
+    if arguments.plot:
+        from gensig.commands.flank_figures import plot_transmission_error
+
+        with replaced_file(arguments.plot) as path:
+            plot_transmission_error(system, result, path)
+    print(f"contact ratio              {content['transverse_contact_ratio']:.4f} transverse, "
+          f"{content['overlap_ratio']:.4f} overlap, {content['total_contact_ratio']:.4f} total")  # fmt: skip
+    print(f"transmission error, mean   {content['mean_um']:.4f} um")
+    print(f"peak to peak               {content['peak_to_peak_um']:.4f} um")
+    orders = ", ".join(f"{value:.4f}" for value in content["harmonics_um"][:4])
+    print(f"mesh orders 1 to 4         {orders} um")
+    print(f"largest line load          {content['max_line_load_n_per_mm']:.2f} N/mm")
+    print(f"largest contact pressure   {content['max_contact_pressure_mpa']:.1f} MPa")
+    return 0
+
+
+def transmission_error_content(system: SlicedPair, result: TransmissionError) -> dict[str, Any]:
+    """The keys of ``gensig transmission-error --json``."""
+    pair, error = system.pair, result.error
+    return {
+        "transverse_contact_ratio": pair.transverse_contact_ratio,
+        "overlap_ratio": pair.overlap_ratio,
+        "total_contact_ratio": pair.total_contact_ratio,
+        "center_distance_mm": pair.center_distance * 1e3,
+        "mesh_force_n": system.mesh_force,
+        "roll_angle_deg": np.degrees(result.contact.roll / pair.pinion.base_radius).tolist(),
+        "transmission_error_um": (error * 1e6).tolist(),
+        "mean_um": float(error.mean()) * 1e6,
+        "peak_to_peak_um": float(np.ptp(error)) * 1e6,
+        "harmonics_um": (result.harmonics * 1e6).tolist(),
+        "mesh_stiffness_n_per_m": result.contact.stiffness.tolist(),
+        "max_line_load_n_per_mm": float(result.contact.line_load.max()) * 1e-3,
+        "max_contact_pressure_mpa": float(result.pressure.max()) * 1e-6,
+        "load_share": result.load_share.tolist(),
+        "bearing_share_of_field": result.bearing,
+        "slice_place_mm": (result.slice_place * 1e3).tolist(),
+        "line_load_n_per_mm": (result.contact.line_load * 1e-3).tolist(),
+        "contact_position": (result.contact.position / pair.base_pitch).tolist(),
+    }
+
+
+def sliced_stiffness(config: Mapping[str, Any], arguments: Namespace) -> int:
+    """``gensig stiffness`` of a pair cut into slices: curves to JSON, a figure, or a summary."""
+    with one_line_warnings("gensig"):
+        system = sound_pair(config)
+        result = system.transmission_error()
+        position, single = system.single_pair()
+    stiffness = result.contact.stiffness
+    content = {
+        "transverse_contact_ratio": system.pair.transverse_contact_ratio,
+        "overlap_ratio": system.pair.overlap_ratio,
+        "total_contact_ratio": system.pair.total_contact_ratio,
+        "base_pitch_mm": system.pair.base_pitch * 1e3,
+        "contact_position": (position / system.pair.base_pitch).tolist(),
+        "single_pair_stiffness_n_per_m": single.tolist(),
+        "roll_angle_deg": np.degrees(result.contact.roll / system.pair.pinion.base_radius).tolist(),
+        "mesh_stiffness_n_per_m": stiffness.tolist(),
+        "mesh_stiffness_mean_n_per_m": float(stiffness.mean()),
+        "mesh_stiffness_kind": "dF/d(approach) at static equilibrium, contact term as a secant",
+    }
+    if arguments.json:
+        _write_json(arguments.json, content)
+    if arguments.plot:
+        from gensig.commands.flank_figures import plot_sliced_stiffness
+
+        with replaced_file(arguments.plot) as path:
+            plot_sliced_stiffness(system, result, position, single, path)
+    print(f"contact ratio              {system.pair.transverse_contact_ratio:.4f} transverse, "
+          f"{system.pair.overlap_ratio:.4f} overlap, {system.pair.total_contact_ratio:.4f} total")  # fmt: skip
+    print(f"mesh stiffness, mean       {stiffness.mean():.4e} N/m")
+    print(f"mesh stiffness, range      {stiffness.min():.4e} .. {stiffness.max():.4e} N/m")
+    print(f"single pair, highest       {single.max():.4e} N/m")
+    return 0
+
+
+def sound_pair(config: Mapping[str, Any]) -> SlicedPair:
+    """The pair of a configuration; refuses faults, which slices do not know yet."""
+    if read_faults(config["fault"]):
+        raise ConfigError(
+            f"fault={config['fault']['kind']}: the flanks here are sound ones; take fault=healthy, and gensig "
+            f"stiffness with system=spur_pair for faults"
+        )
+    return read_sliced_pair(config)
+
+
+def _warn_of_lost_contact(system: SlicedPair, result: TransmissionError) -> None:
+    """Say how much of the field of action a modification takes out of contact."""
+    lost = 1.0 - result.bearing
+    if system.modification.is_any and lost > LOST_SHARE:
+        print(
+            f"gensig: WARNING: {lost:.0%} of the field of action carry no load: the modification or the misalignment "
+            f"is deeper than {system.torque:g} N m can close",
+            file=sys.stderr,
+        )
+
+
+def _write_json(file: str, content: Mapping[str, Any]) -> None:
+    with replaced_file(file) as path:
+        path.write_text(json.dumps(content, indent=1) + "\n", encoding="utf-8")

@@ -1,0 +1,135 @@
+"""Compiled core of the loaded contact in slices: which slices of which pairs bear, and how much.
+
+Scalar code without reassociation, in the order of the arrays.
+"""
+
+from __future__ import annotations
+
+import functools
+from typing import Any
+
+import numpy as np
+from numba import njit
+
+_compiled: Any = functools.partial(njit, nogil=True, cache=True, error_model="numpy")()
+
+ROUNDS = 100  # at most, of the bearing slices and the logarithm's load
+SETTLED = 1e-12  # relative change of the approach that ends the rounds
+LEAST_INTENSITY = 1e-3  # of the even load per width: the logarithm has no limit where a slice lets go
+
+
+@_compiled
+def solve_slices(
+    structure, factor, constant, log_weight, gap, width, coupling, shared, force, even, approach, stiffness, line_load
+):
+    """Loads of all slices of all pairs at one force, phase by phase.
+
+    Slice j of pair i stands back by gap[i, j] and is as soft as structure[i, j] + contact. The structure's deflection w
+    along the face obeys k w - (k coupling w')' = p for the load per width p, k = 1 / structure, with free ends; without
+    coupling every slice bends by itself. Source of the differential form: Pasternak (1954), a foundation with shear.
+
+    Parameters
+    ----------
+    structure : (phase, pair, slice) m2/N     of teeth and bodies of both gears, per width, without what pairs share
+    factor, constant (phase, pair, slice), log_weight : contact compliance factor (constant - log_weight ln p), m2/N
+    gap : (phase, pair, slice) m              inf where there is no flank
+    width : (phase, pair, slice) m            of each slice, less where the field of action cuts it
+    coupling : squared length over which slices couple, over the squared width of a slice
+    shared : m/N                              body compliance that all pairs share
+    force, even : N, N/m                      total force, and the load per width that scales the logarithm
+    approach, stiffness : (phase,) m, N/m     written; inf and 0 where nothing can touch
+    line_load : (phase, pair, slice) N/m      written
+
+    Returns
+    -------
+    number of phases whose bearing slices were still changing after `ROUNDS`
+    """
+    n_phases, n_pairs, n_slices = gap.shape
+    contact, bearing = np.empty((n_pairs, n_slices)), np.zeros((n_pairs, n_slices), np.bool_)
+    lift, rest = np.empty((n_pairs, n_slices)), np.empty((n_pairs, n_slices))
+    diagonal, upper = np.empty(n_slices), np.empty(n_slices)
+    n_unsettled = 0
+    for k in range(n_phases):
+        first = np.inf
+        for i in range(n_pairs):
+            for j in range(n_slices):
+                contact[i, j] = factor * (constant[k, i, j] - log_weight * np.log(even))
+                bearing[i, j] = width[k, i, j] > 0.0 and gap[k, i, j] < np.inf
+                if bearing[i, j]:
+                    first = min(first, gap[k, i, j])
+        line_load[k] = 0.0
+        if first == np.inf:
+            approach[k], stiffness[k] = np.inf, 0.0
+            continue
+        last, total, settled = np.inf, 0.0, False
+        for _ in range(ROUNDS):
+            total, moment = 0.0, 0.0
+            for i in range(n_pairs):
+                if not bearing[i].any():
+                    continue
+                _deflections(
+                    structure[k, i], contact[i], gap[k, i], first, bearing[i], coupling, diagonal, upper,
+                    lift[i], rest[i],
+                )  # fmt: skip
+                for j in range(n_slices):
+                    if bearing[i, j]:
+                        total += width[k, i, j] * (1.0 - lift[i, j]) / contact[i, j]
+                        moment += width[k, i, j] * (gap[k, i, j] - first - rest[i, j]) / contact[i, j]
+            local = (force + moment) / total  # above the first gap
+            changed = False
+            for i in range(n_pairs):
+                none = not bearing[i].any()
+                for j in range(n_slices):
+                    if width[k, i, j] <= 0.0 or gap[k, i, j] == np.inf:
+                        continue
+                    moved = 0.0 if none else lift[i, j] * local - rest[i, j]
+                    bite = local - (gap[k, i, j] - first) - moved
+                    touches = bite > 0.0
+                    if touches != bearing[i, j]:
+                        bearing[i, j] = touches
+                        changed = True
+                    if touches:
+                        load = bite / contact[i, j]
+                        line_load[k, i, j] = load
+                        contact[i, j] = factor * (
+                            constant[k, i, j] - log_weight * np.log(max(load, LEAST_INTENSITY * even))
+                        )
+                    else:
+                        line_load[k, i, j] = 0.0
+            settled = not changed and abs(local - last) <= SETTLED * local
+            last = local
+            if settled:
+                break
+        n_unsettled += not settled
+        approach[k] = first + last + shared * force
+        stiffness[k] = total / (1.0 + shared * total)
+    return n_unsettled
+
+
+@_compiled
+def _deflections(structure, contact, gap, first, bearing, coupling, diagonal, upper, lift, rest):
+    """Deflection of one pair's structure, lift x (approach above the first gap) - rest, (slice,) each, written.
+
+    Where a slice bears, its load per width is (approach - gap - w) / contact: one tridiagonal system, solved for the
+    part that goes with the approach and the one that does not (Thomas, whose pivots are positive here).
+    """
+    n_slices = structure.shape[0]
+    for j in range(n_slices):
+        own = 1.0 / structure[j]
+        before = 0.0 if j == 0 else coupling * 2.0 / (structure[j] + structure[j - 1])
+        after = 0.0 if j == n_slices - 1 else coupling * 2.0 / (structure[j] + structure[j + 1])
+        pressed = 1.0 / contact[j] if bearing[j] else 0.0
+        pivot = own + before + after + pressed
+        lift[j] = pressed
+        rest[j] = pressed * (gap[j] - first) if bearing[j] else 0.0
+        if j > 0:
+            ratio = -before / diagonal[j - 1]
+            pivot -= ratio * upper[j - 1]
+            lift[j] -= ratio * lift[j - 1]
+            rest[j] -= ratio * rest[j - 1]
+        diagonal[j], upper[j] = pivot, -after
+    for j in range(n_slices - 1, -1, -1):
+        follow_lift = 0.0 if j == n_slices - 1 else lift[j + 1]
+        follow_rest = 0.0 if j == n_slices - 1 else rest[j + 1]
+        lift[j] = (lift[j] - upper[j] * follow_lift) / diagonal[j]
+        rest[j] = (rest[j] - upper[j] * follow_rest) / diagonal[j]

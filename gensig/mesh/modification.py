@@ -1,0 +1,148 @@
+"""Flanks that are ground back on purpose, or stand askew: relief, crowning, helix slope, misalignment.
+
+Depths are along the transverse line of action and count into the flank. Heights are radial, from the tip or from the
+lowest working point. Source of the shapes and names: ISO 21771-1:2024, section on flank modifications.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, fields, replace
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from gensig.errors import ConfigError
+from gensig.geometry.contact import GearPair
+from gensig.geometry.gear import Gear
+from gensig.units import from_si, unit
+
+Array = NDArray[np.float64]
+
+SHAPES = {"linear": 1, "parabolic": 2}  # exponent of the share of the height
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class FlankModification:
+    """What is ground off one gear's flanks, the same on every tooth; all 0 is the involute helicoid.
+
+    Parameters
+    ----------
+    tip_relief, root_relief : m      depth at the tip and at the lowest working point
+    tip_relief_height, root_relief_height : m    radial, over which they run out
+    profile_shape : ``linear`` or ``parabolic``    of both over the height
+    crowning : m                     depth at both ends of the face, parabolic
+    end_relief : m                   depth at both ends of the face, linear over `end_relief_width`
+    end_relief_width : m
+    helix_slope : m                  depth at the end that enters last, from none at the other, linear; may be negative
+    """
+
+    tip_relief: float = unit("um", default=0.0)
+    tip_relief_height: float = unit("mm", default=0.0)
+    root_relief: float = unit("um", default=0.0)
+    root_relief_height: float = unit("mm", default=0.0)
+    profile_shape: str = "linear"
+    crowning: float = unit("um", default=0.0)
+    end_relief: float = unit("um", default=0.0)
+    end_relief_width: float = unit("mm", default=0.0)
+    helix_slope: float = unit("um", default=0.0)
+
+    def __post_init__(self) -> None:
+        if self.profile_shape not in SHAPES:
+            raise ConfigError(f"profile_shape = {self.profile_shape!r}; allowed: {', '.join(SHAPES)}")
+        for field in fields(self):
+            value: Any = getattr(self, field.name)
+            if field.name not in ("profile_shape", "helix_slope") and not value >= 0.0:
+                key = f"{field.name}_{field.metadata['unit']}"
+                raise ConfigError(f"{key} = {from_si(key, value):g} must not be negative")
+        for depth, length, key in (
+            (self.tip_relief, self.tip_relief_height, "tip_relief_height_mm"),
+            (self.root_relief, self.root_relief_height, "root_relief_height_mm"),
+            (self.end_relief, self.end_relief_width, "end_relief_width_mm"),
+        ):
+            if depth > 0.0 and length == 0.0:
+                raise ConfigError(f"{key} = 0: a relief of {depth * 1e6:g} um needs a length to run out over")
+
+    def profile(self, gear: Gear, curvature_radius: Array, lowest: float) -> Array:
+        """Depth over the profile, (point,) m.
+
+        Parameters
+        ----------
+        curvature_radius : (point,) m    of the flank
+        lowest : m                       curvature radius of the lowest working point
+
+        Raises
+        ------
+        ConfigError    for reliefs that overlap
+        """
+        radius = np.hypot(gear.base_radius, curvature_radius)
+        start = float(np.hypot(gear.base_radius, lowest))
+        working = gear.tip_radius - start
+        tip = self.tip_relief_height if self.tip_relief else 0.0
+        root = self.root_relief_height if self.root_relief else 0.0
+        if tip + root > working:
+            raise ConfigError(
+                f"{gear.name}: tip_relief_height_mm = {tip * 1e3:g} and root_relief_height_mm = {root * 1e3:g} "
+                f"overlap: the working flank is {working * 1e3:.4g} mm high; reduce one"
+            )
+        power = SHAPES[self.profile_shape]
+        depth = np.zeros_like(radius)
+        if tip:
+            depth += self.tip_relief * np.maximum((radius - gear.tip_radius + tip) / tip, 0.0) ** power
+        if root:
+            depth += self.root_relief * np.maximum((start + root - radius) / root, 0.0) ** power
+        return depth
+
+    def lead(self, place: Array, face_width: float) -> Array:
+        """Depth across the face, (slice,) m; ``place`` (slice,) m from the end that enters first.
+
+        Raises
+        ------
+        ConfigError    for end reliefs that overlap
+        """
+        if self.end_relief and 2.0 * self.end_relief_width > face_width:
+            raise ConfigError(
+                f"end_relief_width_mm = {self.end_relief_width * 1e3:g} at both ends overlaps on a face of "
+                f"{face_width * 1e3:g} mm; reduce it to at most half"
+            )
+        from_middle = 2.0 * place / face_width - 1.0
+        depth = self.crowning * from_middle**2 + self.helix_slope * place / face_width
+        if self.end_relief:
+            from_end = np.minimum(place, face_width - place)
+            depth = depth + self.end_relief * np.maximum(1.0 - from_end / self.end_relief_width, 0.0)
+        return depth
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class PairModification:
+    """Both gears' modifications and how much the shafts are out of line, m over the face, along the line of action."""
+
+    pinion: FlankModification
+    wheel: FlankModification
+    misalignment: float = unit("um", default=0.0)
+
+    @property
+    def is_any(self) -> bool:
+        """Whether anything stands otherwise than an aligned involute helicoid."""
+        plain = FlankModification()
+        return self.misalignment != 0.0 or any(
+            replace(side, profile_shape=plain.profile_shape) != plain for side in (self.pinion, self.wheel)
+        )
+
+    def deviation(self, pair: GearPair, position: Array, place: Array) -> Array:
+        """How far both flanks stand back where they meet, (slice, node) m; nowhere less than 0.
+
+        Parameters
+        ----------
+        position : (node,) m    on the path of contact, from A; beyond it the nearest end counts
+        place : (slice,) m      from the end that enters first
+        """
+        on_path = np.clip(position, 0.0, pair.path_of_contact)
+        width = pair.face_width
+        profile = self.pinion.profile(
+            pair.pinion, np.asarray(pair.pinion_curvature(on_path)), float(pair.pinion_curvature(0.0))
+        ) + self.wheel.profile(
+            pair.wheel, np.asarray(pair.wheel_curvature(on_path)), float(pair.wheel_curvature(pair.path_of_contact))
+        )
+        lead = self.pinion.lead(place, width) + self.wheel.lead(place, width) + self.misalignment * place / width
+        return profile + (lead - min(float(lead.min()), 0.0))[:, None]

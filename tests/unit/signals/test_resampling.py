@@ -1,0 +1,63 @@
+"""A change of rate: what is kept, what is shut out, and the same samples however they are cut."""
+
+import numpy as np
+import pytest
+from numpy.testing import assert_allclose, assert_array_equal
+
+from gensig.dynamics.decimation import PASS_SHARE as RECORDER_SHARE
+from gensig.signals.resampling import PASS_SHARE, RateChange, rate_change
+
+PAIRS = [(51200, 12800), (51200, 5000), (51200, 25600), (44100, 12800), (12000, 12800)]
+
+
+def tone(frequency, rate, n_samples):
+    return np.sin(2 * np.pi * frequency * np.arange(n_samples) / rate)
+
+
+@pytest.mark.parametrize(("found", "wanted"), PAIRS)
+def test_tones_in_the_band_are_those_of_the_other_rate(found, wanted):
+    frequency = 0.38 * min(found, wanted)
+    made = rate_change(found, wanted).apply(tone(frequency, found, found))
+    assert made.size == wanted
+    edge = wanted // 10
+    expected = tone(frequency, wanted, wanted)
+    assert_allclose(made[edge:-edge], expected[edge:-edge], rtol=0, atol=1e-3)
+
+
+@pytest.mark.parametrize(("found", "wanted"), [pair for pair in PAIRS if pair[0] > 1.2 * pair[1]])
+def test_tones_above_half_the_new_rate_do_not_fold(found, wanted):
+    change = rate_change(found, wanted)
+    for share in (0.5, 0.6, 0.9):
+        frequency = share * wanted
+        if frequency < 0.5 * found:
+            assert np.abs(change.apply(tone(frequency, found, found))[wanted // 10 : -wanted // 10]).max() < 1e-5
+    assert np.abs(tone(0.6 * wanted, found, found)[:: max(found // wanted, 1)]).max() > 0.9  # without a low-pass
+
+
+@pytest.mark.parametrize(("found", "wanted"), PAIRS)
+def test_a_part_has_the_samples_of_the_whole(found, wanted):
+    signal = np.random.default_rng(0).standard_normal((2, 20_000))
+    change = rate_change(found, wanted)
+    whole = change.apply(signal)
+    n_samples = whole.shape[1]
+    assert n_samples == change.n_samples(20_000)
+    for start, stop in [(0, n_samples), (0, 1), (777, 1234), (n_samples - 3, n_samples)]:
+        part = change.apply_to_part(lambda first, last: signal[:, first:last], 20_000, start, stop)
+        assert_allclose(part, whole[:, start:stop], rtol=0, atol=1e-12)
+
+
+def test_the_same_rate_changes_nothing():
+    signal = np.random.default_rng(0).standard_normal(100)
+    change = rate_change(25_600.0, 25_600.0)
+    assert change.is_none
+    assert_array_equal(change.apply(signal), signal)
+
+
+def test_the_band_is_that_of_the_simulated_recorder():
+    assert PASS_SHARE == RECORDER_SHARE
+
+
+def test_no_ratio_is_refused():
+    for up, down in [(0, 1), (2, 4)]:
+        with pytest.raises(ValueError, match="no ratio"):
+            RateChange(up=up, down=down)

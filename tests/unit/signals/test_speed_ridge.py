@@ -1,0 +1,77 @@
+"""The mesh of a wandering speed is followed to a fraction of a tooth; noise and other speeds are not followed."""
+
+import numpy as np
+import pytest
+
+from gensig.errors import ConfigError
+from gensig.signals.mesh_motion import Teeth
+from gensig.signals.recording import Recording
+from gensig.signals.speed_ridge import mesh_frequency_course, wandering_mesh_cycles
+
+RATE = 25600.0
+TEETH = Teeth(driving=23, driven=57)
+SPEED = 1500.0  # r/min
+
+
+def recording(depth, *, noise=1.0, duration=3.0, seed=0):
+    """Mesh of four harmonics with sidebands of both shafts, and its cycles, at a speed that swings by a share."""
+    rng = np.random.default_rng(seed)
+    time = np.arange(round(duration * RATE)) / RATE
+    swing = 2 * np.pi * 0.7
+    turned = SPEED / 60 * (time + depth / swing * (1 - np.cos(swing * time)))
+    cycles = TEETH.driving * turned
+    signal = np.zeros((2, time.size))
+    for harmonic in range(1, 5):
+        for orders in (0.0, 1.0, -1.0, TEETH.driving / TEETH.driven, -TEETH.driving / TEETH.driven):
+            height = (1.0 if orders == 0 else 0.15) / harmonic * rng.uniform(0.5, 1.5, (2, 1))
+            phase = rng.uniform(0, 2 * np.pi, (2, 1))
+            signal += height * np.cos(2 * np.pi * (harmonic * cycles + orders * turned) + phase)
+    signal += noise * rng.standard_normal(signal.shape)
+    return Recording(sensors=("a", "b"), acceleration=signal, sampling_rate=RATE), cycles
+
+
+def followed(made, speed_rpm=SPEED):
+    return wandering_mesh_cycles(made, TEETH, speed_rpm, highest=10_000.0, options="the speed", longer="record longer")
+
+
+@pytest.mark.parametrize("depth", [0.0, 0.003, 0.01, 0.02])
+@pytest.mark.parametrize("stated", [0.995, 1.0, 1.005])
+def test_cycles_are_found_to_a_fraction_of_a_tooth(depth, stated):
+    made, cycles = recording(depth)
+    error = followed(made, stated * SPEED) - cycles
+    assert np.std(error) < 0.05
+    assert np.all(np.diff(followed(made)) > 0)
+
+
+def test_a_steady_line_would_miss_it():
+    """What the test above would say of an answer that does not follow."""
+    _, cycles = recording(0.01)
+    steady = np.arange(cycles.size) / RATE * SPEED / 60 * TEETH.driving
+    assert np.std(steady - cycles) > 0.5
+
+
+@pytest.mark.parametrize("seed", range(8))
+def test_noise_is_not_followed(seed):
+    noise = np.random.default_rng(seed).standard_normal((1 + seed % 3, round((0.6 + seed % 4) * RATE)))
+    made = Recording(sensors=("a",), acceleration=noise, sampling_rate=RATE)
+    with pytest.raises(ConfigError, match="sign of the mesh"):
+        followed(made)
+
+
+def test_a_speed_beyond_the_search_is_refused():
+    with pytest.raises(ConfigError, match="sign of the mesh"):
+        followed(recording(0.0)[0], 1.12 * SPEED)
+
+
+def test_the_course_is_the_frequency_over_time():
+    made, cycles = recording(0.02)
+    mesh = SPEED / 60 * TEETH.driving
+    time, found = mesh_frequency_course(made.acceleration, RATE, TEETH.driving, mesh, search=0.03, highest=10_000.0)
+    true = np.interp(time, np.arange(cycles.size) / RATE, np.gradient(cycles) * RATE)
+    assert np.abs(found / true - 1).max() < 6e-3
+    assert np.std(found / true - 1) < 2e-3
+    for wrong in ({"search": 0.05}, {"highest": 500.0}):
+        with pytest.raises(ValueError, match="no course"):
+            mesh_frequency_course(
+                made.acceleration, RATE, TEETH.driving, mesh, **{"search": 0.03, "highest": 10_000.0, **wrong}
+            )
