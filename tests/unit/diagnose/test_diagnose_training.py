@@ -10,7 +10,7 @@ from fake_dataset import FakeDataset
 from diagnose.jobs import Job, run_jobs
 from diagnose.models import build_model
 from diagnose.settings import settings_from
-from diagnose.study import plan_study, score_predictions, severity_rows, task_from
+from diagnose.study import plan_study, score_predictions, task_from
 from diagnose.train import train_network, with_shuffled_labels
 from diagnose.windows import load_windows, subset_segments
 from gensig.compose import compose
@@ -132,17 +132,6 @@ def test_a_part_with_one_class_is_refused():
     dataset.usable[48:] = dataset.columns["label"][48:] == 1
     with pytest.raises(ConfigError, match=r"one class only in its test part \(crack\)"):
         plan_study(task_from(dataset, settings), settings)
-
-
-def test_severity_rows_count_hits():
-    dataset = FakeDataset(n_units=8, records_per_unit=8)
-    task = task_from(dataset, make_settings())
-    record = np.arange(dataset.n_records)
-    label, severity = task.labels(), dataset.column("severity")
-    rows = severity_rows(task, [(record, np.where(severity > 0.5, label, 0))])
-    assert {row["class"] for row in rows} == {"crack", "pitting", "missing_tooth"}
-    assert all(row["recall"] == float(row["severity_low"] > 0.5) for row in rows)
-    assert sum(row["n_records"] for row in rows) == (label > 0).sum()
 
 
 @pytest.mark.parametrize(
