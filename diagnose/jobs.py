@@ -29,7 +29,7 @@ from diagnose.oracle import Cache as OracleCache
 from diagnose.oracle import fit_oracle_indicators, oracle_windows
 from diagnose.predictions import Prediction, Rows
 from diagnose.probe import fit_probe
-from diagnose.protocols import OPEN_PROTOCOLS
+from diagnose.protocols import HEALTHY_ONLY, OPEN_PROTOCOLS
 from diagnose.settings import TrainSettings
 from diagnose.sham import sham_method, sham_task
 from diagnose.tensorboard import epoch_log
@@ -105,7 +105,8 @@ def run_job(task: Task, settings: TrainSettings, job: Job) -> list[Outcome]:
         name = job.protocols[0]
         if job.seed is None:
             return [*fitted_runs(task, settings, name, _windows(task, name))]
-        return [*trained_runs(settings, name, job.seed, _windows(task, name, "", settings.model))]
+        heard = None if name == HEALTHY_ONLY else settings.model  # the autoencoder hears time
+        return [*trained_runs(settings, name, job.seed, _windows(task, name, "", heard))]
     if job.control == SHAM:
         task = _sham(task, settings)
     if job.seed is not None:

@@ -12,7 +12,8 @@ if TYPE_CHECKING:
     from diagnose.windows import Task
 
 # Their training lacks classes that the test has: scores of novelty are judged there, not accuracy over classes.
-OPEN_PROTOCOLS = ("healthy_only", "open_set")
+HEALTHY_ONLY = "healthy_only"
+OPEN_PROTOCOLS = (HEALTHY_ONLY, "open_set")
 MEANING = {
     "by_unit": "tested on machines (unit = one set of gears in one gearbox) never seen in training",
     "cross_specimen": "on sets of gears never seen",
