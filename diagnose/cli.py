@@ -17,6 +17,7 @@ VERBS = {
     "export": "write a trained network as ONNX",
     "adapt": "move a trained network to a machine by its healthy recordings",
     "detectability": "which test shows a fault: maps over speed, torque, channel and bandwidth",
+    "score": "score predictions of your own, beside a frozen benchmark",
 }
 
 

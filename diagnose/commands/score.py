@@ -1,0 +1,47 @@
+"""``diagnose score``."""
+
+from __future__ import annotations
+
+import json
+import sys
+from collections.abc import Sequence
+from pathlib import Path
+
+from diagnose.commands.parser import verb_parser
+
+HELP = """\
+Score predictions of your own on a data set's split, by the scorer of diagnose train.
+
+FILE is a CSV with the columns record_id and predicted (a class name); protocol, method and seed may stand beside, as
+in the predictions.csv of diagnose train. Every test record is named once. Where the data set is a frozen benchmark,
+the results that ship with it stand beside yours."""
+EXAMPLE = """\
+examples:
+  diagnose score --data runs/benchmark --predictions mine.csv
+  diagnose score --data runs/benchmark --predictions runs/report/predictions.csv --json"""
+
+
+def run(words: Sequence[str]) -> int:
+    """Print the scores; a benchmark that differs from the frozen one is named on stderr and not compared."""
+    parser = verb_parser("score", HELP, EXAMPLE)
+    parser.add_argument("--data", required=True, metavar="DIR", help="data set made by gensig generate")
+    parser.add_argument("--predictions", required=True, metavar="FILE", help="CSV: record_id, predicted, ...")
+    parser.add_argument("--protocol", metavar="NAME", help="of a file without that column (default: by_unit)")
+    parser.add_argument("--json", action="store_true", help="print everything as JSON")
+    arguments = parser.parse_args(words)
+    from diagnose.scoring import score_file, score_table
+    from gensig.dataset.reader import open_dataset
+
+    dataset = open_dataset(arguments.data)
+    result = score_file(dataset, Path(arguments.predictions), protocol=arguments.protocol)
+    if arguments.json:
+        print(json.dumps(result, indent=2, allow_nan=False))
+        return 0
+    benchmark = result["benchmark"]
+    if benchmark is not None:
+        for difference in benchmark["differences"]:
+            print(f"diagnose: not comparable with {benchmark['name']}: {difference}", file=sys.stderr)
+        if not benchmark["differences"]:
+            print(f"{benchmark['name']}: plan, splits and signals are the frozen ones")
+    print("\n".join(score_table(result)))
+    return 0
