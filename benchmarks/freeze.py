@@ -1,6 +1,6 @@
-"""Freeze a data set and what was reached on it as a benchmark: ``python -m benchmarks.freeze NAME DATA REPORT``.
+"""Freeze a data set and what was reached on it as a benchmark: ``python -m benchmarks.freeze NAME DATA REPORT...``.
 
-DATA is the folder of ``gensig generate experiment=NAME``, REPORT that of a ``diagnose train`` on it. Writes
+DATA is the folder of ``gensig generate experiment=NAME``, each REPORT that of a ``diagnose train`` on it. Writes
 ``diagnose/frozen/NAME.json``; an existing one is never written again: a benchmark that changes needs another name.
 """
 
@@ -8,6 +8,7 @@ from __future__ import annotations
 
 import argparse
 import json
+from collections.abc import Sequence
 from dataclasses import asdict
 from pathlib import Path
 
@@ -23,19 +24,13 @@ DIGITS = 9
 CONTROLS = ("label_shuffle", "sham", "metadata_probe", "result_probe", "oracle_network", "oracle_indicators")
 
 
-def freeze(name: str, data: Path, report: Path) -> Benchmark:
-    """The benchmark that a data set and a report on it make."""
+def freeze(name: str, data: Path, reports: Sequence[Path]) -> Benchmark:
+    """The benchmark that a data set and reports on it make."""
     dataset = open_dataset(data)
-    metrics = json.loads((report / "metrics.json").read_text(encoding="utf-8"))
-    results = {
-        protocol: {
-            method: {key: round(values["balanced_accuracy"][key], 4) for key in ("mean", "low", "high")}
-            for method, values in result["methods"].items()
-            if isinstance(values["balanced_accuracy"], dict) and method not in CONTROLS
-        }
-        for protocol, result in metrics["protocols"].items()
-        if not is_leaky(protocol)
-    }
+    results: dict[str, dict[str, dict[str, float]]] = {}
+    for report in reports:
+        for protocol, methods in _results(report).items():
+            results.setdefault(protocol, {}).update(methods)
     chosen = np.linspace(0, dataset.n_records - 1, N_RECORDS).astype(int)
     return Benchmark(
         name=name,
@@ -52,11 +47,25 @@ def freeze(name: str, data: Path, report: Path) -> Benchmark:
     )
 
 
+def _results(report: Path) -> dict[str, dict[str, dict[str, float]]]:
+    """Balanced accuracy with its interval by clean protocol and method."""
+    metrics = json.loads((report / "metrics.json").read_text(encoding="utf-8"))
+    return {
+        protocol: {
+            method: {key: round(values["balanced_accuracy"][key], 4) for key in ("mean", "low", "high")}
+            for method, values in result["methods"].items()
+            if isinstance(values["balanced_accuracy"], dict) and method not in CONTROLS
+        }
+        for protocol, result in metrics["protocols"].items()
+        if not is_leaky(protocol)
+    }
+
+
 def main() -> None:
     parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
     parser.add_argument("name")
     parser.add_argument("data", type=Path)
-    parser.add_argument("report", type=Path)
+    parser.add_argument("report", type=Path, nargs="+")
     arguments = parser.parse_args()
     target = FOLDER / f"{arguments.name}.json"
     benchmark = freeze(arguments.name, arguments.data, arguments.report)
