@@ -29,6 +29,9 @@ MISSING = float("nan")
 FIXED_KEYS = (
     "gear.",
     "system.",
+    "modification.",
+    "mesh.n_slices",
+    "mesh.coupling_modules",
     "sensing.sampling_rate_hz",
     "sensing.path.",
     "sensing.tacho.",
