@@ -1,0 +1,1 @@
+"""What gears suffer over their lives: root stress, wear, growing cracks and pits."""
