@@ -22,9 +22,9 @@ from gensig.faults.registry import COMPOUND, fault_parts, read_faults
 from gensig.mesh.pair_table import check_teeth
 from gensig.records import signal_shapes
 from gensig.rows import MISSING, Stream, read_seed, record_system, replace_key, stream, whole_number
+from gensig.systems.pair_machine import PairMachine, severity
 from gensig.systems.registry import read_system
 from gensig.systems.shaft_sensors import SWITCHES
-from gensig.systems.spur_pair import SpurPair, severity
 from gensig.units import from_si
 
 SHARD_BYTES = 65_536_000  # 80 records of 4 x 51,200 float32 samples
@@ -204,7 +204,7 @@ def _fitting(plan: Mapping[str, Any], n_records: int, counts: tuple[int, ...]) -
 
 def _row(
     config: Mapping[str, Any],
-    system: SpurPair,
+    system: PairMachine,
     fault: dict[str, Any],
     values: dict[str, float],
     start: np.random.Generator,

@@ -16,8 +16,8 @@ from gensig.faults.registry import read_faults
 from gensig.planning import make_plan, record_bytes, records_per_shard
 from gensig.records import simulate_record
 from gensig.rows import row_faults, stream
+from gensig.systems.pair_machine import severity
 from gensig.systems.registry import read_system
-from gensig.systems.spur_pair import severity
 
 CLASSES = ("healthy", "crack", "pitting", "missing_tooth")
 SHARED = ("unit_id", "gearbox_id", "specimen_id", "condition_id", "speed_set_rpm", "torque_nm", "snr_db")
