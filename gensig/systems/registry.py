@@ -16,10 +16,11 @@ from gensig.mesh.options import read_mesh_options, read_slice_options
 from gensig.sensing.manufacturing import Quality
 from gensig.sensing.reading import read_sensing
 from gensig.systems.operation import read_operating
+from gensig.systems.helical_pair import HelicalPair
 from gensig.systems.pair_machine import PairMachine
 from gensig.systems.sliced_pair import SlicedPair
 from gensig.systems.spur_pair import SpurPair
-from gensig.systems.supports import AS_GIVEN, on_bearings, put_on_bearings, read_holding
+from gensig.systems.supports import AS_GIVEN, held_axially, on_bearings, put_on_bearings, read_holding
 from gensig.units import read, to_si
 
 SIDES = ("pinion", "wheel")
@@ -48,13 +49,27 @@ def read_spur_pair(config: Mapping[str, Any]) -> SpurPair:
             "modification: system=spur_pair has its reliefs as faults (fault=tip_relief, fault=misalignment); a "
             "modification is taken by gensig transmission-error, and by gensig stiffness with system=helical_pair"
         )
+    return SpurPair(pair=read_pair(config), **_read_machine(config, read_pair(config)))
+
+
+def read_helical_pair(config: Mapping[str, Any]) -> HelicalPair:
+    """Build a helical pair, or a spur pair in slices, from the boundary keys of a configuration."""
+    flanks = read_sliced_pair(config)
+    machine = _read_machine(config, flanks.pair)
+    bodies = {
+        name: held_axially(machine[name], getattr(flanks.pair, name), section(config, "gear", name)) for name in SIDES
+    }
+    return HelicalPair(pair=flanks.pair, flanks=flanks, **{**machine, **bodies})
+
+
+def _read_machine(config: Mapping[str, Any], pair: GearPair) -> dict[str, Any]:
+    """What a pair's machine has whatever its teeth, by the fields of ``PairMachine``."""
     material = read_material(config)
     sides = {name: section(config, "gear", name) for name in SIDES}
     machine = section(config, "system")
     for key in machine:
         if key not in SYSTEM_KEYS:
             raise ConfigError(f"system: unknown key '{key}'; known: {', '.join(SYSTEM_KEYS)}")
-    pair = read_pair(config)
     gears = {"pinion": pair.pinion, "wheel": pair.wheel}
     operating, quality = (
         read_operating(section(config, "operating")),
@@ -65,19 +80,18 @@ def read_spur_pair(config: Mapping[str, Any]) -> SpurPair:
     if on_bearings(machine.get("supports", AS_GIVEN), quality):
         force = operating.torque / gears["pinion"].base_radius
         bodies = {name: put_on_bearings(bodies[name], gears[name], held[name], material, force) for name in SIDES}
-    return SpurPair(
-        pair=pair,
-        material=material,
-        mesh=read_mesh_options(section(config, "mesh")),
-        pinion=bodies["pinion"],
-        wheel=bodies["wheel"],
-        operating=operating,
-        sensing=read_sensing(section(config, "sensing")),
-        quality=quality,
-        solver=read(Solver, section(config, "solver"), "solver"),
-        motor=_read_rotor("system.motor", machine.get("motor")),
-        load=_read_rotor("system.load", machine.get("load")),
-    )
+    return {
+        "material": material,
+        "mesh": read_mesh_options(section(config, "mesh")),
+        "pinion": bodies["pinion"],
+        "wheel": bodies["wheel"],
+        "operating": operating,
+        "sensing": read_sensing(section(config, "sensing")),
+        "quality": quality,
+        "solver": read(Solver, section(config, "solver"), "solver"),
+        "motor": _read_rotor("system.motor", machine.get("motor")),
+        "load": _read_rotor("system.load", machine.get("load")),
+    }
 
 
 def read_sliced_pair(config: Mapping[str, Any]) -> SlicedPair:
@@ -122,7 +136,7 @@ def read_modification(config: Mapping[str, Any]) -> PairModification:
     return read(PairModification, own, "modification", **sides)
 
 
-SYSTEMS: dict[str, Callable[[Mapping[str, Any]], PairMachine]] = {"spur_pair": read_spur_pair}
+SYSTEMS: dict[str, Callable[[Mapping[str, Any]], PairMachine]] = {"spur_pair": read_spur_pair, SLICED: read_helical_pair}
 
 
 def read_system(config: Mapping[str, Any]) -> PairMachine:
@@ -133,13 +147,8 @@ def read_system(config: Mapping[str, Any]) -> PairMachine:
     ConfigError, GeometryError    for keys or values that make no machine
     """
     kind = section(config, "system").get("kind")
-    if kind == SLICED:
-        raise ConfigError(
-            f"system={kind} has statics so far: take gensig stiffness or gensig transmission-error; records "
-            f"are made by system={', '.join(SYSTEMS)}"
-        )
     if kind not in SYSTEMS:
-        raise ConfigError(f"system.kind = {kind!r}; allowed: {', '.join((*SYSTEMS, SLICED))}")
+        raise ConfigError(f"system.kind = {kind!r}; allowed: {', '.join(SYSTEMS)}")
     return SYSTEMS[kind](config)
 
 
@@ -172,7 +181,8 @@ def _read_body(gear: Gear, values: Mapping[str, Any], material: Material) -> Bod
         if not value > 0.0:
             raise ConfigError(f"gear.{gear.name}.{key} = {value:g} must be positive, or null to derive it")
     try:
-        support = read(Support, section(values, "support"), "support")
+        given_support = {key: value for key, value in section(values, "support").items() if value is not None}
+        support = read(Support, given_support, "support")
     except ConfigError as error:
         raise ConfigError(f"gear.{gear.name}.{error}") from None
     return Body(mass=mass, inertia=inertia, support=support)

@@ -70,11 +70,14 @@ class SlicedPair:
 
     def sliced_mesh(self) -> SlicedMesh:
         """The pair cut into slices, modified flanks included."""
-        deviation = None
-        if self.modification.is_any:
-            position, place = node_positions(self.pair, self.mesh), slice_places(self.pair, self.slices)
-            deviation = self.modification.deviation(self.pair, position, place)
-        return sliced_mesh(self.pair, self.material, self.mesh, self.slices, deviation=deviation)
+        return sliced_mesh(self.pair, self.material, self.mesh, self.slices, deviation=self.deviation())
+
+    def deviation(self) -> Array | None:
+        """How far all flanks stand back at the table's positions, (slice, node) m; None for perfect ones."""
+        if not self.modification.is_any:
+            return None
+        position, place = node_positions(self.pair, self.mesh), slice_places(self.pair, self.slices)
+        return self.modification.deviation(self.pair, position, place)
 
     def phases(self, n_phases: int = N_PHASES) -> Array:
         """Rolls of equally spaced phases of one mesh period, (phase,) m."""
