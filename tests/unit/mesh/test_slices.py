@@ -98,7 +98,7 @@ def test_loads_add_up_and_never_pull(mesh_keys):
     for changes in ({}, {"contact": "linear"}, {"slice_coupling": "coupled"}):
         mesh, contact = solved(pair, 178.0, mesh_keys, **changes)
         force = 178.0 / pair.pinion.base_radius
-        np.testing.assert_allclose(contact.line_load.sum(axis=(1, 2)) * mesh.slice_width, force, rtol=1e-9)
+        np.testing.assert_allclose(contact.line_load.sum(axis=(1, 2)) * mesh.slice_width[0], force, rtol=1e-9)
         assert contact.line_load.min() >= 0.0
 
 
@@ -109,7 +109,7 @@ def test_equilibrium_is_that_of_an_independent_solver(mesh_keys, length):
     changes = {"contact": "linear", "slice_coupling": "coupled", "coupling_modules": length, "n_slices": 12}
     deviation = np.linspace(0.0, 8e-6, 12)[:, None]
     mesh, contact = solved(pair, 60.0, mesh_keys, n_phases=3, deviation=deviation, **changes)
-    force, width = 60.0 / pair.pinion.base_radius, mesh.slice_width
+    force, width = 60.0 / pair.pinion.base_radius, mesh.slice_width[0]
     coupling = (length * pair.pinion.normal_module / width) ** 2
     for k in range(3):
         position = contact.position[k]
