@@ -15,8 +15,8 @@ from gensig.mesh.modification import FlankModification, PairModification
 from gensig.mesh.options import read_mesh_options, read_slice_options
 from gensig.sensing.manufacturing import Quality
 from gensig.sensing.reading import read_sensing
-from gensig.systems.operation import read_operating
 from gensig.systems.helical_pair import HelicalPair
+from gensig.systems.operation import read_operating
 from gensig.systems.pair_machine import PairMachine
 from gensig.systems.sliced_pair import SlicedPair
 from gensig.systems.spur_pair import SpurPair
@@ -136,7 +136,10 @@ def read_modification(config: Mapping[str, Any]) -> PairModification:
     return read(PairModification, own, "modification", **sides)
 
 
-SYSTEMS: dict[str, Callable[[Mapping[str, Any]], PairMachine]] = {"spur_pair": read_spur_pair, SLICED: read_helical_pair}
+SYSTEMS: dict[str, Callable[[Mapping[str, Any]], PairMachine]] = {
+    "spur_pair": read_spur_pair,
+    SLICED: read_helical_pair,
+}
 
 
 def read_system(config: Mapping[str, Any]) -> PairMachine:

@@ -124,7 +124,8 @@ def held_axially(body: Body, gear: Gear, values: Mapping[str, Any]) -> Body:
 def in_gearbox(body: Body, gearbox: Gearbox, axes: slice, quality: Quality) -> Body:
     """A gear on its support in one gearbox; ``axes`` are the two places of its x and y among the four supports.
 
-    Stiffness scatters about what it is, along the axis and in tilting as the mean of both radial ones. So does damping, unless ``quality`` has a range of damping ratios: then the
+    Stiffness scatters about what it is, along the axis and in tilting as the mean of both radial ones. So does damping,
+    unless ``quality`` has a range of damping ratios: then the
     ratio is the gearbox's, and without one the middle of the range.
     """
     support, stiffness, damping = body.support, gearbox.stiffness_factor[axes], gearbox.damping_factor[axes]
