@@ -14,7 +14,7 @@ from gensig.dynamics import _layout as layout
 from gensig.dynamics._equations import P_TURN, accelerate, event, motion, recenter, set_out
 from gensig.dynamics._layout import AHEAD, BASE, NOMINAL, PART, ROLL, at_row
 from gensig.dynamics._mesh_kernels import mesh_law
-from gensig.dynamics._tables import between, cover, gather, left_out_between
+from gensig.dynamics._tables import beside_between, between, cover, gather
 from gensig.dynamics._vector import (
     any_above,
     compiled,
@@ -138,7 +138,7 @@ def integrate(
                 source, target, slot_0, h, offset = parted, parted, PART, (1.0 - share) * step, share * step
             between(slot_0, slot_1, layout.MIDDLE, first, last, work)
             if group.n_chords > 1:
-                left_out_between(slot_0, slot_1, layout.MIDDLE, first, last, work)
+                beside_between(slot_0, slot_1, layout.MIDDLE, first, last, work)
             half = 0.5 * h
             at, ahead = source, trial_a
             loaded = zero
@@ -222,9 +222,9 @@ def integrate(
     if begin == 2:
         for i in range(0, layout.SLOT_ROWS * n, n):
             store(work, layout.SLOT_ROWS * n + i, load(work, 2 * layout.SLOT_ROWS * n + i))
-        for i in range(0, layout.LEFT_OUT_ROWS * n, n):
-            kept = load(work, (layout.LEFT_OUT + 2 * layout.LEFT_OUT_ROWS) * n + i)
-            store(work, (layout.LEFT_OUT + layout.LEFT_OUT_ROWS) * n + i, kept)
+        for i in range(0, layout.BESIDE_ROWS * n, n):
+            kept = load(work, (layout.BESIDE + 2 * layout.BESIDE_ROWS) * n + i)
+            store(work, (layout.BESIDE + layout.BESIDE_ROWS) * n + i, kept)
         for lane in range(n):
             wide[(ROLL + 1) * n + lane] = wide[(ROLL + 2) * n + lane]
         for k in range(4):

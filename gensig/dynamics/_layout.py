@@ -53,12 +53,13 @@ LAW = MOTION + 4
 RAW = LAW + N_LAW  # table rows as they are read, lane by lane
 PAIR_FORCE = RAW + MOST_PAIRS * COLUMNS
 # of chords only: the force that bends what pairs share, the same at the last step's end, the approach less that
-# deflection in the middle of the step, and by slot and pair the energy that the chord's spring leaves out, its slope
+# deflection in the middle of the step, table rows as they are read, and the same by slot and pair
 TOTAL = PAIR_FORCE + MOST_PAIRS
-LAST_TOTAL, LOCAL, LEFT_OUT = TOTAL + 1, TOTAL + 2, TOTAL + 3
-ENERGY_COLUMNS = 2
-LEFT_OUT_ROWS = MOST_PAIRS * ENERGY_COLUMNS
-N_MESH = LEFT_OUT + N_SLOTS * LEFT_OUT_ROWS
+LAST_TOTAL, LOCAL, RAW_BESIDE = TOTAL + 1, TOTAL + 2, TOTAL + 3
+BESIDE = RAW_BESIDE + MOST_PAIRS * COLUMNS
+LEFT_OUT, LEFT_OUT_SLOPE, TOUCH, TOUCH_SLOPE = range(COLUMNS)
+BESIDE_ROWS = MOST_PAIRS * COLUMNS
+N_MESH = BESIDE + N_SLOTS * BESIDE_ROWS
 # what is told of the mesh at an output sample: the newest pair, the normal force, and that of every pair
 SEEN_NEWEST, SEEN_FORCE, SEEN_PAIRS, N_SEEN = 0, 1, 2, 2 + MOST_PAIRS
 # rows of the float64 scratch
@@ -76,10 +77,10 @@ class Group(NamedTuple):
     ``numbers``, ``exact`` and ``places`` hold rows as named above. ``table`` holds, lane after lane, the pairs of
     distinct teeth (pinion's times wheel's, node, [c, c', g, g']), or where those are many the distinct teeth of the
     pinion and then those of the wheel, whose ``WHEEL_ROWS`` is then not 0. Helical pairs have ``n_chords`` of them, one
-    behind the other, ``depth`` (lane, chord) m says from which bite on each holds, and ``left_out`` beside every node
-    the energy in J that the chord's spring leaves out and its slope. ``n_pairs`` are followed at once.
-    ``bend`` (lane, 4) is half the distance of nodes where a column is followed by its slope, else 0: values bend
-    between nodes as their slopes say.
+    behind the other, ``depth`` (lane, chord) m says from which bite on each holds, and ``beside`` has the places of the
+    table and holds [energy in J that the chord's spring leaves out, its slope, gap of the first touch, its slope].
+    ``n_pairs`` are followed at once. ``bend`` (lane, 4) is half the distance of nodes where a column is followed by its
+    slope, else 0: values bend between nodes as their slopes say.
     ``tooth_row`` is the row of every tooth (-1 for a missing one), ``tooth_error`` its gap in m at the pitch point,
     ``tooth_tilt`` how fast that grows along the path in m/m.
 
@@ -101,7 +102,7 @@ class Group(NamedTuple):
     n_chords: int
     table: Any
     depth: Any
-    left_out: Any
+    beside: Any
     bend: Any
     tooth_row: Any
     tooth_error: Any

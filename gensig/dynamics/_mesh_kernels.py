@@ -11,11 +11,12 @@ from gensig.dynamics._layout import (
     AHEAD,
     BACKLASH,
     BASE,
+    BESIDE,
+    BESIDE_ROWS,
     BITE,
     COAST_TABLE,
     COLUMNS,
     DAMPING,
-    ENERGY_COLUMNS,
     FIRST_PITCH,
     FOLLOWED,
     FRICTION,
@@ -25,7 +26,7 @@ from gensig.dynamics._layout import (
     LAST_CELL,
     LAW,
     LEFT_OUT,
-    LEFT_OUT_ROWS,
+    LEFT_OUT_SLOPE,
     MIDDLE_POINT,
     MOST_PAIRS,
     MOTION,
@@ -53,6 +54,7 @@ from gensig.dynamics._layout import (
     TABLE_START,
     TANGENT_LENGTH,
     TOTAL,
+    TOUCH_SLOPE,
     WHEEL_ROWS,
     WHEEL_TEETH,
     WHEEL_TOOTH,
@@ -120,7 +122,8 @@ def one_sided_law(
     Normal force, friction force, friction moments about pinion and wheel, force on the roll coordinate (energy
     balance), stored energy, power lost in mesh damping, number of loaded pairs; a vector each. Rows ``margin`` take
     how deep every pair bites into the body that the others deflect, negative where it does not, and ``PAIR_FORCE`` its
-    normal force; none if negative. ``chords`` asks for the energy that springs of chords leave out.
+    normal force; none if negative. Of ``chords``, the damping goes by the gap of the first touch, for their own jump
+    from one to the next, and the energy that their springs leave out is stored too.
     """
     n = width(work)
     zero, one = spread(work, 0.0), spread(work, 1.0)
@@ -149,7 +152,10 @@ def one_sided_law(
         slope = load(work, (pair + GAP_SLOPE) * n)
         elastic = (bite - shared * total) * load(work, (pair + STIFFNESS) * n)
         elastic = where_above(bite, zero, elastic, zero)
-        rate = approach_rate - slope * roll_rate
+        felt = slope
+        if chords:
+            felt = load(work, (BESIDE + slot * BESIDE_ROWS + k * COLUMNS + TOUCH_SLOPE) * n)
+        rate = approach_rate - felt * roll_rate
         force = elastic * (1.0 + damping * rate)
         force = where_above(force, zero, force, zero)
         if margin >= 0:
@@ -165,10 +171,17 @@ def one_sided_law(
     if chords:
         store(work, TOTAL * n, total)
         for k in range(first, last):
-            row = (LEFT_OUT + slot * LEFT_OUT_ROWS + k * ENERGY_COLUMNS) * n
-            bite, slope = load(work, (BITE + k) * n), load(work, row + n)
-            stored = stored + where_above(bite, zero, load(work, row) + ahead * slope, zero)
-            along = along - where_above(bite, zero, slope, zero)
+            pair, row = (slot * SLOT_ROWS + k * N_KEPT) * n, (BESIDE + slot * BESIDE_ROWS + k * COLUMNS) * n
+            bite, slope = load(work, (BITE + k) * n), load(work, row + LEFT_OUT_SLOPE * n)
+            left_out = load(work, row + LEFT_OUT * n) + ahead * slope
+            elastic = (bite - shared * total) * load(work, pair + STIFFNESS * n)
+            felt = load(work, row + TOUCH_SLOPE * n)
+            rate = approach_rate - felt * roll_rate
+            force = elastic * (1.0 + damping * rate)
+            damped = where_above(force, zero, force, zero) - elastic
+            turned = damped * (felt - load(work, pair + GAP_SLOPE * n)) - slope
+            stored = stored + where_above(bite, zero, left_out, zero)
+            along = along + where_above(bite, zero, turned, zero)
     if not consistent:
         along = zero
     return normal, friction, moment_p, moment_w, along, stored, lost, loaded

@@ -8,10 +8,11 @@ from gensig.dynamics._layout import (
     AHEAD,
     AT_PINION,
     AT_WHEEL,
+    BESIDE,
+    BESIDE_ROWS,
     CHORD,
     CHORD_STRIDE,
     COLUMNS,
-    ENERGY_COLUMNS,
     ERROR,
     FAR,
     FAR_NEAR,
@@ -24,7 +25,7 @@ from gensig.dynamics._layout import (
     LAST_CELL,
     LAST_NEAR,
     LEFT_OUT,
-    LEFT_OUT_ROWS,
+    LEFT_OUT_SLOPE,
     LOCAL,
     MIDDLE_POINT,
     MOST_PAIRS,
@@ -40,6 +41,7 @@ from gensig.dynamics._layout import (
     PITCH,
     POSITION,
     RAW,
+    RAW_BESIDE,
     ROLL,
     SHARED,
     SLOT_ROWS,
@@ -51,6 +53,8 @@ from gensig.dynamics._layout import (
     TABLE,
     TABLE_START,
     TILT,
+    TOUCH,
+    TOUCH_SLOPE,
     WHEEL_ROWS,
     WHEEL_TEETH,
     WHEEL_TOOTH,
@@ -134,7 +138,7 @@ def gather(group, slot, renew, work, wide, near):
                     if renew:
                         changed = _choose(group, lane, k, pinion, cell, x - cell, position, work, near) or changed
                     pinion += near[(CHORD + k) * n + lane] * group.places[CHORD_STRIDE * n + lane]
-                    _read_left_out(group, lane, slot, k, pinion + cell * COLUMNS, x - cell, work)
+                    _read_beside(group, lane, k, pinion + cell * COLUMNS, x - cell, work)
                 p, wheel = pinion + cell * COLUMNS, near[(AT_WHEEL + k) * n + lane]
                 low, high = load_four(group.table, p), load_four(group.table, p + COLUMNS)
                 if wheel >= 0:
@@ -156,6 +160,8 @@ def gather(group, slot, renew, work, wide, near):
     near[span], near[span + 1], near[span + 2], near[span + 3] = first, last, near_first, near_last
     for k in range(first, last):
         _spread_rows(group, slot, k, work)
+        if group.n_chords > 1:
+            _spread_beside(group, slot, k, work)
     return changed
 
 
@@ -178,15 +184,13 @@ def _choose(group, lane, k, pair, cell, part, position, work, near):
 
 
 @inlined
-def _read_left_out(group, lane, slot, k, place, part, work):
-    """Energy that a chord's spring leaves out, and its slope, as rows of the slot."""
+def _read_beside(group, lane, k, p, part, work):
+    """What stands beside the table, as the table is read."""
+    low, high = load_four(group.beside, p), load_four(group.beside, p + COLUMNS)
+    step = high - low
+    bent = (part * (1.0 - part)) * load_four(group.bend, lane * COLUMNS)
     n = width(work)
-    p, here = place // COLUMNS * ENERGY_COLUMNS, LEFT_OUT + slot * LEFT_OUT_ROWS + k * ENERGY_COLUMNS
-    for column in range(ENERGY_COLUMNS):
-        low, high = group.left_out[p + column], group.left_out[p + ENERGY_COLUMNS + column]
-        work[(here + column) * n + lane] = low + part * (high - low)
-    bent = part * (1.0 - part) * group.bend[lane * COLUMNS + OWN]
-    work[here * n + lane] -= bent * (group.left_out[p + ENERGY_COLUMNS + 1] - group.left_out[p + 1])
+    store(work, RAW_BESIDE * n + (k * n + lane) * COLUMNS, low + part * step - bent * second_and_fourth(step))
 
 
 @inlined
@@ -208,6 +212,25 @@ def _spread_rows(group, slot, k, work):
         store(work, pair + GAP * n + lane, gap + load_four(work, (ERROR + k) * n + lane) + tilt * beyond)
         store(work, pair + GAP_SLOPE * n + lane, gap_slope + tilt)
         store(work, pair + STIFFNESS * n + lane, 1.0 / own)
+
+
+@inlined
+def _spread_beside(group, slot, k, work):
+    """The same for what stands beside the table."""
+    n = width(work)
+    row, pair = (BESIDE + slot * BESIDE_ROWS + k * COLUMNS) * n, (slot * SLOT_ROWS + k * N_KEPT) * n
+    for lane in range(0, n, FOUR):
+        here = RAW_BESIDE * n + (k * n + lane) * COLUMNS
+        energy, energy_slope, touch, touch_slope = transpose(
+            load_four(work, here), load_four(work, here + FOUR), load_four(work, here + 2 * FOUR),
+            load_four(work, here + 3 * FOUR),
+        )  # fmt: skip
+        tilt = load_four(work, (TILT + k) * n + lane)
+        beyond = load_four(work, pair + POSITION * n + lane) - load_four(group.numbers, MIDDLE_POINT * n + lane)
+        store(work, row + LEFT_OUT * n + lane, energy)
+        store(work, row + LEFT_OUT_SLOPE * n + lane, energy_slope)
+        store(work, row + TOUCH * n + lane, touch + load_four(work, (ERROR + k) * n + lane) + tilt * beyond)
+        store(work, row + TOUCH_SLOPE * n + lane, touch_slope + tilt)
 
 
 @inlined
@@ -257,16 +280,17 @@ def between(a, b, middle, first, last, work):
 
 
 @inlined
-def left_out_between(a, b, middle, first, last, work):
-    """The same for the energy that chords leave out."""
+def beside_between(a, b, middle, first, last, work):
+    """The same for what stands beside the tables of chords."""
     n = width(work)
     begin, end = load(work, (AHEAD + a) * n), load(work, (AHEAD + b) * n)
     eighth, growth = 0.125 * (end - begin), 1.5 / (end - begin)
     for k in range(first, last):
-        pair = LEFT_OUT + k * ENERGY_COLUMNS
-        p, q = (pair + a * LEFT_OUT_ROWS) * n, (pair + b * LEFT_OUT_ROWS) * n
-        m = (pair + middle * LEFT_OUT_ROWS) * n
-        before, after = load(work, p), load(work, q)
-        slope_p, slope_q = load(work, p + n), load(work, q + n)
-        store(work, m, 0.5 * (before + after) + eighth * (slope_p - slope_q))
-        store(work, m + n, growth * (after - before) - 0.25 * (slope_p + slope_q))
+        pair = BESIDE + k * COLUMNS
+        p, q = (pair + a * BESIDE_ROWS) * n, (pair + b * BESIDE_ROWS) * n
+        m = (pair + middle * BESIDE_ROWS) * n
+        for value, slope in ((LEFT_OUT, LEFT_OUT_SLOPE), (TOUCH, TOUCH_SLOPE)):
+            before, after = load(work, p + value * n), load(work, q + value * n)
+            slope_p, slope_q = load(work, p + slope * n), load(work, q + slope * n)
+            store(work, m + value * n, 0.5 * (before + after) + eighth * (slope_p - slope_q))
+            store(work, m + slope * n, growth * (after - before) - 0.25 * (slope_p + slope_q))

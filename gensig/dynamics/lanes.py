@@ -109,7 +109,7 @@ def pack(
         n_chords=len(depth[0]),
         table=np.concatenate([table[..., :COLUMNS].ravel() for table in tables]).astype(precision),
         depth=depth.astype(precision).ravel(),
-        left_out=np.concatenate([table[..., COLUMNS:].ravel() for table in tables]).astype(precision),
+        beside=np.concatenate([table[..., COLUMNS:].ravel() for table in tables]).astype(precision),
         bend=np.outer(0.5 / exact[NODES_PER_METER], [1.0, 0.0, 1.0, 0.0]).astype(precision).ravel(),
         tooth_row=np.concatenate(rows),
         tooth_error=np.concatenate([error for one in lanes for error in (one.pinion_error, one.wheel_error)]),
@@ -183,7 +183,8 @@ def _rows(table: PairTable | SlicedTable) -> tuple[Array, NDArray[np.int64], tup
     )
     values = [table.compliance, table.compliance_slope, table.gap, table.gap_slope]
     if len(table.depth) > 1:
-        values.extend(left_out_energy(table))
+        touch = (np.broadcast_to(value[:, :, :1], value.shape) for value in (table.gap, table.gap_slope))
+        values.extend((*left_out_energy(table), *touch))
     pairs = np.stack([value[np.ix_(pinion, wheel)].reshape(-1, *value.shape[2:]) for value in values], axis=-1)
     if pinion[0] != 0 or wheel[0] != 0:  # back flanks are those of sound teeth
         pairs = np.concatenate([np.stack([value[0, 0] for value in values], axis=-1)[None], pairs])
