@@ -76,7 +76,11 @@ def test_what_modify_flank_writes_other_commands_take(tmp_path, capsys, monkeypa
 @pytest.mark.parametrize(
     ("words", "message"),
     [
-        (["transmission-error", *HELICAL, "fault=crack"], "the flanks here are sound ones"),
+        (["modify-flank", *HELICAL, "fault=crack"], "a modification is for sound flanks"),
+        (
+            ["transmission-error", *HELICAL, "fault=crack", "fault.crack_depth_mm=1", "fault.crack_width_mm=5"],
+            "mesh.slice_coupling = 'independent' with a fault over part of the face",
+        ),
         (["transmission-error", *HELICAL, "--plot", "te.txt"], "the name must end in .png"),
         (["transmission-error", *HELICAL, "operating.torque_nm=0"], "torque"),
         (["transmission-error", *HELICAL, "mesh.n_slices=0"], "mesh.n_slices = 0 must lie in 1..1000"),
