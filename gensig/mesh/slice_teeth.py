@@ -118,14 +118,18 @@ def _overhang(pair: GearPair, tooth: Tooth) -> float:
     return 0.5 * (tooth.gear.face_width - pair.face_width)
 
 
+def _source(tooth: Tooth, pair: GearPair, edges: Array) -> NDArray[np.int64]:
+    """Which slice of a tooth every slice of the pair is part of, (slice,)."""
+    middle = 0.5 * (edges[1:] + edges[:-1]) + _overhang(pair, tooth)
+    return np.clip(np.searchsorted(tooth.slice_edges, middle) - 1, 0, len(tooth.slice_width) - 1)
+
+
 def _gap(tooth: Tooth, flank: FlankSide, pair: GearPair, edges: Array) -> Array:
     """(slice, node) m."""
     if is_nominal(tooth):
         return np.zeros((len(edges) - 1, len(flank.curvature)))
-    middle = 0.5 * (edges[1:] + edges[:-1]) + _overhang(pair, tooth)
-    source = np.clip(np.searchsorted(tooth.slice_edges, middle) - 1, 0, len(tooth.slice_width) - 1)
     gaps = slice_gaps(tooth, flank.flank_curvature, flank.relative_radius)
-    return np.where(np.isfinite(gaps), gaps, NO_FLANK)[source]
+    return np.where(np.isfinite(gaps), gaps, NO_FLANK)[_source(tooth, pair, edges)]
 
 
 def _softening(
@@ -137,23 +141,36 @@ def _softening(
     edges: Array,
     structure: Array,
 ) -> Array:
-    """(slice, node) m2/N: what is lost weakens all slices alike, a crack those that it cuts."""
+    """(slice, node) m2/N: lost material weakens all slices alike, a crack those that it cuts."""
     in_plane, gear = material.in_plane(options.elasticity), tooth.gear
     different, place = np.unique(np.stack([flank.curvature, structure]), axis=1, return_inverse=True)
     curvature, rest = different
-    reached = np.minimum(curvature, tooth.tip_curvature_radius)
-    softer = np.zeros((1, len(curvature)))
+    softer = opened = np.zeros((1, len(curvature)))
     if tooth.material_loss.any():
-        whole = structural_compliance(replace(tooth, cracks=()), reached, in_plane, options)
-        softer = softer + (whole - structural_compliance(healthy_tooth(gear), curvature, in_plane, options))
-    opened = np.zeros_like(softer)
+        softer = _without_loss(tooth, curvature, in_plane, options)[_source(tooth, pair, edges)]
     if tooth.cracks:
+        reached = np.minimum(curvature, tooth.tip_curvature_radius)
         cracks = [_strips(tooth, crack, reached, in_plane, options, pair, edges) for crack in tooth.cracks]
         local = np.sum(cracks, axis=0)
         whole = _opened(tooth, reached, in_plane, options)
         opened = _shared_out(local, whole, rest / gear.face_width, np.diff(edges))
     softer = np.broadcast_to(gear.face_width * (softer + opened), (len(edges) - 1, len(curvature)))
     return softer[:, place.ravel()]
+
+
+def _without_loss(tooth: Tooth, curvature: Array, material: Material, options: MeshOptions) -> Array:
+    """What lost material adds to the compliance in every slice of the tooth, (slice, phase) m/N.
+
+    A slice without its tip is loaded at its new corner; what it lost above carried nothing there.
+    """
+    gone = ~np.isfinite(tooth.material_loss)
+    profile = tooth.profile.curvature_radius
+    tip = np.where(gone.any(axis=1), profile[np.maximum(gone.argmax(axis=1) - 1, 0)], profile[-1])
+    left = replace(tooth, cracks=(), material_loss=np.where(gone, 0.0, tooth.material_loss))
+    known = np.unique(np.concatenate([curvature, tip]))
+    compliance = structural_compliance(left, known, material, options)
+    loaded = np.interp(np.minimum(curvature, tip[:, None]), known, compliance)
+    return loaded - structural_compliance(healthy_tooth(tooth.gear), curvature, material, options)
 
 
 def _opened(tooth: Tooth, curvature: Array, material: Material, options: MeshOptions) -> Array:

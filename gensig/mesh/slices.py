@@ -38,6 +38,7 @@ class SlicedMesh:
     contact_factor : m2/N, contact_constant : (node,), log_weight : see ``ContactLaw``
     gap : (slice, node) m            corner gap and what the flanks of all teeth stand back
     shared_compliance : m/N
+    deviation : (slice, node) m      what the flanks stand back, in slices of equal width; None: nothing
     edges : (slice + 1,) m           of the slices, from the end that enters first
     pinion, wheel : what single teeth have beyond that
     """
@@ -52,6 +53,7 @@ class SlicedMesh:
     log_weight: float
     gap: Array
     shared_compliance: float
+    deviation: Array | None
     edges: Array
     pinion: GearSlices
     wheel: GearSlices
@@ -87,6 +89,7 @@ class LoadedContact:
     Parameters
     ----------
     roll : (phase,) m                     pinion's roll along the line of action
+    pair_index : (phase, pair)            0 is the pair whose first slice enters at roll 0, 1 the next one
     position : (phase, pair, slice) m     from A; may lie beyond the path, where corners touch
     approach : (phase,) m                 of the gears along the transverse line of action
     stiffness : (phase,) N/m              secant of the contact term, tangent of everything else
@@ -94,6 +97,7 @@ class LoadedContact:
     """
 
     roll: Array
+    pair_index: NDArray[np.int64]
     position: Array
     approach: Array
     stiffness: Array
@@ -147,6 +151,7 @@ def sliced_mesh(
         log_weight=law.log_weight,
         gap=gap,
         shared_compliance=shared,
+        deviation=deviation,
         edges=edges,
         pinion=sides["pinion"],
         wheel=sides["wheel"],
@@ -257,7 +262,9 @@ def loaded_contact(mesh: SlicedMesh, roll: Array, force: float, meeting: Meeting
             f"no contact at {int(np.sum(~np.isfinite(approach)))} and no settled one at {n_unsettled} of {len(roll)} "
             f"phases under {force:.4g} N; reduce the modification or raise the torque"
         )
-    return LoadedContact(roll=roll, position=position, approach=approach, stiffness=stiffness, line_load=line_load)
+    return LoadedContact(
+        roll=roll, pair_index=index, position=position, approach=approach, stiffness=stiffness, line_load=line_load
+    )
 
 
 def _gaps(mesh: SlicedMesh, position: Array) -> Array:
@@ -280,16 +287,24 @@ def _add_teeth(
         kinds = side.kind[tooth]
         for kind in np.unique(kinds[kinds > 0]):
             here = kinds == kind
-            places = position[here]
-            for j in range(position.shape[-1]):
-                structure[here, j] += np.interp(places[:, j], mesh.position, side.softening[kind, j])
-                gap[here, j] += np.interp(places[:, j], mesh.position, side.gap[kind, j])
+            softer, back = _of_kind(mesh, side, int(kind), position[here])
+            structure[here] += softer
+            gap[here] += back
         if error is not None:
             gap += error[tooth][:, :, None]
         if tilt is not None:
             gap += tilt[tooth][:, :, None] * (position - mesh.pair.pitch_point)
         gap[~side.present[kinds]] = np.inf
     gap[gap > 0.1 * NO_FLANK] = np.inf
+
+
+def _of_kind(mesh: SlicedMesh, side: GearSlices, kind: int, position: Array) -> tuple[Array, Array]:
+    """How much softer, m2/N, and how far back, m, the slices of one kind of tooth are at positions (phase, slice)."""
+    softer, gap = np.empty_like(position), np.empty_like(position)
+    for j in range(position.shape[1]):
+        softer[:, j] = np.interp(position[:, j], mesh.position, side.softening[kind, j])
+        gap[:, j] = np.interp(position[:, j], mesh.position, side.gap[kind, j])
+    return softer, gap
 
 
 def cut_by_field(mesh: SlicedMesh, position: Array) -> tuple[Array, Array]:
@@ -304,13 +319,17 @@ def cut_by_field(mesh: SlicedMesh, position: Array) -> tuple[Array, Array]:
     return np.where(share > 0.0, 0.5 * (low + high), position), share
 
 
-def single_pair_stiffness(mesh: SlicedMesh, position: Array, force: float) -> Array:
+def single_pair_stiffness(
+    mesh: SlicedMesh, position: Array, force: float, kinds: tuple[int, int] = (0, 0), closed: float = 0.1 * NO_FLANK
+) -> Array:
     """Stiffness of the slices of one pair that lie on the path, flanks taken as touching, (phase,) N/m.
 
     Parameters
     ----------
     position : (phase,) m    of the first slice, from A
     force : N                at whose even load per width a load-dependent contact term is taken
+    kinds : of the pinion's and the wheel's tooth
+    closed : m               slices whose flanks stand further back than this count for nothing
 
     The slices bend by themselves here: the sum over the face of 1 / (structure + contact).
     """
@@ -318,6 +337,10 @@ def single_pair_stiffness(mesh: SlicedMesh, position: Array, force: float) -> Ar
     constant = np.interp(middle, mesh.position, mesh.contact_constant)
     contact = mesh.contact_factor * (constant - mesh.log_weight * math.log(force / mesh.pair.face_width))
     softness = np.interp(middle, mesh.position, mesh.structure) + contact
+    for side, kind in zip((mesh.pinion, mesh.wheel), kinds, strict=True):
+        if kind:
+            softer, gap = _of_kind(mesh, side, kind, middle)
+            softness, share = softness + softer, share * (gap < closed) * side.present[kind]
     alone = np.sum(mesh.slice_width * share / softness, axis=1)
     return alone / (1.0 + mesh.shared_compliance * alone)
 

@@ -4,11 +4,10 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from dataclasses import dataclass
-from functools import lru_cache
 
 from gensig.errors import GeometryError
-from gensig.faults.base import Fault, faulty_teeth
-from gensig.mesh.sliced_table import SlicedTable, sliced_table
+from gensig.faults.base import Fault
+from gensig.mesh.sliced_table import SlicedTable
 from gensig.systems.pair_machine import PairMachine
 from gensig.systems.sliced_pair import SlicedPair
 
@@ -24,7 +23,7 @@ class HelicalPair(PairMachine):
 
     def mesh_table(self, faults: Sequence[Fault] = ()) -> SlicedTable:
         """Force over phase and approach of every distinct pair of teeth, with the given faults."""
-        return _mesh_table(self.flanks, tuple(faults))
+        return self.flanks.mesh_table(faults)
 
     def require_drive(self) -> None:
         """Raise unless at least one pair is always in contact, by the overlap of the face too."""
@@ -33,16 +32,3 @@ class HelicalPair(PairMachine):
                 f"the total contact ratio {self.pair.total_contact_ratio:.4f} is below 1, so the drive is interrupted "
                 f"at every tooth; use more teeth, a wider face, a larger helix angle or a larger addendum_coefficient"
             )
-
-
-@lru_cache(maxsize=32)
-def _mesh_table(flanks: SlicedPair, faults: tuple[Fault, ...]) -> SlicedTable:
-    return sliced_table(
-        flanks.pair,
-        flanks.material,
-        flanks.mesh,
-        flanks.slices,
-        faulty_teeth(flanks.pair, faults),
-        force=flanks.mesh_force,
-        deviation=flanks.deviation(),
-    )

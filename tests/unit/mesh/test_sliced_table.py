@@ -1,9 +1,12 @@
 """Chords of the force of sliced pairs: the same equilibrium as the slices, the spur table, convex and within 1 %."""
 
+from dataclasses import replace
+
 import numpy as np
 import pytest
 
 from gensig.config import read_request
+from gensig.faults.registry import read_faults
 from gensig.mesh._slice_kernels import bite_forces
 from gensig.mesh.load_distribution import loaded_pair_table, pair_states, static_mesh
 from gensig.mesh.pair_table import node_positions
@@ -107,6 +110,52 @@ def test_chords_err_by_less_than_a_hundredth_of_the_set_force(words):
     found = np.maximum(((first[:, None, None] + depth[:, None] - far.T[:, None]) / own.T[:, None]).max(axis=2), 0.0)
     assert exact.max() > system.mesh_force
     np.testing.assert_allclose(found, exact, atol=0.01 * system.mesh_force)
+
+
+@pytest.mark.parametrize(
+    ("fault", "share"),
+    [
+        (("fault=crack", "fault.crack_depth_mm=1", "fault.crack_width_mm=5"), 2e-3),
+        (("fault=pitting", "fault.pit_length_mm=0.6", "fault.pit_width_mm=5"), 2e-3),
+        (("fault=chipped",), 2e-3),
+        (("fault=broken", "fault.broken_height_mm=1"), 3e-3),
+        (("fault=missing_tooth",), 2e-3),
+        (("fault=pitch_error",), 2e-3),
+        (("fault=wear",), 5e-3),
+        (("fault=misalignment",), 0.01),
+    ],
+)
+def test_faulty_teeth_have_their_own_chords(fault, share):
+    """Over the mesh periods that see tooth 0, which meets sound ones and is met by nobody else."""
+    system, _, _ = table_of(*fault)
+    faults = read_faults(read_request(["system=helical_pair", *fault]).config["fault"])
+    table = system.mesh_table(faults)
+    roll = system.phases(64, first_period=-2, n_periods=8)
+    exact = loaded_contact(system.sliced_mesh(faults), roll, system.mesh_force)
+    approach, _ = at_rest(table, roll, system.mesh_force)
+    np.testing.assert_allclose(approach, exact.approach, rtol=share)
+    assert len(table.pinion_present) == 2
+    assert len(table.wheel_present) == 1
+    sound = at_rest(system.mesh_table(), roll, system.mesh_force)[0]
+    assert np.abs(exact.approach - sound).max() > 2.0 * share * sound.max()
+
+
+def test_teeth_that_all_share_a_form_are_looked_at_once():
+    """What nobody meets is not computed; sound ones stay kind 0 for the back flanks."""
+    system, _, _ = table_of()
+    read = read_request(["system=helical_pair", "fault=profile_error"]).config
+    form = replace(read_faults(read["fault"])[0], tooth="all")
+    crack = read_faults(
+        read_request(["system=helical_pair", "fault=crack", "fault.crack_depth_mm=1", "fault.tooth=3"]).config["fault"]
+    )
+    table = system.mesh_table((form, *crack))
+    assert table.compliance.shape[:2] == (3, 1)
+    assert table.pinion_kind[3] == 2
+    assert np.bincount(table.pinion_kind).tolist() == [0, 60, 1]
+    again = system.mesh_table((form,))
+    np.testing.assert_array_equal(again.compliance[1, 0], table.compliance[1, 0])
+    np.testing.assert_array_equal(again.depth, table.depth)
+    assert system.mesh_table((form,)) is again
 
 
 def test_chords_are_convex_and_meet():
