@@ -56,12 +56,16 @@ class Support:
                 if value < 0.0:
                     raise ConfigError(f"support.{key} = {value:g} must not be negative")
 
-    def damped(self, mass: float, ratio_x: float, ratio_y: float) -> Support:
-        """The support with c = 2 zeta sqrt(k m) for a gear of ``mass`` in kg on it alone."""
+    def damped(self, body: Body, ratio_x: float, ratio_y: float) -> Support:
+        """The support with c = 2 zeta sqrt(k m) for a gear on it alone; along the axis and against tilting with the
+        mean of the two ratios."""
+        mean = 0.5 * (ratio_x + ratio_y)
         return replace(
             self,
-            damping_x=2.0 * ratio_x * math.sqrt(self.stiffness_x * mass),
-            damping_y=2.0 * ratio_y * math.sqrt(self.stiffness_y * mass),
+            damping_x=2.0 * ratio_x * math.sqrt(self.stiffness_x * body.mass),
+            damping_y=2.0 * ratio_y * math.sqrt(self.stiffness_y * body.mass),
+            damping_z=2.0 * mean * math.sqrt(self.stiffness_z * body.mass),
+            damping_tilt=2.0 * mean * math.sqrt(self.stiffness_tilt * body.tilt_inertia),
         )
 
 
