@@ -39,6 +39,9 @@ UNITS: dict[str, tuple[float, str]] = {
     "db": (1.0, "level"),
 }
 
+# how channels end whose acceleration is one of an angle
+TURNING = ("rotation", "tilt_x", "tilt_y")
+
 T = TypeVar("T")
 
 
@@ -61,6 +64,11 @@ def from_si(name: str, value: float) -> float:
     """SI value in the unit that the suffixed name states."""
     _, suffix = split_unit(name)
     return value if suffix is None else value / UNITS[suffix][0]
+
+
+def is_turning(channel: str) -> bool:
+    """Whether a channel's acceleration is that of an angle, in rad/s2."""
+    return channel.endswith(TURNING)
 
 
 def read(cls: type[T], values: Mapping[str, Any], where: str, **given: Any) -> T:

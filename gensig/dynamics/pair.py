@@ -56,18 +56,16 @@ class Support:
                 if value < 0.0:
                     raise ConfigError(f"support.{key} = {value:g} must not be negative")
 
-    def damped(self, mass: float, ratio_x: float, ratio_y: float, tilt_inertia: float = 0.0) -> Support:
-        """The support with c = 2 zeta sqrt(k m) for a gear of ``mass`` in kg on it alone.
-
-        Along the axis and in tilting, where the gear has a ``tilt_inertia`` in kg m2, with the mean of both ratios.
-        """
-        ratio = 0.5 * (ratio_x + ratio_y)
+    def damped(self, body: Body, ratio_x: float, ratio_y: float) -> Support:
+        """The support with c = 2 zeta sqrt(k m) for a gear on it alone; along the axis and against tilting with the
+        mean of the two ratios."""
+        mean = 0.5 * (ratio_x + ratio_y)
         return replace(
             self,
-            damping_x=2.0 * ratio_x * math.sqrt(self.stiffness_x * mass),
-            damping_y=2.0 * ratio_y * math.sqrt(self.stiffness_y * mass),
-            damping_z=2.0 * ratio * math.sqrt(self.stiffness_z * mass),
-            damping_tilt=2.0 * ratio * math.sqrt(self.stiffness_tilt * tilt_inertia),
+            damping_x=2.0 * ratio_x * math.sqrt(self.stiffness_x * body.mass),
+            damping_y=2.0 * ratio_y * math.sqrt(self.stiffness_y * body.mass),
+            damping_z=2.0 * mean * math.sqrt(self.stiffness_z * body.mass),
+            damping_tilt=2.0 * mean * math.sqrt(self.stiffness_tilt * body.tilt_inertia),
         )
 
 

@@ -84,9 +84,7 @@ class SlicedPair:
     def sliced_mesh(self, faults: Sequence[Fault] = ()) -> SlicedMesh:
         """The pair cut into slices, modified flanks and faulty teeth included."""
         teeth = faulty_teeth(self.pair, faults)
-        return sliced_mesh(
-            self.pair, self.material, self.mesh, self.slices, deviation=self.deviation(), teeth=teeth
-        )
+        return sliced_mesh(self.pair, self.material, self.mesh, self.slices, deviation=self.deviation(), teeth=teeth)
 
     def deviation(self) -> Array | None:
         """How far all flanks stand back at the table's positions, (slice, node) m; None for perfect ones."""

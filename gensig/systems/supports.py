@@ -9,7 +9,7 @@ from typing import Any
 import numpy as np
 
 from gensig.dynamics.bearing import BallBearing, Shaft, support_stiffness
-from gensig.dynamics.pair import Body, Support
+from gensig.dynamics.pair import Body
 from gensig.errors import ConfigError
 from gensig.geometry.gear import Gear
 from gensig.material import Material
@@ -71,6 +71,8 @@ def on_bearings(kind: Any, quality: Quality) -> bool:
 def put_on_bearings(body: Body, gear: Gear, holding: Holding, material: Material, force: float) -> Body:
     """The gear held by its shaft and bearings under the static mesh ``force`` in N; its damping is left to a ratio.
 
+    Along the axis and against tilting it is held as given: radial contact says nothing of that.
+
     Raises
     ------
     ConfigError    where bearing or shaft are not known
@@ -125,12 +127,13 @@ def in_gearbox(body: Body, gearbox: Gearbox, axes: slice, quality: Quality) -> B
     """A gear on its support in one gearbox; ``axes`` are the two places of its x and y among the four supports.
 
     Stiffness scatters about what it is, along the axis and in tilting as the mean of both radial ones. So does damping,
-    unless ``quality`` has a range of damping ratios: then the
-    ratio is the gearbox's, and without one the middle of the range.
+    unless ``quality`` has a range of damping ratios: then the ratio is the gearbox's, and without one the middle of the
+    range.
     """
     support, stiffness, damping = body.support, gearbox.stiffness_factor[axes], gearbox.damping_factor[axes]
     stiffer, more_damped = float(np.sqrt(stiffness.prod())), float(np.sqrt(damping.prod()))
-    scattered = Support(
+    scattered = replace(
+        support,
         stiffness_x=support.stiffness_x * float(stiffness[0]),
         stiffness_y=support.stiffness_y * float(stiffness[1]),
         damping_x=support.damping_x * float(damping[0]),
@@ -143,5 +146,5 @@ def in_gearbox(body: Body, gearbox: Gearbox, axes: slice, quality: Quality) -> B
     nominal = quality.support_damping_ratio
     if nominal is not None:
         ratio = np.full(2, nominal) if gearbox.damping_ratio is None else gearbox.damping_ratio[axes]
-        scattered = scattered.damped(body.mass, float(ratio[0]), float(ratio[1]), body.tilt_inertia)
+        scattered = scattered.damped(body, float(ratio[0]), float(ratio[1]))
     return replace(body, support=scattered)
