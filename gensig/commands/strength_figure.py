@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import math
+from dataclasses import replace
 from pathlib import Path
 from typing import Any
 
@@ -33,20 +34,21 @@ def _stress(axis: Any, system: RootStrength, gears: dict[str, GearStress], histo
     roll = np.degrees(history.roll / system.pair.pinion.base_radius)
     for (name, values), colour in zip(history.stress.items(), (SOUND, FAULTY), strict=True):
         axis.plot(roll, values * 1e-6, color=colour, label=f"{name}, through the mesh")
-        axis.axhline(gears[name].stress * 1e-6, color=colour, linestyle="--", linewidth=1.0, label=f"{name}, ISO 6336-3")
-    axis.set(
-        title="Root stress of one tooth pair", xlabel="roll of the pinion since contact begins, deg", ylabel="MPa"
-    )
-    axis.set_ylim(bottom=0.0)
+        axis.axhline(
+            gears[name].stress * 1e-6, color=colour, linestyle="--", linewidth=1.0, label=f"{name}, ISO 6336-3"
+        )
+    axis.set(title="Root stress of one tooth pair", xlabel="roll of the pinion since contact begins, deg", ylabel="MPa")
+    highest = max(max(values.max() for values in history.stress.values()), max(one.stress for one in gears.values()))
+    axis.set_ylim(0.0, 1.45e-6 * highest)  # room for the legend
     share = axis.twinx()
     share.plot(roll, history.share, color=GREY, linestyle=":", label="load share of the pair")
-    share.set(ylabel="share of the load", ylim=(0.0, 1.6))
+    share.set(ylabel="share of the load", ylim=(0.0, 1.45))
     lines = [line for side in (axis, share) for line in side.get_lines()]
-    axis.legend(lines, [line.get_label() for line in lines], loc="upper right", fontsize=8)
+    axis.legend(lines, [line.get_label() for line in lines], loc="upper center", ncols=2, fontsize=8)
 
 
 def _tooth(axis: Any, system: RootStrength, found: GearStress) -> None:
-    """Outline in the normal section, in mm from the centreline and above the root circle, with the 30 degree tangents."""
+    """Outline in the normal section with the 30 degree tangents, mm from the centreline and above the root circle."""
     real = gears_of(system.pair)[system.decisive]
     virtual, section = virtual_gear(real), root_section(real)
     floor = virtual.tip_radius - (real.tip_radius - real.root_radius)
@@ -75,9 +77,9 @@ def _tooth(axis: Any, system: RootStrength, found: GearStress) -> None:
     )  # fmt: skip
     axis.plot([0.0, 0.0], [height, top], color=GREY, linestyle="--", label=f"lever arm, {top - height:.3g} mm")
     axis.set(
-        title=f"{system.decisive}: Y_F {found.factors.form_factor:.3f}, Y_S "
-        f"{found.factors.stress_correction_factor:.3f}, safety {found.safety.paper:.2f} (paper), "
-        f"{found.safety.iso:.2f} (ISO)",
+        title=f"Tooth of the {system.decisive}: Y_F {found.factors.form_factor:.3f}, Y_S "
+        f"{found.factors.stress_correction_factor:.3f}\nsafety {found.safety.paper:.2f} (paper), "
+        f"{found.safety.iso:.2f} (ISO 6336-3)",
         xlabel="mm", ylabel="mm above the root", aspect="equal",
     )  # fmt: skip
     axis.legend(loc="lower center", fontsize=8)
@@ -85,7 +87,5 @@ def _tooth(axis: Any, system: RootStrength, found: GearStress) -> None:
 
 def _spur(gear: Gear) -> Gear:
     """The spur gear with, to the nearest whole number of teeth, the tooth form of the normal section."""
-    from dataclasses import replace
-
     n_teeth = round(virtual_gear(gear).n_teeth)
     return replace(gear, n_teeth=n_teeth, helix_angle=0.0, bore_radius=0.1 * gear.normal_module)

@@ -82,7 +82,7 @@ def root_factors(
     *,
     load_point: str = "outer_single_pair",
     edition: int = 2019,
-    grade: int | None = None,
+    grade: float | None = None,
     allow_extrapolation: bool = False,
 ) -> dict[str, RootFactors]:
     """Factors of both gears, by name.
@@ -166,7 +166,7 @@ def rim_thickness_factor(gear: Gear) -> float:
     return 1.0 if rim >= RIM_SHARES[1] * height else 1.6 * math.log(2.242 * height / rim)
 
 
-def deep_tooth_factor(ratio: float, grade: int | None) -> float:
+def deep_tooth_factor(ratio: float, grade: float | None) -> float:
     """Y_DT of teeth of ISO 1328 grade 4 or finer (None: perfect) with a contact ratio eps_alpha_n above 2.05.
 
     Source: ISO 6336-3:2006, 10: -0.666 eps_alpha_n + 2.366 up to 2.5, 0.7 beyond.

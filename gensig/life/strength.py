@@ -94,9 +94,7 @@ class Strength:
                 raise ConfigError(f"strength.{key} = {from_si(key, value):g} must be positive")
         for key, allowed in (("load_point", LOAD_POINTS), ("edition", EDITIONS)):
             if getattr(self, key) not in allowed:
-                raise ConfigError(
-                    f"strength.{key} = {getattr(self, key)!r}; allowed: {', '.join(map(str, allowed))}"
-                )
+                raise ConfigError(f"strength.{key} = {getattr(self, key)!r}; allowed: {', '.join(map(str, allowed))}")
 
     @property
     def force_factor(self) -> float:
@@ -126,8 +124,8 @@ class Safety:
 def safety(strength: Strength, stress: float, *, notch_parameter: float, normal_module: float) -> Safety:
     """Safety factors under a root stress sigma_F in Pa, load factors included.
 
-    Source: engine paper eq. (32); ISO 6336-3, 5. The paper's lacks Y_ST although its stress has Y_S, so it is about half
-    of the other.
+    Source: engine paper eq. (32); ISO 6336-3, 5. The paper's lacks Y_ST although its stress has Y_S, so it is about
+    half of the other.
     """
     if not stress > 0.0:
         raise ConfigError(f"the root stress is {stress * 1e-6:g} MPa and must be positive")

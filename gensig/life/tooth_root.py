@@ -66,8 +66,8 @@ class RootSection:
 class RootLoading:
     """What a force at some points of the flank does to the critical section, (point,) each.
 
-    ``load_angle`` alpha_Fen in rad and ``lever_arm`` h_Fe in m; ``form_factor`` Y_F, ``stress_correction_factor`` Y_S and
-    their product ``stress_factor``, which stays finite where the lever arm does not count.
+    ``load_angle`` alpha_Fen in rad and ``lever_arm`` h_Fe in m; ``form_factor`` Y_F, ``stress_correction_factor`` Y_S
+    and their product ``stress_factor``, which stays finite where the lever arm does not count.
     """
 
     load_angle: Array
@@ -108,9 +108,7 @@ def root_section(gear: Gear) -> RootSection:
     fillet = rounding + 2.0 * g**2 / (math.cos(theta) * (z * math.cos(theta) ** 2 - 2.0 * g))
     height = 0.5 * (z * math.cos(math.pi / 3.0 - theta) + g / math.cos(theta) - rounding)
     module = gear.normal_module
-    return RootSection(
-        thickness=module * thickness, fillet_radius=module * fillet, height=module * height, theta=theta
-    )
+    return RootSection(thickness=module * thickness, fillet_radius=module * fillet, height=module * height, theta=theta)
 
 
 def _settled_theta(gear: Gear, z: float, g: float, h: float) -> float:
@@ -160,10 +158,7 @@ def root_loading(gear: Gear, tip_distance: Array | float, *, allow_extrapolation
     radius = np.hypot(virtual.base_radius, curvature)
     arm = (np.cos(gamma) - np.sin(gamma) * np.tan(load_angle)) * radius - section.height
     per_arm = (
-        6.0
-        * gear.normal_module
-        * np.cos(load_angle)
-        / (section.thickness**2 * math.cos(alpha))  # Y_F = per_arm * h_Fe
+        6.0 * gear.normal_module * np.cos(load_angle) / (section.thickness**2 * math.cos(alpha))  # Y_F = per_arm * h_Fe
     )
     power = 1.0 / (1.21 + 2.3 * np.maximum(arm, 0.0) / section.thickness)
     lifted = np.maximum(1.2 * arm + 0.13 * section.thickness, 0.0)

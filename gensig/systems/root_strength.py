@@ -41,8 +41,9 @@ WIDEST = 64.0  # times the force at ISO's load point: the search for the force o
 class RootHistory:
     """Root stress of one tooth pair from its first touch to its last.
 
-    ``roll`` (point,) m of the pinion along the line of action, 0 where the pair enters at A (the first slice of a helical
-    one); ``share`` (point,) of the load on this pair; ``stress`` by gear, (point,) Pa: the largest over the face.
+    ``roll`` (point,) m of the pinion along the line of action, 0 where the pair enters at A (the first slice of a
+    helical one); ``share`` (point,) of the load on this pair; ``stress`` by gear, (point,) Pa, the largest over the
+    face.
     """
 
     roll: Array
@@ -70,7 +71,7 @@ class RootStrength:
     flanks: SlicedPair
     sliced: bool
     strength: Strength
-    grade: int | None
+    grade: float | None
 
     @property
     def pair(self) -> GearPair:
@@ -99,7 +100,7 @@ class RootStrength:
         return max(self.factors, key=lambda name: self.factors[name].stress_per_force)
 
     def force_for(self, stress: float) -> float:
-        """Tangential force F_t in N under which sigma_F of the decisive gear is ``stress`` Pa, load factors included."""
+        """Tangential force F_t in N that gives the decisive gear this sigma_F in Pa, load factors included."""
         if not (math.isfinite(stress) and stress > 0.0):
             raise ConfigError(f"a root stress of {stress * 1e-6:g} MPa cannot be asked for; give a positive one")
         return stress / (self.factors[self.decisive].stress_per_force * self.strength.load_factor)
