@@ -1,7 +1,8 @@
 """Write the reference tables again: ``python -m tests.reference.regenerate [healthy|tooth|crack|...]``.
 
-Without names, all of them; see ``TABLES``. Compliances are dimensionless, compliance * E * W; a plane compliance in this form is the
-same for every module, modulus and face width, and depends on Poisson's ratio (0.3 here) and the plane state.
+Without names, all of them; see ``TABLES``. Compliances are dimensionless, compliance * E * W; a plane compliance in
+this form is the same for every module, modulus and face width, and depends on Poisson's ratio (0.3 here) and the plane
+state.
 """
 
 from __future__ import annotations
