@@ -220,9 +220,10 @@ def read_root_strength(config: Mapping[str, Any]) -> RootStrength:
     sliced = section(config, "system").get("kind") == SLICED
     if not sliced:
         read_system(config)  # refuses what a spur pair cannot have
+    flanks = read_sliced_pair(config)
     return RootStrength(
-        flanks=read_sliced_pair(config),
-        sliced=sliced,
+        flanks=flanks,
+        sliced=sliced or flanks.pair.pinion.helix_angle != 0.0,
         strength=read(Strength, section(config, "strength"), "strength"),
         grade=read(Quality, section(config, "quality"), "quality").iso1328_grade,
     )
