@@ -50,6 +50,13 @@ def _stiffness(parser: argparse.ArgumentParser) -> None:
     parser.add_argument("--plot", metavar="FILE", help="write a figure (PNG, SVG or PDF)")
 
 
+def _root_stress(parser: argparse.ArgumentParser) -> None:
+    _stiffness(parser)
+    parser.add_argument(
+        "--stress", type=float, metavar="MPA", help="take the load that gives this root stress instead of the torque"
+    )
+
+
 def _modify_flank(parser: argparse.ArgumentParser) -> None:
     _overrides(parser)
     parser.add_argument("--out", required=True, metavar="FILE", help="option to write: DIR/modification/NAME.yaml")
@@ -205,6 +212,13 @@ VERBS: dict[str, Verb] = {
         "--out mine/modification/robust.yaml --plot front.png",
         "gensig.commands.modify:modify_flank",
         _modify_flank,
+    ),
+    "root-stress": Verb(
+        "bending stress at the tooth's root over the mesh, and safety factors",
+        "gensig root-stress gear=engine_pump_drive --stress 349.39 --json root.json --plot root.png\n"
+        "  gensig root-stress system=helical_pair strength.mean_stress_factor=0.7",
+        "gensig.commands.strength:root_stress",
+        _root_stress,
     ),
     "simulate": Verb(
         "one record: signal, spectrum, figure",

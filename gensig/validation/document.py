@@ -14,6 +14,7 @@ SOURCE_TITLES = {
     "helical_reference": "Reference numbers for both helical pairs",
     "helical_error_paper": "What the paper on transmission error and flank modification prints",
     "helical_heat_paper": "What the paper on helical stiffness with temperature prints: cold gears",
+    "engine_root_stress": "Root stress and safety factor of the diesel's injection pump drive",
 }
 SOURCE_TEXTS = {
     "spur_reference": "Computed independently of this project (rack geometry, potential-energy method, 2-D finite "
@@ -40,6 +41,10 @@ SOURCE_TEXTS = {
     "which the printed contact ratio comes out.",
     "helical_heat_paper": "Gears 40/162, 24.351 kN m; bores of half the pitch radius, an even split of the profile "
     "shift and the rack's rounding are assumed, the paper prints none of them. Hot gears are not computed yet.",
+    "engine_root_stress": "Sun, Shi, Chen, Li & Liu, spur gears 54/54 of module 3, and numbers computed from it "
+    "independently of this project (`reference`, `variants`). The paper prints root stresses and safety factors, but "
+    "neither a force nor any form factor: the force that gives its stress is what can be compared. All load factors "
+    "are 1; rack ISO 53-A is assumed.",
 }
 TITLES = {
     "geometry": "Teeth and root transition curve",
@@ -106,6 +111,10 @@ TITLES = {
     "printed_error": "Transmission error and line load",
     "printed_schemes": "Tables 3 to 5",
     "cold": "Cold stiffness",
+    "pump_drive": "What the paper prints",
+    "reference": "Form and stress correction factors, forces",
+    "variants": "The same stress under other racks",
+    "mesh": "Through the mesh",
 }
 INTRO = """# Validation
 

@@ -18,7 +18,14 @@ from importlib import resources
 
 from gensig.errors import ConfigError
 
-SOURCES = ("spur_reference", "spur_paper", "helical_reference", "helical_error_paper", "helical_heat_paper")
+SOURCES = (
+    "spur_reference",
+    "spur_paper",
+    "helical_reference",
+    "helical_error_paper",
+    "helical_heat_paper",
+    "engine_root_stress",
+)
 REPRODUCED, DIFFERS = "reproduced", "differs"
 HOLDS, FAILS = "claim holds", "claim does not hold"
 NOT_PRINTED = "not printed"
@@ -36,6 +43,8 @@ UNITS = {
     "1e-12 m/N": 1e-12,
     "N/mm": 1e3,
     "N": 1.0,
+    "N m": 1.0,
+    "h": 3600.0,
     "MPa": 1e6,
     "1e9 N/m": 1e9,
     "N/(mm um)": 1e9,  # per face width
