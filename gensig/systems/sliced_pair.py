@@ -21,6 +21,7 @@ from gensig.mesh.slices import (
     slice_places,
     sliced_mesh,
 )
+from gensig.mesh.thermal_growth import PairGrowth
 
 Array = NDArray[np.float64]
 
@@ -54,7 +55,10 @@ class TransmissionError:
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class SlicedPair:
-    """A gear pair with sound teeth, its flank modification, and the pinion's torque in N m."""
+    """A gear pair with sound teeth, its flank modification, and the pinion's torque in N m.
+
+    ``growth`` is what heat does to flanks beyond growing the pair as a whole, see ``gensig.systems.hot_pair``.
+    """
 
     pair: GearPair
     material: Material
@@ -62,6 +66,7 @@ class SlicedPair:
     slices: SliceOptions
     modification: PairModification
     torque: float
+    growth: PairGrowth | None = None
 
     @property
     def mesh_force(self) -> float:
@@ -74,6 +79,9 @@ class SlicedPair:
         if self.modification.is_any:
             position, place = node_positions(self.pair, self.mesh), slice_places(self.pair, self.slices)
             deviation = self.modification.deviation(self.pair, position, place)
+        if self.growth is not None:
+            proud = self.growth.deviation(self.pair, node_positions(self.pair, self.mesh))
+            deviation = proud + (0.0 if deviation is None else deviation) + np.zeros((self.slices.n_slices, 1))
         return sliced_mesh(self.pair, self.material, self.mesh, self.slices, deviation=deviation)
 
     def phases(self, n_phases: int = N_PHASES) -> Array:

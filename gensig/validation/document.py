@@ -13,7 +13,7 @@ SOURCE_TITLES = {
     "spur_paper": "What the spur paper prints and claims",
     "helical_reference": "Reference numbers for both helical pairs",
     "helical_error_paper": "What the paper on transmission error and flank modification prints",
-    "helical_heat_paper": "What the paper on helical stiffness with temperature prints: cold gears",
+    "helical_heat_paper": "What the paper on helical stiffness with temperature prints",
 }
 SOURCE_TEXTS = {
     "spur_reference": "Computed independently of this project (rack geometry, potential-energy method, 2-D finite "
@@ -39,7 +39,9 @@ SOURCE_TEXTS = {
     "of the contact lines, `misaligned` have 5.2 um over the face. No line was tuned; the addendum is the one with "
     "which the printed contact ratio comes out.",
     "helical_heat_paper": "Gears 40/162, 24.351 kN m; bores of half the pitch radius, an even split of the profile "
-    "shift and the rack's rounding are assumed, the paper prints none of them. Hot gears are not computed yet.",
+    "shift and the rack's rounding are assumed, the paper prints none of them. Hot gears are those of "
+    "heat=chongqing_rated, whose inputs are assumed as well; `true`, `contact_ratio`, `apparent` and `softened` are "
+    "the effects of heat one by one (docs/theory/heat.md), `ours` gensig's own mesh.",
 }
 TITLES = {
     "geometry": "Teeth and root transition curve",
@@ -106,6 +108,15 @@ TITLES = {
     "printed_error": "Transmission error and line load",
     "printed_schemes": "Tables 3 to 5",
     "cold": "Cold stiffness",
+    "hot": "Hot stiffness",
+    "hot_change": "Hot over cold, effect by effect",
+    "finite_elements": "Beside the paper's finite elements",
+    "sweeps": "Sweeps of friction, torque and speed",
+    "sweeps_rise": "Does stiffness rise with friction, torque and speed?",
+    "torque_matters_most": "Does torque matter most?",
+    "heat_flow": "Friction heat, and how warm the cooled surfaces get",
+    "flash": "Flash temperature",
+    "hotter_than_housing": "Gears hotter than their housing",
 }
 INTRO = """# Validation
 

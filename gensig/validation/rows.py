@@ -36,6 +36,8 @@ UNITS = {
     "1e-12 m/N": 1e-12,
     "N/mm": 1e3,
     "N": 1.0,
+    "K": 1.0,
+    "kW": 1e3,
     "MPa": 1e6,
     "1e9 N/m": 1e9,
     "N/(mm um)": 1e9,  # per face width
@@ -127,7 +129,7 @@ def judge(row: Row, value: float) -> Result:
     else:
         printed = float(row.printed)
         allowed = max((row.tolerance or 0.0) * abs(printed), half_last_digit(row.printed))
-        deviation = (computed - printed) / abs(printed)
+        deviation = (computed - printed) / abs(printed) if printed else None
         verdict = REPRODUCED if abs(computed - printed) <= allowed * (1.0 + 1e-9) else DIFFERS
     return Result(row=row, computed=computed, deviation=deviation, verdict=verdict)
 
