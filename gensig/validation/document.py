@@ -108,6 +108,7 @@ TITLES = {
     "printed_error": "Transmission error and line load",
     "printed_schemes": "Tables 3 to 5",
     "cold": "Cold stiffness",
+    "bulk_field": "Bulk temperature above the oil",
     "hot": "Hot stiffness",
     "hot_change": "Hot over cold, effect by effect",
     "finite_elements": "Beside the paper's finite elements",

@@ -9,7 +9,7 @@ from functools import cached_property, lru_cache
 import numpy as np
 
 from gensig.compose import compose
-from gensig.mesh.body_heat import BodyHeat
+from gensig.mesh.body_heat import BodyHeat, face_surface, tooth_surface
 from gensig.mesh.heat import flash_temperature
 from gensig.systems.hot_pair import COLD, TRUE, Duty, HotState, Variant, hot_state, stiffness_variants, sweep
 from gensig.systems.registry import read_duty
@@ -78,8 +78,6 @@ def _even_flash(case: HotCase, at: str) -> float:
 
 def _surface_rise(case: HotCase, at: str) -> float:
     """Rise above the oil of the surfaces that it cools, mean over them: heat over convection x surface."""
-    from gensig.mesh.body_heat import face_surface, tooth_surface
-
     gear = getattr(case.duty.system.pair, at)
     body: BodyHeat = getattr(case.state, at)
     heat = case.duty.heat
