@@ -6,7 +6,7 @@ Theory, ranges and choices: ``docs/theory/heat.md``. Temperatures are in degrees
 from __future__ import annotations
 
 import math
-from dataclasses import dataclass, fields
+from dataclasses import dataclass, fields, replace
 
 import numpy as np
 from numpy.typing import NDArray
@@ -34,6 +34,8 @@ class Heat:
     pinion_temperature, wheel_temperature : of the whole gear; None is solved from friction heat and cooling
     pinion_bore_temperature, wheel_bore_temperature : None lets no heat through the bore
     face_convection, tooth_convection : W/(m2 K)    from the faces of the body and from the teeth to the oil
+    convection_speed : rad/s    of the pinion, at which both hold; they go with its root (thermal paper, eq. 34). None
+        takes them at any speed
     pinion_heat_share : of the friction heat
     conductivity W/(m K), specific_heat J/(kg K), expansion 1/K
     modulus_temperature, modulus : Young's modulus over temperature; only its shape counts
@@ -51,6 +53,7 @@ class Heat:
     wheel_bore_temperature: float | None = unit("degc")
     face_convection: float = unit("w_per_m2k")
     tooth_convection: float = unit("w_per_m2k")
+    convection_speed: float | None = unit("rpm")
     pinion_heat_share: float
     conductivity: float = unit("w_per_mk")
     specific_heat: float = unit("j_per_kgk")
@@ -70,6 +73,11 @@ class Heat:
             value = next(getattr(self, field.name) for field in fields(self) if key.startswith(field.name))
             if not low <= value <= high:
                 raise ConfigError(f"heat.{key} = {from_si(key, value):g} must lie in {low:g}..{high:g}")
+        if self.convection_speed is not None and not self.convection_speed > 0.0:
+            raise ConfigError(
+                f"heat.convection_speed_rpm = {from_si('convection_speed_rpm', self.convection_speed):g} must be "
+                f"positive, or null for convection that does not depend on speed"
+            )
         rising = all(a < b for a, b in zip(self.modulus_temperature, self.modulus_temperature[1:], strict=False))
         if len(self.modulus_temperature) < 2 or len(self.modulus_temperature) != len(self.modulus) or not rising:
             raise ConfigError(
@@ -87,6 +95,18 @@ class Heat:
     def is_any(self) -> bool:
         """Whether heat changes anything."""
         return self.growth or self.center_distance or self.softening
+
+    def at_speed(self, speed: float) -> Heat:
+        """The same with the convection of a pinion's speed in rad/s."""
+        if self.convection_speed is None:
+            return self
+        factor = math.sqrt(speed / self.convection_speed)
+        return replace(
+            self,
+            convection_speed=None,
+            face_convection=self.face_convection * factor,
+            tooth_convection=self.tooth_convection * factor,
+        )
 
     def require_known(self, temperature: float, what: str) -> None:
         """Raise ExtrapolationError, which begins with ``what``, for a temperature beyond the material's data."""

@@ -100,9 +100,9 @@ def hot_state(duty: Duty) -> HotState:
         system.pair, contact.position, contact.line_load,
         force=system.mesh_force, friction=duty.friction, speed=duty.speed,
     )  # fmt: skip
-    share = heat.pinion_heat_share
-    pinion = _body(system.pair.pinion, share * loss, heat, heat.pinion_temperature, heat.pinion_bore_temperature)
-    wheel = _body(system.pair.wheel, (1.0 - share) * loss, heat, heat.wheel_temperature, heat.wheel_bore_temperature)
+    share, cooling = heat.pinion_heat_share, heat.at_speed(duty.speed)
+    pinion = _body(system.pair.pinion, share * loss, cooling, heat.pinion_temperature, heat.pinion_bore_temperature)
+    wheel = _body(system.pair.wheel, (1.0 - share) * loss, cooling, heat.wheel_temperature, heat.wheel_bore_temperature)
     position, flash = _flash_along_path(duty, contact)
     return HotState(
         contact=contact,

@@ -80,7 +80,7 @@ def _surface_rise(case: HotCase, at: str) -> float:
     """Rise above the oil of the surfaces that it cools, mean over them: heat over convection x surface."""
     gear = getattr(case.duty.system.pair, at)
     body: BodyHeat = getattr(case.state, at)
-    heat = case.duty.heat
+    heat = case.duty.heat.at_speed(case.duty.speed)
     return body.to_oil / (heat.face_convection * face_surface(gear) + heat.tooth_convection * tooth_surface(gear))
 
 

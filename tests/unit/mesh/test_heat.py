@@ -85,6 +85,7 @@ def test_modulus_falls_by_three_per_cent_in_a_hundred_kelvin(duty):
         (["heat.oil_temperature_degc=400"], ExtrapolationError, "heat.oil_temperature_degc = 400 lies beyond the mate"),
         (["heat.pinion_temperature_degc=-80"], ExtrapolationError, "-75 to 300 degrees Celsius"),
         (["heat.face_convection_w_per_m2k=-1"], ConfigError, "heat.face_convection_w_per_m2k = -1 must lie in 0..1"),
+        (["heat.convection_speed_rpm=0"], ConfigError, "heat.convection_speed_rpm = 0 must be positive, or null"),
         (["heat.pinion_heat_share=1.2"], ConfigError, "heat.pinion_heat_share = 1.2 must lie in 0..1"),
         (["heat.expansion_per_k=1"], ConfigError, "heat.expansion_per_k = 1 must lie in 0..0.0001"),
         (["heat.conductivity_w_per_mk=0"], ConfigError, "heat.conductivity_w_per_mk = 0 must lie in 1..500"),
