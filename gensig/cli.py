@@ -229,7 +229,8 @@ VERBS: dict[str, Verb] = {
     ),
     "stiffness": Verb(
         "mesh stiffness of sound and faulty teeth",
-        "gensig stiffness fault=crack fault.crack_depth_mm=1.5 --json crack.json --plot crack.png",
+        "gensig stiffness fault=crack fault.crack_depth_mm=1.5 --json crack.json --plot crack.png\n"
+        "  gensig stiffness system=helical_pair gear=chongqing_40_162 heat=chongqing_rated --plot hot.png",
         "gensig.commands.physics:stiffness",
         _stiffness,
     ),

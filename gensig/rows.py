@@ -31,6 +31,7 @@ FIXED_KEYS = (
     "system.",
     "modification.",
     "strength.",
+    "heat.",
     "mesh.n_slices",
     "mesh.coupling_modules",
     "sensing.sampling_rate_hz",

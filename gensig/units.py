@@ -20,6 +20,11 @@ from gensig.errors import ConfigError
 # suffix: (factor to SI, what it measures); longer suffixes first, so that kg_m2 is not read as m2
 UNITS: dict[str, tuple[float, str]] = {
     "kg_m2": (1.0, "moment of inertia"),
+    "w_per_m2k": (1.0, "heat transfer coefficient"),
+    "w_per_mk": (1.0, "thermal conductivity"),
+    "j_per_kgk": (1.0, "specific heat"),
+    "per_k": (1.0, "thermal expansion"),
+    "degc": (1.0, "temperature"),  # degrees Celsius inside too: only differences and tables of steel are asked
     "n_per_m": (1.0, "stiffness"),
     "ns_per_m": (1.0, "damping"),
     "nm_per_rad": (1.0, "torsional stiffness"),

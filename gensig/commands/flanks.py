@@ -12,6 +12,7 @@ from typing import Any
 import numpy as np
 
 from gensig.commands.console import one_line_warnings, replaced_file
+from gensig.commands.heat_report import heat_content, heat_report, print_heat
 from gensig.config import read_request
 from gensig.errors import ConfigError
 from gensig.faults.registry import read_faults
@@ -103,6 +104,7 @@ def sliced_stiffness(config: Mapping[str, Any], arguments: Namespace) -> int:
         result = system.transmission_error(faults) if faults else sound
         position, single = system.single_pair()
         faulty = system.faulty_pair(faults, position) if faults else None
+        hot = heat_report(config)
     stiffness = result.contact.stiffness
     content = {
         "transverse_contact_ratio": system.pair.transverse_contact_ratio,
@@ -120,13 +122,19 @@ def sliced_stiffness(config: Mapping[str, Any], arguments: Namespace) -> int:
     if faulty is not None:
         content["faulty_pair_stiffness_n_per_m"] = faulty.tolist()
         content["sound_mesh_stiffness_n_per_m"] = sound.contact.stiffness.tolist()
+    if hot is not None:
+        content["heat"] = heat_content(hot)
     if arguments.json:
         _write_json(arguments.json, content)
     if arguments.plot:
         from gensig.commands.flank_figures import plot_sliced_stiffness
+        from gensig.commands.heat_figures import plot_heat
 
         with replaced_file(arguments.plot) as path:
-            plot_sliced_stiffness(system, result, position, single, path, faulty=faulty)
+            if hot is None:
+                plot_sliced_stiffness(system, result, position, single, path, faulty=faulty)
+            else:
+                plot_heat(hot, path)
     print(f"contact ratio              {system.pair.transverse_contact_ratio:.4f} transverse, "
           f"{system.pair.overlap_ratio:.4f} overlap, {system.pair.total_contact_ratio:.4f} total")  # fmt: skip
     print(f"mesh stiffness, mean       {stiffness.mean():.4e} N/m")
@@ -139,6 +147,8 @@ def sliced_stiffness(config: Mapping[str, Any], arguments: Namespace) -> int:
         near = single > LEAST_SHARE * single.max()
         loss = 1e2 * (1.0 - faulty[near] / single[near])
         print(f"faulty pair loses          {_span(loss.tolist(), '.3g')} %")
+    if hot is not None:
+        print_heat(hot)
     return 0
 
 
@@ -155,10 +165,10 @@ def sound_pair(config: Mapping[str, Any]) -> SlicedPair:
 def _warn_of_lost_contact(system: SlicedPair, result: TransmissionError) -> None:
     """Say how much of the field of action a modification takes out of contact."""
     lost = 1.0 - result.bearing
-    if system.modification.is_any and lost > LOST_SHARE:
+    if (system.modification.is_any or system.growth is not None) and lost > LOST_SHARE:
         print(
-            f"gensig: WARNING: {lost:.0%} of the field of action carry no load: the modification or the misalignment "
-            f"is deeper than {system.torque:g} N m can close",
+            f"gensig: WARNING: {lost:.0%} of the field of action carry no load: the modification, the misalignment or "
+            f"the unequal growth of hot gears is deeper than {system.torque:g} N m can close",
             file=sys.stderr,
         )
 

@@ -11,11 +11,13 @@ from gensig.errors import ConfigError
 from gensig.geometry.contact import GearPair
 from gensig.geometry.gear import Gear
 from gensig.material import Material
+from gensig.mesh.heat import Heat
 from gensig.mesh.modification import FlankModification, PairModification
 from gensig.mesh.options import read_mesh_options, read_slice_options
 from gensig.sensing.manufacturing import Quality
 from gensig.sensing.reading import read_sensing
 from gensig.systems.helical_pair import HelicalPair
+from gensig.systems.hot_pair import Duty, as_configured
 from gensig.systems.operation import read_operating
 from gensig.systems.pair_machine import PairMachine
 from gensig.systems.sliced_pair import SlicedPair
@@ -48,6 +50,10 @@ def read_spur_pair(config: Mapping[str, Any]) -> SpurPair:
         raise ConfigError(
             "modification: system=spur_pair has its reliefs as faults (fault=tip_relief, fault=misalignment); a "
             "modification is taken by gensig transmission-error, and by gensig stiffness with system=helical_pair"
+        )
+    if read_heat(config).is_any:
+        raise ConfigError(
+            "heat: system=spur_pair has gears as they are drawn; system=helical_pair takes heat, and spur gears too"
         )
     return SpurPair(pair=read_pair(config), **_read_machine(config, read_pair(config)))
 
@@ -95,7 +101,20 @@ def _read_machine(config: Mapping[str, Any], pair: GearPair) -> dict[str, Any]:
 
 
 def read_sliced_pair(config: Mapping[str, Any]) -> SlicedPair:
-    """Build a spur or helical pair cut into slices from the boundary keys of a configuration, whatever its system."""
+    """Build a spur or helical pair cut into slices from the boundary keys of a configuration, whatever its system; as
+    hot as its ``heat`` makes it."""
+    heat = read_heat(config)
+    return as_configured(read_duty(config)) if heat.is_any else read_cold_pair(config)
+
+
+def read_duty(config: Mapping[str, Any]) -> Duty:
+    """The cold pair of a configuration with what heats and cools it."""
+    speed = _number("operating.speed_rpm", section(config, "operating")["speed_rpm"])
+    return Duty(system=read_cold_pair(config), heat=read_heat(config), speed=speed)
+
+
+def read_cold_pair(config: Mapping[str, Any]) -> SlicedPair:
+    """The same pair as it is drawn."""
     mesh = section(config, "mesh")
     return SlicedPair(
         pair=read_pair(config),
@@ -111,8 +130,8 @@ def read_pair(config: Mapping[str, Any]) -> GearPair:
     """The two gears of a configuration; a wheel has the opposite hand unless it says otherwise."""
     gear = section(config, "gear")
     helix = _number("gear.helix_angle_deg", gear["helix_angle_deg"])
-    gears = {name: _read_gear(name, gear, hand * helix) for name, hand in zip(SIDES, (1.0, -1.0), strict=True)}
-    return GearPair(**gears, backlash=_number("gear.backlash_um", gear["backlash_um"]))
+    pinion, wheel = (_read_gear(name, gear, hand * helix) for name, hand in zip(SIDES, (1.0, -1.0), strict=True))
+    return GearPair(pinion=pinion, wheel=wheel, backlash=_number("gear.backlash_um", gear["backlash_um"]))
 
 
 def read_material(config: Mapping[str, Any]) -> Material:
@@ -121,6 +140,11 @@ def read_material(config: Mapping[str, Any]) -> Material:
     if material.poisson_ratio >= 0.5:
         raise ConfigError(f"material.poisson_ratio = {material.poisson_ratio:g} must be below 0.5")
     return material
+
+
+def read_heat(config: Mapping[str, Any]) -> Heat:
+    """Which effects of heat a configuration has, and what they take."""
+    return read(Heat, section(config, "heat"), "heat")
 
 
 def read_modification(config: Mapping[str, Any]) -> PairModification:

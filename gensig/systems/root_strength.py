@@ -24,7 +24,7 @@ from gensig.life.root_stress import (
 )
 from gensig.life.strength import Safety, Strength, safety
 from gensig.mesh.load_distribution import loaded_pair_table, pair_states, static_mesh
-from gensig.mesh.slices import loaded_contact, pair_positions
+from gensig.mesh.slices import loaded_contact
 from gensig.sensing.manufacturing import Quality
 from gensig.systems.registry import SLICED, read_sliced_pair, read_system, section
 from gensig.systems.sliced_pair import SlicedPair
@@ -192,11 +192,11 @@ class RootStrength:
         """The same slice by slice, the largest of the face; slices bend each other as in the mesh."""
         mesh, pair, slices = self.flanks.sliced_mesh(), self.pair, self.flanks.slices
         contact = loaded_contact(mesh, phases, force)
-        roll = pair_positions(mesh, phases)[:, :, 0] + mesh.lag[0]
+        roll = contact.position[:, :, 0] + mesh.lag[0]
         structure = np.interp(contact.position, mesh.position, mesh.structure)
         coupled = slices.slice_coupling == "coupled"
         length = slices.coupling_modules * pair.pinion.normal_module
-        coupling = (length / mesh.slice_width) ** 2 if coupled else 0.0
+        coupling = (length / float(mesh.slice_width[0])) ** 2 if coupled else 0.0
         stress = {}
         for name, gear in gears_of(pair).items():
             factor = stress_factor_on_path(
@@ -206,7 +206,7 @@ class RootStrength:
             common = pair.face_width / root_width(pair, gear)
             own = tangential * common * factor / gear.normal_module
             stress[name] = spread_along_face(own, structure, coupling).max(axis=2).ravel()
-        share = contact.line_load.sum(axis=2)
+        share = (contact.line_load * mesh.slice_width).sum(axis=2)
         return roll.ravel(), (share / share.sum(axis=1, keepdims=True)).ravel(), stress
 
 

@@ -27,6 +27,7 @@ from gensig.mesh.slices import (
     slice_places,
     sliced_mesh,
 )
+from gensig.mesh.thermal_growth import PairGrowth
 
 Array = NDArray[np.float64]
 
@@ -67,7 +68,10 @@ class TransmissionError:
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class SlicedPair:
-    """A gear pair with sound teeth, its flank modification, and the pinion's torque in N m."""
+    """A gear pair with sound teeth, its flank modification, and the pinion's torque in N m.
+
+    ``growth`` is what heat does to flanks beyond growing the pair as a whole, see ``gensig.systems.hot_pair``.
+    """
 
     pair: GearPair
     material: Material
@@ -75,6 +79,7 @@ class SlicedPair:
     slices: SliceOptions
     modification: PairModification
     torque: float
+    growth: PairGrowth | None = None
 
     @property
     def mesh_force(self) -> float:
@@ -88,10 +93,13 @@ class SlicedPair:
 
     def deviation(self) -> Array | None:
         """How far all flanks stand back at the table's positions, (slice, node) m; None for perfect ones."""
-        if not self.modification.is_any:
+        if not self.modification.is_any and self.growth is None:
             return None
         position, place = node_positions(self.pair, self.mesh), slice_places(self.pair, self.slices)
-        return self.modification.deviation(self.pair, position, place)
+        back = np.zeros((len(place), len(position)))
+        if self.modification.is_any:
+            back = back + self.modification.deviation(self.pair, position, place)
+        return back if self.growth is None else back + self.growth.deviation(self.pair, position)
 
     def mesh_table(self, faults: Sequence[Fault] = ()) -> SlicedTable:
         """What the dynamics asks of the mesh with the given faults."""

@@ -10,6 +10,7 @@ from gensig.validation.case import read_case
 from gensig.validation.dynamics_checks import DYNAMICS
 from gensig.validation.fault_checks import FAULT
 from gensig.validation.geometry_checks import GEOMETRY, Check
+from gensig.validation.heat_checks import HOT, read_hot_case
 from gensig.validation.helical_checks import SLICED, read_sliced_case
 from gensig.validation.mesh_checks import MESH
 from gensig.validation.rows import SOURCES, Result, Row, judge, read_rows
@@ -30,6 +31,8 @@ def evaluate(row: Row) -> Result:
         return judge(row, SLICED[row.quantity](read_sliced_case(row.overrides), row.at))
     if row.quantity in STRENGTH:
         return judge(row, STRENGTH[row.quantity](read_strength_case(row.overrides), row.at))
+    if row.quantity in HOT:
+        return judge(row, HOT[row.quantity](read_hot_case(row.overrides), row.at))
     if row.quantity not in QUANTITIES:
         raise ConfigError(f"{row.origin}.csv, {row.id}: no quantity '{row.quantity}'; see gensig.validation.checks")
     return judge(row, QUANTITIES[row.quantity](read_case(row.overrides), row.at))

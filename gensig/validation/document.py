@@ -13,7 +13,7 @@ SOURCE_TITLES = {
     "spur_paper": "What the spur paper prints and claims",
     "helical_reference": "Reference numbers for both helical pairs",
     "helical_error_paper": "What the paper on transmission error and flank modification prints",
-    "helical_heat_paper": "What the paper on helical stiffness with temperature prints: cold gears",
+    "helical_heat_paper": "What the paper on helical stiffness with temperature prints",
     "engine_root_stress": "Root stress and safety factor of the diesel's injection pump drive",
 }
 SOURCE_TEXTS = {
@@ -40,7 +40,9 @@ SOURCE_TEXTS = {
     "of the contact lines, `misaligned` have 5.2 um over the face. No line was tuned; the addendum is the one with "
     "which the printed contact ratio comes out.",
     "helical_heat_paper": "Gears 40/162, 24.351 kN m; bores of half the pitch radius, an even split of the profile "
-    "shift and the rack's rounding are assumed, the paper prints none of them. Hot gears are not computed yet.",
+    "shift and the rack's rounding are assumed, the paper prints none of them. Hot gears are those of "
+    "heat=chongqing_rated, whose inputs are assumed as well; `true`, `contact_ratio`, `apparent` and `softened` are "
+    "the effects of heat one by one (docs/theory/heat.md), `ours` gensig's own mesh.",
     "engine_root_stress": "Sun, Shi, Chen, Li & Liu, spur gears 54/54 of module 3, and numbers computed from it "
     "independently of this project (`reference`, `variants`). The paper prints root stresses and safety factors, but "
     "neither a force nor any form factor: the force that gives its stress is what can be compared. All load factors "
@@ -115,6 +117,16 @@ TITLES = {
     "reference": "Form and stress correction factors, forces",
     "variants": "The same stress under other racks",
     "mesh": "Through the mesh",
+    "bulk_field": "Bulk temperature above the oil",
+    "hot": "Hot stiffness",
+    "hot_change": "Hot over cold, effect by effect",
+    "finite_elements": "Beside the paper's finite elements",
+    "sweeps": "Sweeps of friction, torque and speed",
+    "sweeps_rise": "Does stiffness rise with friction, torque and speed?",
+    "torque_matters_most": "Does torque matter most?",
+    "heat_flow": "Friction heat, and how warm the cooled surfaces get",
+    "flash": "Flash temperature",
+    "hotter_than_housing": "Gears hotter than their housing",
 }
 INTRO = """# Validation
 

@@ -45,6 +45,8 @@ UNITS = {
     "N": 1.0,
     "N m": 1.0,
     "h": 3600.0,
+    "K": 1.0,
+    "kW": 1e3,
     "MPa": 1e6,
     "1e9 N/m": 1e9,
     "N/(mm um)": 1e9,  # per face width
@@ -136,7 +138,7 @@ def judge(row: Row, value: float) -> Result:
     else:
         printed = float(row.printed)
         allowed = max((row.tolerance or 0.0) * abs(printed), half_last_digit(row.printed))
-        deviation = (computed - printed) / abs(printed)
+        deviation = (computed - printed) / abs(printed) if printed else None
         verdict = REPRODUCED if abs(computed - printed) <= allowed * (1.0 + 1e-9) else DIFFERS
     return Result(row=row, computed=computed, deviation=deviation, verdict=verdict)
 

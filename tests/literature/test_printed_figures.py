@@ -6,7 +6,7 @@ from dataclasses import replace
 import pytest
 
 from gensig.errors import ConfigError
-from gensig.validation.checks import QUANTITIES, SLICED, STRENGTH, evaluate, run_validation
+from gensig.validation.checks import HOT, QUANTITIES, SLICED, STRENGTH, evaluate, run_validation
 from gensig.validation.rows import (
     DIFFERS,
     FAILS,
@@ -45,7 +45,7 @@ def test_rows_are_unique_and_shortfalls_are_explained():
 
 
 def test_every_quantity_is_used():
-    assert {*QUANTITIES, *SLICED, *STRENGTH} == {row.quantity for row in ROWS}
+    assert {*QUANTITIES, *SLICED, *STRENGTH, *HOT} == {row.quantity for row in ROWS}
 
 
 @pytest.mark.parametrize(
