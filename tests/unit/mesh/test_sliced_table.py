@@ -6,6 +6,7 @@ import numpy as np
 import pytest
 
 from gensig.config import read_request
+from gensig.errors import FaultError
 from gensig.faults.registry import read_faults
 from gensig.mesh._slice_kernels import bite_forces
 from gensig.mesh.load_distribution import loaded_pair_table, pair_states, static_mesh
@@ -156,6 +157,13 @@ def test_teeth_that_all_share_a_form_are_looked_at_once():
     np.testing.assert_array_equal(again.compliance[1, 0], table.compliance[1, 0])
     np.testing.assert_array_equal(again.depth, table.depth)
     assert system.mesh_table((form,)) is again
+
+
+def test_too_many_different_teeth_are_refused():
+    system, _, _ = table_of()
+    runout = read_faults(read_request(["system=helical_pair", "fault=runout"]).config["fault"])[0]
+    with pytest.raises(FaultError, match="62 different teeth of the pinion and 133 of the wheel make 8246 pairs"):
+        system.mesh_table((runout, replace(runout, gear="wheel")))
 
 
 def test_chords_are_convex_and_meet():
