@@ -145,7 +145,8 @@ def sliced_table(
     )
     if (n_pairs := len(pinion) * len(wheel)) > MOST_PAIRS:
         raise FaultError(
-            f"{len(pinion)} different teeth of the pinion and {len(wheel)} of the wheel make {n_pairs} pairs, above {MOST_PAIRS}; put faults that differ from tooth to tooth on one gear or on fewer teeth"
+            f"{len(pinion)} different teeth of the pinion and {len(wheel)} of the wheel make {n_pairs} pairs, above "
+            f"{MOST_PAIRS}; put faults that differ from tooth to tooth on one gear or on fewer teeth"
         )
     setting = _Setting(
         pair=pair,
