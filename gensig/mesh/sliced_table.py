@@ -61,6 +61,8 @@ class SlicedTable:
     pinion_present, wheel_present : (kind,)
     shared_compliance : m/N   of the bodies, that all pairs share
     set_chord : chord of the set torque's mean load, for what asks for one spring
+    middle_lag : m            how much further along its way the first slice is than the middle of the face: what grows
+        with the contact's position (tilts of single teeth, sliding) does so with position - middle_lag
     """
 
     pair: GearPair
@@ -79,6 +81,7 @@ class SlicedTable:
     wheel_present: NDArray[np.bool_]
     shared_compliance: float
     set_chord: int
+    middle_lag: float = 0.0
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -169,7 +172,8 @@ def sliced_table(
             asked = a in met[0] and b in met[1] and one.present and other.present
             first[a, b], loads[a, b] = _curves(setting, _known(one), _known(other), True) if asked else healthy
     compliance, gap = _chords(first, loads, frame.depth)
-    shared = _mesh(setting, setting.pinion, setting.wheel).shared_compliance
+    mesh = _mesh(setting, setting.pinion, setting.wheel)
+    shared = mesh.shared_compliance
     columns = _smoothed(compliance + shared, gap, float(frame.position[1] - frame.position[0]))
     return SlicedTable(
         pair=pair,
@@ -188,6 +192,7 @@ def sliced_table(
         wheel_present=np.array([tooth.present for tooth in wheel]),
         shared_compliance=shared,
         set_chord=frame.set_chord,
+        middle_lag=0.5 * float(mesh.lag[0] + mesh.lag[-1]),
     )
 
 
