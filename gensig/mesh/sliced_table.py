@@ -16,7 +16,7 @@ from functools import lru_cache
 import numpy as np
 from numpy.typing import NDArray
 
-from gensig.errors import GeometryError
+from gensig.errors import FaultError, GeometryError
 from gensig.geometry.contact import GearPair
 from gensig.geometry.tooth import Tooth, healthy_tooth
 from gensig.material import Material
@@ -30,12 +30,14 @@ from gensig.mesh.smooth_table import smooth
 Array = NDArray[np.float64]
 
 N_CHORDS = 8
-N_TRIED, N_SAMPLES = 40, 32  # depths and positions at which chords are chosen
+N_TRIED, N_SAMPLES = 32, 24  # depths and positions at which chords are chosen
 PER_SLICE = 4  # positions looked at from one slice's entry to the next one's
+UNMET_STEP = 8  # nodes between the positions looked at for teeth that never meet on their working flanks
 DEEPEST = 3.0  # largest depth, in largest static ones
 LEAST_REACH = 1e-4  # m; first gaps up to here are tabulated, so that teeth that stand proud find their force
 FARTHEST = 1e-3  # m; first gaps beyond are all alike
 N_PHASES = 32
+MOST_PAIRS = 400  # of different teeth, about a tenth of a second and 0.8 MB each
 OFF_PATH = 1e3  # times the least compliance, where mesh.law=paper has no contact
 
 
@@ -59,6 +61,8 @@ class SlicedTable:
     pinion_present, wheel_present : (kind,)
     shared_compliance : m/N   of the bodies, that all pairs share
     set_chord : chord of the set torque's mean load, for what asks for one spring
+    middle_lag : m            how much further along its way the first slice is than the middle of the face: what grows
+        with the contact's position (tilts of single teeth, sliding) does so with position - middle_lag
     """
 
     pair: GearPair
@@ -77,6 +81,7 @@ class SlicedTable:
     wheel_present: NDArray[np.bool_]
     shared_compliance: float
     set_chord: int
+    middle_lag: float = 0.0
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -134,12 +139,18 @@ def sliced_table(
     Raises
     ------
     ConfigError, GeometryError    for a force that is not positive, or where nothing can touch
+    FaultError    for more different pairs of teeth than can be tabulated
     """
     odd = dict(teeth or {})
     (pinion, pinion_kind), (wheel, wheel_kind) = (
         distinct_teeth(gear, {number: odd[name, number] for name, number in sorted(odd) if name == gear.name})
         for gear in (pair.pinion, pair.wheel)
     )
+    if (n_pairs := len(pinion) * len(wheel)) > MOST_PAIRS:
+        raise FaultError(
+            f"{len(pinion)} different teeth of the pinion and {len(wheel)} of the wheel make {n_pairs} pairs, above "
+            f"{MOST_PAIRS}; put faults that differ from tooth to tooth on one gear or on fewer teeth"
+        )
     setting = _Setting(
         pair=pair,
         material=material,
@@ -151,17 +162,18 @@ def sliced_table(
         wheel=_known(wheel[np.bincount(wheel_kind).argmax()]),
     )
     frame = _frame(setting)
-    healthy = _curves(setting, _known(pinion[0]), _known(wheel[0]))
     first = np.empty((len(pinion), len(wheel), len(frame.position)))
     loads = np.empty((*first.shape, len(frame.depth)))
     met = set(pinion_kind.tolist()), set(wheel_kind.tolist())
+    # where all teeth have a common form the sound one is met by nobody, but the back flanks are sound
+    healthy = _curves(setting, _known(pinion[0]), _known(wheel[0]), 0 in met[0] and 0 in met[1])
     for a, one in enumerate(pinion):
         for b, other in enumerate(wheel):
-            # sound ones beside common forms of all teeth meet nobody, and those that are missing touch nobody
             asked = a in met[0] and b in met[1] and one.present and other.present
-            first[a, b], loads[a, b] = _curves(setting, _known(one), _known(other)) if asked else healthy
+            first[a, b], loads[a, b] = _curves(setting, _known(one), _known(other), True) if asked else healthy
     compliance, gap = _chords(first, loads, frame.depth)
-    shared = _mesh(setting, setting.pinion, setting.wheel).shared_compliance
+    mesh = _mesh(setting, setting.pinion, setting.wheel)
+    shared = mesh.shared_compliance
     columns = _smoothed(compliance + shared, gap, float(frame.position[1] - frame.position[0]))
     return SlicedTable(
         pair=pair,
@@ -180,6 +192,7 @@ def sliced_table(
         wheel_present=np.array([tooth.present for tooth in wheel]),
         shared_compliance=shared,
         set_chord=frame.set_chord,
+        middle_lag=0.5 * float(mesh.lag[0] + mesh.lag[-1]),
     )
 
 
@@ -326,18 +339,20 @@ def _bitten(setting: _Setting, mesh: SlicedMesh, position: Array, depth: Array, 
 
 
 @lru_cache(maxsize=128)
-def _curves(setting: _Setting, pinion: _Known, wheel: _Known) -> tuple[Array, Array]:
+def _curves(setting: _Setting, pinion: _Known, wheel: _Known, are_met: bool) -> tuple[Array, Array]:
     """First gap (node,) m and force (node, knot) N of one pair of teeth at the depths of the frame."""
     frame, mesh = _frame(setting), _mesh(setting, pinion, wheel)
     looked = frame.position
     later = float(setting.pair.face_width * math.tan(setting.pair.base_helix_angle)) / setting.slices.n_slices
     step = int(later / (PER_SLICE * (looked[1] - looked[0]))) if mesh.lag[-1] > 0.0 else 0
+    step = step if are_met else max(step, UNMET_STEP)
     if step > 1:
         looked = np.append(looked[:-1:step], looked[-1])
     first, force = _bitten(setting, mesh, looked, frame.depth, frame.reach)
     found = np.flatnonzero(first <= frame.reach)
     if not len(found):  # no flank is left to touch: what is sound, out of reach
-        sound = _curves(setting, *(_known(healthy_tooth(gear)) for gear in (setting.pair.pinion, setting.pair.wheel)))
+        gears = setting.pair.pinion, setting.pair.wheel
+        sound = _curves(setting, *(_known(healthy_tooth(gear)) for gear in gears), False)
         return np.full(len(frame.position), FARTHEST), sound[1]
     if setting.options.law == "paper":
         first, force = np.zeros_like(first), np.maximum(force, force.max() / OFF_PATH)

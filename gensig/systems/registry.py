@@ -44,7 +44,7 @@ def read_spur_pair(config: Mapping[str, Any]) -> SpurPair:
     if _number("gear.helix_angle_deg", gear["helix_angle_deg"]) != 0.0:
         raise ConfigError(
             f"gear.helix_angle_deg = {gear['helix_angle_deg']:g}: system=spur_pair takes spur gears, 0; helical ones "
-            f"have system=helical_pair, with gensig stiffness and gensig transmission-error"
+            f"have system=helical_pair"
         )
     if read_modification(config).is_any:
         raise ConfigError(

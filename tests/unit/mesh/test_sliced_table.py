@@ -6,12 +6,13 @@ import numpy as np
 import pytest
 
 from gensig.config import read_request
+from gensig.errors import FaultError
 from gensig.faults.registry import read_faults
 from gensig.mesh._slice_kernels import bite_forces
 from gensig.mesh.load_distribution import loaded_pair_table, pair_states, static_mesh
 from gensig.mesh.pair_table import node_positions
 from gensig.mesh.sliced_table import DEEPEST, N_CHORDS, sliced_table
-from gensig.mesh.slices import loaded_contact, single_pair_stiffness, slice_places
+from gensig.mesh.slices import Meeting, loaded_contact, single_pair_stiffness, slice_places
 from gensig.systems.registry import read_sliced_pair
 
 
@@ -28,8 +29,9 @@ def table_of(*words, teeth=None):
     return system, table, system.sliced_mesh()
 
 
-def at_rest(table, roll, force):
-    """Approach, and load (phase, pair) of the chords under a total force, by bisection."""
+def at_rest(table, roll, force, errors=None):
+    """Approach, and load (phase, pair) of the chords under a total force, by bisection; ``errors`` by tooth as in
+    ``Meeting``, tilts taken at the middle of the face."""
     pitch = table.pair.base_pitch
     index = np.floor(roll / pitch).astype(int)[:, None] - table.first_pitch
     index = index - np.arange(table.last_pitch - table.first_pitch)
@@ -45,6 +47,13 @@ def at_rest(table, roll, force):
         return (1.0 - part) * low + part * high
 
     own, gap = read(table.compliance) - table.shared_compliance, read(table.gap)
+    if errors is not None:
+        middle = position - table.middle_lag - table.pair.pitch_point
+        for error, tilt, n in (
+            (errors.pinion_error, errors.pinion_tilt, len(table.pinion_kind)),
+            (errors.wheel_error, errors.wheel_tilt, len(table.wheel_kind)),
+        ):
+            gap += (error[index % n] + tilt[index % n] * middle)[:, :, None]
     gap[~(table.pinion_present[kinds[0]] & table.wheel_present[kinds[1]])] = np.inf
 
     def load(within):
@@ -140,6 +149,23 @@ def test_faulty_teeth_have_their_own_chords(fault, share):
     assert np.abs(exact.approach - sound).max() > 2.0 * share * sound.max()
 
 
+def test_errors_of_single_teeth_open_all_chords():
+    """Pitch errors and tilts of a good grade 5 gear; a tilt acts slice by slice, in the table at the middle."""
+    system, table, mesh = table_of()
+    rng = np.random.default_rng(2)
+    errors = Meeting(
+        pinion_error=rng.uniform(-2e-6, 2e-6, 61),
+        wheel_error=rng.uniform(-2e-6, 2e-6, 132),
+        pinion_tilt=rng.uniform(-1e-4, 1e-4, 61),
+        wheel_tilt=rng.uniform(-1e-4, 1e-4, 132),
+    )
+    roll = system.phases(32, n_periods=20)
+    exact = loaded_contact(mesh, roll, system.mesh_force, errors).approach
+    found = at_rest(table, roll, system.mesh_force, errors)[0]
+    np.testing.assert_allclose(found, exact, rtol=5e-3)
+    assert np.ptp(exact) > 1e-6
+
+
 def test_teeth_that_all_share_a_form_are_looked_at_once():
     """What nobody meets is not computed; sound ones stay kind 0 for the back flanks."""
     system, _, _ = table_of()
@@ -156,6 +182,13 @@ def test_teeth_that_all_share_a_form_are_looked_at_once():
     np.testing.assert_array_equal(again.compliance[1, 0], table.compliance[1, 0])
     np.testing.assert_array_equal(again.depth, table.depth)
     assert system.mesh_table((form,)) is again
+
+
+def test_too_many_different_teeth_are_refused():
+    system, _, _ = table_of()
+    runout = read_faults(read_request(["system=helical_pair", "fault=runout"]).config["fault"])[0]
+    with pytest.raises(FaultError, match="62 different teeth of the pinion and 133 of the wheel make 8246 pairs"):
+        system.mesh_table((runout, replace(runout, gear="wheel")))
 
 
 def test_chords_are_convex_and_meet():
