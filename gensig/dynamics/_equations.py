@@ -5,11 +5,17 @@ from __future__ import annotations
 import numpy as np
 
 from gensig.dynamics import _layout as layout
-from gensig.dynamics._layout import BASE, CENTER, NOMINAL, at_row
+from gensig.dynamics._layout import BASE, CENTER, NOMINAL, at_row, is_helical
 from gensig.dynamics._vector import inlined, load, spread, store, where_above, width
 
 # degrees of freedom of the two gears that every machine begins with; helical gears have more behind them
 P_X, P_Y, P_TURN, W_X, W_Y, W_TURN, N_IN_PLANE = range(7)
+N_GEARS = 12
+
+
+@inlined
+def _n_gears(group):
+    return N_GEARS if is_helical(group) else N_IN_PLANE
 
 
 @inlined
@@ -21,7 +27,7 @@ def motion(group, q, v, work):
     rate = pinion_radius * load(work, v + P_TURN * n) - wheel_radius * load(work, v + W_TURN * n)
     approach = at_row(numbers, layout.REST_APPROACH) + (approach - load(work, q + P_Y * n) + load(work, q + W_Y * n))
     rate = rate - load(work, v + P_Y * n) + load(work, v + W_Y * n)
-    for d in range(N_IN_PLANE, group.n_gears):
+    for d in range(N_IN_PLANE, _n_gears(group)):
         reach = load(group.reach, d * n)
         approach = approach + reach * load(work, q + d * n)
         rate = rate + reach * load(work, v + d * n)
@@ -73,7 +79,8 @@ def accelerate(group, law, q, v, forces, a, work):
     store(work, a + W_X * n, 0.0 - friction)
     store(work, a + W_Y * n, 0.0 - normal)
     store(work, a + W_TURN * n, at_row(numbers, layout.WHEEL_RADIUS) * normal + moment_w)
-    for d in range(N_IN_PLANE, group.n_gears):
+    n_gears = _n_gears(group)
+    for d in range(N_IN_PLANE, n_gears):
         store(work, a + d * n, 0.0 - load(group.reach, d * n) * normal)
     for d in range(n_dof):
         i = d * n
@@ -83,7 +90,7 @@ def accelerate(group, law, q, v, forces, a, work):
             j = group.other_column[k] * n
             pull = pull - load(group.other_stiffness, k * n) * load(work, q + j)
             pull = pull - load(group.other_damping, k * n) * load(work, v + j)
-        if d < group.n_gears:
+        if d < n_gears:
             pull = pull + load(work, a + i)
         store(work, a + i, pull * load(group.inverse_mass, i))
 

@@ -12,7 +12,7 @@ import numpy as np
 
 from gensig.dynamics import _layout as layout
 from gensig.dynamics._equations import P_TURN, accelerate, event, motion, recenter, set_out
-from gensig.dynamics._layout import AHEAD, BASE, NOMINAL, PART, ROLL, at_row
+from gensig.dynamics._layout import AHEAD, BASE, NOMINAL, PART, ROLL, at_row, is_helical
 from gensig.dynamics._mesh_kernels import mesh_law
 from gensig.dynamics._tables import beside_between, between, cover, gather
 from gensig.dynamics._vector import (
@@ -109,7 +109,7 @@ def integrate(
                 if fresh[lane] > 0.0:
                     wide[(ROLL + begin) * n + lane] = wide[BASE * n + lane]
                     work[layout.LAST_TOTAL * n + lane] = numbers[layout.MEAN_FORCE * n + lane]
-        if group.n_chords > 1:
+        if is_helical(group):
             bent = at_row(numbers, layout.SHARED) * load(work, layout.LAST_TOTAL * n)
             store(work, layout.LOCAL * n, approach + 0.5 * step * rate - bent)
         if place == first_step:
@@ -137,7 +137,7 @@ def integrate(
             elif part == 2:
                 source, target, slot_0, h, offset = parted, parted, PART, (1.0 - share) * step, share * step
             between(slot_0, slot_1, layout.MIDDLE, first, last, work)
-            if group.n_chords > 1:
+            if is_helical(group):
                 beside_between(slot_0, slot_1, layout.MIDDLE, first, last, work)
             half = 0.5 * h
             at, ahead = source, trial_a
@@ -161,7 +161,7 @@ def integrate(
                         differs = law[7] - loaded
                         changed = where_above(differs * differs, zero, one, changed)
                         store(work, layout.MOTION * n, approach)
-                        if stage == 3 and group.n_chords > 1:
+                        if stage == 3 and is_helical(group):
                             store(work, layout.LAST_TOTAL * n, load(work, layout.TOTAL * n))
                 if stage == 3:
                     break
@@ -334,7 +334,7 @@ def law_at(group, motion, work, wide, near, found):
     for _ in range(ROUNDS):
         bent = at_row(group.numbers, layout.SHARED) * load(work, layout.TOTAL * n)
         store(work, layout.LOCAL * n, load(motion, n) - bent)
-        if not gather(group, 1, True, work, wide, near) and group.n_chords > 1:
+        if not gather(group, 1, True, work, wide, near) and is_helical(group):
             break
         law = mesh_law(
             group, near[spans + 6], near[spans + 7], 1, layout.MARGIN, spread(work, 0.0), load(motion, n),
@@ -342,7 +342,7 @@ def law_at(group, motion, work, wide, near, found):
         )  # fmt: skip
         for row in range(layout.N_LAW):
             store(found, row * n, law[row])
-        if group.n_chords == 1:
+        if not is_helical(group):
             break
 
 

@@ -8,7 +8,11 @@ from __future__ import annotations
 
 from typing import Any, NamedTuple
 
+from numba.core import types
+from numba.extending import intrinsic
+
 from gensig.dynamics._vector import FOUR, inlined, load, width
+from gensig.mesh.pair_table import N_PAIRS
 
 MOST_PAIRS = 8  # that may be followed at once; spur gears have 4
 # pairs this much further apart than the approach are followed through a step, m: none comes closer as fast
@@ -89,10 +93,9 @@ class Group(NamedTuple):
     stays small. K and C stand as diagonals and as rows of what else there is (``other_first`` (dof + 1,),
     ``other_column``). ``set_force`` is f and the mean mesh force, ``force`` the same less what holds the rest; the mean
     mesh force is taken off the mesh force again: large forces and torques balance before they are rounded. ``held`` is
-    K times, and ``carried`` M times, how far each degree of freedom turns with the pinion (``rotation``). The first
-    ``n_gears`` degrees of freedom are those of the gears; ``reach`` (dof, lane) is the gradient of the approach, which
-    is asked from the seventh on. ``profile`` (cell, 5, lane) tells the nominal motion and the torque, cell
-    ``profile_first`` first.
+    K times, and ``carried`` M times, how far each degree of freedom turns with the pinion (``rotation``). ``reach``
+    (dof, lane) is the gradient of the approach. ``profile`` (cell, 5, lane) tells the nominal motion and the torque,
+    cell ``profile_first`` first.
     """
 
     numbers: Any
@@ -109,7 +112,6 @@ class Group(NamedTuple):
     tooth_tilt: Any
     one_sided: bool
     consistent: bool
-    n_gears: int
     reach: Any
     inverse_mass: Any
     stiffness: Any
@@ -127,6 +129,30 @@ class Group(NamedTuple):
     profile: Any
     profile_first: int
     cells_per_second: float
+
+
+class HelicalGroup(Group):
+    """Helical gears: a type of its own, so that spur gears are compiled without what these alone need."""
+
+
+_intrinsic: Any = intrinsic
+
+
+@_intrinsic
+def is_helical(typing_context: Any, group: Any) -> Any:
+    """Whether a group is one of helical gears; known when the code is compiled."""
+    answer = issubclass(group.instance_class, HelicalGroup)
+
+    def build(context: Any, builder: Any, sig: Any, args: Any) -> Any:
+        return context.get_constant(types.boolean, answer)
+
+    return types.boolean(group), build
+
+
+@inlined
+def followed(group):
+    """Pairs that are followed at once."""
+    return group.n_pairs if is_helical(group) else N_PAIRS
 
 
 @inlined

@@ -59,8 +59,10 @@ from gensig.dynamics._layout import (
     WHEEL_TEETH,
     WHEEL_TOOTH,
     at_row,
+    is_helical,
 )  # fmt: skip
 from gensig.dynamics._vector import any_above, compiled, inlined, load, spread, store, where_above, width
+from gensig.mesh.pair_table import N_PAIRS
 
 
 @inlined
@@ -86,7 +88,7 @@ def _rubbed(numbers, position, load_of_pair):
 
 
 @inlined
-def _total_load(numbers, first, last, slot, work):
+def _total_load(numbers, rounds, first, last, slot, work):
     """Load of all pairs, and the sum of their stiffnesses; those that the shared deflection lifts off get a bite of 0.
 
     Each that leaves raises the total, so the loop ends after at most as many rounds as there are pairs.
@@ -94,7 +96,7 @@ def _total_load(numbers, first, last, slot, work):
     n = width(work)
     zero, shared = spread(work, 0.0), at_row(numbers, SHARED)
     total, stiffness = zero, zero
-    for _ in range(MOST_PAIRS):
+    for _ in range(rounds):
         stiffness, force = zero, zero
         for k in range(first, last):
             bite = load(work, (BITE + k) * n)
@@ -115,20 +117,22 @@ def _total_load(numbers, first, last, slot, work):
 
 @inlined
 def one_sided_law(
-    numbers, consistent, chords, first, last, slot, margin, ahead, approach, approach_rate, roll_rate, work
+    numbers, consistent, helical, first, last, slot, margin, ahead, approach, approach_rate, roll_rate, work
 ):  # fmt: skip
     """One-sided contact of the gathered pairs, ``ahead`` m of roll after the instant they were gathered at.
 
     Normal force, friction force, friction moments about pinion and wheel, force on the roll coordinate (energy
     balance), stored energy, power lost in mesh damping, number of loaded pairs; a vector each. Rows ``margin`` take
     how deep every pair bites into the body that the others deflect, negative where it does not, and ``PAIR_FORCE`` its
-    normal force; none if negative. Of ``chords``, the damping goes by the gap of the first touch, for their own jump
-    from one to the next, and the energy that their springs leave out is stored too.
+    normal force; none if negative. Helical teeth are damped by the gap of their first touch, for those of
+    chords jump from one to the next, and the energy that the springs of chords leave out is stored too.
     """
     n = width(work)
     zero, one = spread(work, 0.0), spread(work, 1.0)
     shared, damping = at_row(numbers, SHARED), at_row(numbers, DAMPING)
-    beside = ahead - at_row(numbers, HALF_LAG)
+    middle = ahead
+    if helical:
+        middle = ahead - at_row(numbers, HALF_LAG)
     # beyond half the backlash the teeth touch on their back flanks, if at all
     driven = approach + 0.5 * at_row(numbers, BACKLASH)
     for k in range(first, last):
@@ -138,7 +142,8 @@ def one_sided_law(
             store(work, (margin + k) * n, bite)
         bite = where_above(bite, zero, bite, zero)
         store(work, (BITE + k) * n, where_above(driven, zero, bite, zero))
-    total, stiffness = _total_load(numbers, first, last, slot, work)
+    rounds = MOST_PAIRS if helical else N_PAIRS
+    total, stiffness = _total_load(numbers, rounds, first, last, slot, work)
     normal, friction, moment_p, moment_w, along, lost, loaded = zero, zero, zero, zero, zero, zero, zero
     stored = 0.0 - 0.5 * shared * total * total
     for k in range(first, last):
@@ -153,7 +158,7 @@ def one_sided_law(
         elastic = (bite - shared * total) * load(work, (pair + STIFFNESS) * n)
         elastic = where_above(bite, zero, elastic, zero)
         felt = slope
-        if chords:
+        if helical:
             felt = load(work, (BESIDE + slot * BESIDE_ROWS + k * COLUMNS + TOUCH_SLOPE) * n)
         rate = approach_rate - felt * roll_rate
         force = elastic * (1.0 + damping * rate)
@@ -165,10 +170,10 @@ def one_sided_law(
         stored = stored + elastic * (bite - 0.5 * load(work, (pair + OWN) * n) * elastic)
         lost = lost + (force - elastic) * rate
         along = along + force * slope + 0.5 * elastic * elastic * load(work, (pair + OWN_SLOPE) * n)
-        position = load(work, (pair + POSITION) * n) + beside
+        position = load(work, (pair + POSITION) * n) + middle
         sliding, moment, reaction = _rubbed(numbers, position, force)
         friction, moment_p, moment_w = friction + sliding, moment_p + moment, moment_w + reaction
-    if chords:
+    if helical:
         store(work, TOTAL * n, total)
         for k in range(first, last):
             pair, row = (slot * SLOT_ROWS + k * N_KEPT) * n, (BESIDE + slot * BESIDE_ROWS + k * COLUMNS) * n
@@ -240,7 +245,7 @@ def coast_law(group, lane, roll, approach, rate, roll_rate, work):
     within = -approach - numbers[BACKLASH * n + lane]
     newest = int(np.floor(mirrored / pitch)) - places[FIRST_PITCH * n + lane]
     start, stride = places[COAST_TABLE * n + lane], places[STRIDE * n + lane]
-    n_pairs = places[FOLLOWED * n + lane]
+    n_pairs = places[FOLLOWED * n + lane] if is_helical(group) else N_PAIRS
     wheel = places[WHEEL_ROWS * n + lane] * stride
     bites = BITE * n + lane
     for k in range(n_pairs):
@@ -308,7 +313,7 @@ def mesh_law(group, first, last, slot, margin, turned, approach, rate, roll_rate
         law = one_sided_law(
             numbers,
             group.consistent,
-            group.n_chords > 1,
+            is_helical(group),
             first,
             last,
             slot,

@@ -60,6 +60,8 @@ from gensig.dynamics._layout import (
     WHEEL_TOOTH,
     WITHIN,
     YIELDING,
+    followed,
+    is_helical,
 )  # fmt: skip
 from gensig.dynamics._vector import (
     FOUR,
@@ -110,7 +112,7 @@ def gather(group, slot, renew, work, wide, near):
     any lane; rows outside of it are stale. The second holds those that come near their mates: the others carry nothing.
     """
     n = width(work)
-    exact = group.exact
+    exact, n_pairs = group.exact, followed(group)
     changed = False
     first, last, near_first, near_last = MOST_PAIRS, 0, MOST_PAIRS, 0
     for lane in range(n):
@@ -128,13 +130,13 @@ def gather(group, slot, renew, work, wide, near):
         last_cell, within = group.places[LAST_CELL * n + lane], work[WITHIN * n + lane]
         start = exact[TABLE_START * n + lane]
         position = roll - near[NEWEST * n + lane] * pitch
-        for k in range(group.n_pairs):
+        for k in range(n_pairs):
             here = RAW * n + (k * n + lane) * COLUMNS
             pinion = near[(AT_PINION + k) * n + lane]
             if pinion >= 0 and (lowest <= position <= highest or within >= FAR_NEAR):
                 x = (position - start) * nodes
                 cell = min(max(int(x), 0), last_cell)
-                if group.n_chords > 1:
+                if is_helical(group):
                     if renew:
                         changed = _choose(group, lane, k, pinion, cell, x - cell, position, work, near) or changed
                     pinion += near[(CHORD + k) * n + lane] * group.places[CHORD_STRIDE * n + lane]
@@ -160,7 +162,7 @@ def gather(group, slot, renew, work, wide, near):
     near[span], near[span + 1], near[span + 2], near[span + 3] = first, last, near_first, near_last
     for k in range(first, last):
         _spread_rows(group, slot, k, work)
-        if group.n_chords > 1:
+        if is_helical(group):
             _spread_beside(group, slot, k, work)
     return changed
 

@@ -23,6 +23,7 @@ from gensig.dynamics._layout import (
     TORQUE,
     TORQUE_SLOPE,
     Group,
+    HelicalGroup,
 )
 from gensig.dynamics._vector import n_lanes
 from gensig.dynamics.helical import pitches
@@ -101,7 +102,8 @@ def pack(
         [system.force - one.mesh_force * one.approach_direction() for system, one in zip(systems, lanes, strict=True)]
     )
     options = lanes[0].table.options
-    return Group(
+    kind = HelicalGroup if lanes[0].is_helical else Group
+    return kind(
         numbers=numbers.ravel(),
         exact=exact.ravel(),
         places=places.ravel(),
@@ -116,7 +118,6 @@ def pack(
         tooth_tilt=np.concatenate([tilt for one in lanes for tilt in (one.pinion_tilt, one.wheel_tilt)]),
         one_sided=options.law == "one_sided",
         consistent=options.roll_torque == "consistent",
-        n_gears=len(lanes[0].gear_dofs),
         reach=side_by_side(np.stack([one.approach_direction() for one in lanes])),
         inverse_mass=side_by_side(1.0 / mass),
         stiffness=side_by_side(stiffness[:, diagonal, diagonal]),
@@ -173,18 +174,16 @@ def _depths(lanes: Sequence[PairDynamics]) -> Array:
 
 
 def _rows(table: PairTable | SlicedTable) -> tuple[Array, NDArray[np.int64], tuple[int, int]]:
-    """As ``_table_rows``, rows (row, chord, node, column); behind the columns what chords leave out, if there are more
-    than one."""
+    """As ``_table_rows``, rows (row, chord, node, column); behind the columns of helical teeth what stands
+    beside them."""
     if isinstance(table, PairTable):
         rows, row, steps = _table_rows(table)
         return rows[:, None], row, steps
     (pinion, pinion_row), (wheel, wheel_row) = (
         np.unique(kind, return_inverse=True) for kind in (table.pinion_kind, table.wheel_kind)
     )
-    values = [table.compliance, table.compliance_slope, table.gap, table.gap_slope]
-    if len(table.depth) > 1:
-        touch = (np.broadcast_to(value[:, :, :1], value.shape) for value in (table.gap, table.gap_slope))
-        values.extend((*left_out_energy(table), *touch))
+    touch = [np.broadcast_to(value[:, :, :1], value.shape) for value in (table.gap, table.gap_slope)]
+    values = [table.compliance, table.compliance_slope, table.gap, table.gap_slope, *left_out_energy(table), *touch]
     pairs = np.stack([value[np.ix_(pinion, wheel)].reshape(-1, *value.shape[2:]) for value in values], axis=-1)
     if pinion[0] != 0 or wheel[0] != 0:  # back flanks are those of sound teeth
         pairs = np.concatenate([np.stack([value[0, 0] for value in values], axis=-1)[None], pairs])
