@@ -196,13 +196,19 @@ def _mesh_stiffness(row: TableRow, pair: GearPair) -> float:
         raise ConfigError(f"{row.place('mesh_stiffness')}: the row has a torsional stiffness too; give one of them")
     if torsional is not None:
         return torsional / (pair.pinion.base_radius * pair.wheel.base_radius)
-    return mesh_stiffness(pair) * pair.face_width if linear is None else linear
+    if linear is not None:
+        return linear
+    if pair.pinion.n_teeth > pair.wheel.n_teeth:  # the standard's gear 1 is the smaller one, whichever drives
+        pair = replace(pair, pinion=pair.wheel, wheel=pair.pinion)
+    return mesh_stiffness(pair) * pair.face_width
 
 
 def _gear_at(row: TableRow, node: int, number: int, end: str, gears: list[LineGear], options: LineOptions) -> int:
     """Place of the gear on a node that the row means; ConfigError where the tables contradict each other."""
     n_teeth = row.whole(f"teeth_{end}")
     there = [place for place, gear in enumerate(gears) if gear.node == node]
+    if options.gears_csv is None:
+        raise ConfigError(f"{row.place('edge_kind')}: gear_mesh needs a table of gears; give system.gears_csv")
     if not there:
         raise ConfigError(
             f"{row.place(f'edge_{end}')}: system.gears_csv = {options.gears_csv} has no gear on node {number}"

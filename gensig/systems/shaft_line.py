@@ -79,6 +79,10 @@ def read_drive_line(config: Mapping[str, Any]) -> DriveLine:
     gear_rows = [] if options.gears_csv is None else read_gears("system.gears_csv", options.gears_csv)
     node_rows = rows_of_nodes(shafting)
     numbers = tuple(node_rows)
+    if options.viscous_damper_node not in (None, *numbers):
+        raise ConfigError(
+            f"system.viscous_damper_node = {options.viscous_damper_node}: {options.shafting_csv} has no such node"
+        )
     shapes = [gear_of(row) for row in gear_rows]
     gears = [line_gear(row, shape, numbers, options, material) for row, shape in zip(gear_rows, shapes, strict=True)]
     nodes = tuple(node_of(row, place, gears, shapes, options, material) for place, row in enumerate(node_rows.values()))

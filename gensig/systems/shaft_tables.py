@@ -46,7 +46,10 @@ class TableRow:
 
     def place(self, column: str = "") -> str:
         """Where this is, for a message."""
-        return f"{self.table}, row {self.line}" + (f", column {self.headers.get(column, column)}" if column else "")
+        node = f" (node {self.cells['node']})" if self.cells.get("node") else ""
+        return f"{self.table}, row {self.line}{node}" + (
+            f", column {self.headers.get(column, column)}" if column else ""
+        )
 
     def text(self, column: str) -> str:
         """A cell as it is, empty where there is none."""
