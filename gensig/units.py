@@ -28,6 +28,8 @@ UNITS: dict[str, tuple[float, str]] = {
     "n_per_m": (1.0, "stiffness"),
     "ns_per_m": (1.0, "damping"),
     "nm_per_rad": (1.0, "torsional stiffness"),
+    "knm_per_rad": (1e3, "torsional stiffness"),
+    "mnm_per_rad": (1e6, "torsional stiffness"),  # mega, as shaft lines print it
     "nms_per_rad": (1.0, "torsional damping"),
     "mm": (1e-3, "length"),
     "um": (1e-6, "length"),
@@ -36,6 +38,7 @@ UNITS: dict[str, tuple[float, str]] = {
     "rad": (1.0, "angle"),
     "rpm": (2.0 * math.pi / 60.0, "speed"),
     "nm": (1.0, "torque"),
+    "n": (1.0, "force"),
     "kg": (1.0, "mass"),
     "s": (1.0, "time"),
     "hz": (1.0, "frequency"),

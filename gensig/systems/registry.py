@@ -35,6 +35,7 @@ COMMON_GEAR_KEYS = (
 )
 BODY_KEYS = ("mass_kg", "inertia_kg_m2", "support", "bearing", "shaft")
 SLICED = "helical_pair"
+LINE = "shaft_line"
 SYSTEM_KEYS = ("kind", "supports", "motor", "load")
 
 
@@ -103,6 +104,7 @@ def _read_machine(config: Mapping[str, Any], pair: GearPair) -> dict[str, Any]:
 def read_sliced_pair(config: Mapping[str, Any]) -> SlicedPair:
     """Build a spur or helical pair cut into slices from the boundary keys of a configuration, whatever its system; as
     hot as its ``heat`` makes it."""
+    _refuse_line(config)
     heat = read_heat(config)
     return as_configured(read_duty(config)) if heat.is_any else read_cold_pair(config)
 
@@ -174,9 +176,20 @@ def read_system(config: Mapping[str, Any]) -> PairMachine:
     ConfigError, GeometryError    for keys or values that make no machine
     """
     kind = section(config, "system").get("kind")
+    _refuse_line(config)
     if kind not in SYSTEMS:
-        raise ConfigError(f"system.kind = {kind!r}; allowed: {', '.join(SYSTEMS)}")
+        raise ConfigError(f"system.kind = {kind!r}; allowed: {', '.join((*SYSTEMS, LINE))}")
     return SYSTEMS[kind](config)
+
+
+def _refuse_line(config: Mapping[str, Any]) -> None:
+    """Raise for a drive line where a single pair is wanted."""
+    machine = section(config, "system")
+    if machine.get("kind") == LINE:
+        raise ConfigError(
+            f"system={machine.get('name')} is a drive line from tables: so far it has its modes, gensig modes; this is "
+            f"done with system={', '.join(SYSTEMS)}"
+        )
 
 
 def section(config: Mapping[str, Any], *path: str) -> Mapping[str, Any]:

@@ -25,6 +25,8 @@ SOURCES = (
     "helical_error_paper",
     "helical_heat_paper",
     "engine_root_stress",
+    "engine_reference",
+    "engine_paper",
 )
 REPRODUCED, DIFFERS = "reproduced", "differs"
 HOLDS, FAILS = "claim holds", "claim does not hold"
