@@ -33,14 +33,23 @@ class Rows(NamedTuple):
     value: Any
 
 
+class Padded(NamedTuple):
+    """A sparse square matrix, its rows filled up to ``width`` numbers each: ``column``, ``value`` (width, dof)."""
+
+    column: Any
+    value: Any
+
+
 class Factor(NamedTuple):
     """A = L D L^T under the envelope of A: row i of L ends before its diagonal and has ``reach[i]`` numbers.
 
-    ``lower`` holds the rows one after the other from ``first`` (dof,) on, ``inverse_pivot`` (dof,) is 1 / D.
+    ``lower`` holds the rows one after the other from ``first`` (dof,) on, ``inverse_pivot`` (dof,) is 1 / D. ``turn``
+    (dof,) is an order in which rows can be solved where neighbours do not wait for each other.
     """
 
     first: Any
     reach: Any
+    turn: Any
     lower: Any
     inverse_pivot: Any
 
@@ -92,12 +101,33 @@ class Line(NamedTuple):
     per that of the reference, ``carried`` M times it.
     """
 
-    mass: Rows
-    damping: Rows
-    stiffness: Rows
+    mass: Padded
+    damping: Padded
+    stiffness: Padded
     direction: Rows
     factor: Factor
     answer: Any
     compliance: Any
     rotation: Any
     carried: Any
+
+
+class Work(NamedTuple):
+    """Scratch of the core: (dof,), then (mesh,), then as their places say."""
+
+    ahead_q: Any
+    ahead_v: Any
+    moved: Any
+    force: Any
+    turned: Any
+    roll_rate: Any
+    free: Any
+    approach: Any
+    before: Any
+    rate: Any
+    right: Any
+    near: Any
+    matrix: Any
+    law: Any
+    pairs: Any
+    gathered: Any

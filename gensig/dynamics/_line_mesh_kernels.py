@@ -6,24 +6,21 @@ of library calls: bits depend on nothing but the numbers given.
 
 from __future__ import annotations
 
-import functools
 import math
-from typing import Any
 
 import numpy as np
-from numba import njit
 
 from gensig.dynamics import _line_layout as layout
 from gensig.dynamics._line_layout import COAST, DRIVE
-
-_compiled: Any = functools.partial(njit, nogil=True, cache=True, error_model="numpy")()
+from gensig.dynamics._vector import compiled
 
 MOST_ROUNDS = 60
 UNDAMPED = 20  # rounds of Newton's method after which every step is halved
-SETTLED, SETTLED_LEAST = 1e-9, 1e-13  # of an approach, and m; one more step of Newton's method squares the former
+SETTLED, SETTLED_LEAST = 1e-9, 1e-13  # of an approach, and m: what forces and approaches may disagree by
+ROUNDED = 1e-14  # of what forces take off an approach
 
 
-@_compiled
+@compiled
 def gather(meshes, mesh, flank, turned, pairs):
     """Stiffness and gap of the pairs of a flank and their slopes, where the mesh has rolled ``turned`` pitches.
 
@@ -36,7 +33,7 @@ def gather(meshes, mesh, flank, turned, pairs):
     if flank == COAST:
         sense, at_rows = -1, place[layout.AT_COAST_ROWS]
         turned = meshes.number[mesh, layout.MIRROR] - turned
-    newest = int(math.floor(turned)) - first
+    newest = math.floor(turned) - first
     n_cells = n_pairs * n_nodes
     for j in range(n_pairs):
         index = newest - j
@@ -62,7 +59,7 @@ def gather(meshes, mesh, flank, turned, pairs):
             )
 
 
-@_compiled
+@compiled
 def flank_law(pairs, damping, shared, within, rate, roll_rate):
     """Law of the gathered pairs of a flank (pair, N_GATHERED), ``within`` m beyond where sound teeth touch.
 
@@ -107,11 +104,12 @@ def flank_law(pairs, damping, shared, within, rate, roll_rate):
     return normal, tangent, rate_tangent, stored, lost, along
 
 
-@_compiled
-def mesh_law(meshes, mesh, turned, roll_rate, approach, rate, gathered, pairs, law):
+@compiled
+def mesh_law(meshes, mesh, turned, roll_rate, approach, rate, law, work):
     """Law of one mesh on whichever flank it touches, into ``law`` (mesh, N_LAW).
 
-    ``gathered`` (mesh, flank) says which flanks ``pairs`` holds for this roll; the other is gathered when it may touch.
+    ``work.gathered`` (mesh, flank) says which flanks ``work.pairs`` holds for this roll; the other is gathered when it
+    may touch.
     """
     number, found = meshes.number[mesh], law[mesh]
     found[:] = 0.0
@@ -121,12 +119,17 @@ def mesh_law(meshes, mesh, turned, roll_rate, approach, rate, gathered, pairs, l
             within, least, sense = -approach - number[layout.BACKLASH], number[layout.LEAST_COAST_GAP], -1.0
         if not within > least:
             continue
-        if not gathered[mesh, flank]:
-            gather(meshes, mesh, flank, turned, pairs)
-            gathered[mesh, flank] = True
+        if not work.gathered[mesh, flank]:
+            gather(meshes, mesh, flank, turned, work.pairs)
+            work.gathered[mesh, flank] = True
         n_pairs = meshes.place[mesh, layout.N_PAIRS]
         normal, tangent, rate_tangent, stored, lost, along = flank_law(
-            pairs[mesh, flank, :n_pairs], number[layout.DAMPING], number[layout.SHARED], within, sense * rate, roll_rate
+            work.pairs[mesh, flank, :n_pairs],
+            number[layout.DAMPING],
+            number[layout.SHARED],
+            within,
+            sense * rate,
+            roll_rate,
         )
         found[layout.FORCE] += sense * normal
         found[layout.TANGENT] += tangent
@@ -136,7 +139,7 @@ def mesh_law(meshes, mesh, turned, roll_rate, approach, rate, gathered, pairs, l
         found[layout.ALONG] += along
 
 
-@_compiled
+@compiled
 def eliminate(matrix, right):
     """Solve ``matrix`` x = ``right`` in place without pivoting: I + W J needs none, see ``solve_contact``."""
     n = len(right)
@@ -153,11 +156,10 @@ def eliminate(matrix, right):
         right[i] /= matrix[i, i]
 
 
-@_compiled
+@compiled
 def solve_contact(
-    meshes, compliance, free, carried, turned, roll_rate, before, rate_before, per_step, approach, gathered, pairs, law,
-    matrix, right,
-):  # fmt: skip
+    meshes, compliance, free, carried, turned, roll_rate, before, rate_before, per_step, approach, law, work
+):
     """Approaches and forces of all meshes with delta = free - W (F(delta) - carried), by a semi-smooth Newton method.
 
     Parameters
@@ -167,7 +169,8 @@ def solve_contact(
     before, rate_before : (mesh,)   approaches and their rates where the step began
     per_step : 1/s                  2 / h: the rate is per_step (delta - before) - rate_before; 0 for statics
     approach : (mesh,) m            first guess, takes the solution
-    law : (mesh, N_LAW)             takes what the meshes do there
+    law : (mesh, N_LAW)             what the meshes do there, at the guess and then at the solution
+    work : ``Work``
 
     Forces grow with the approaches, J >= 0 their slopes, so the equation has one solution, and I + W J is similar to a
     symmetric positive matrix once J is shared out; its elimination needs no pivots.
@@ -177,30 +180,33 @@ def solve_contact(
     rounds of Newton's method, or -1 where it found no solution
     """
     n = len(free)
+    matrix, right, near = work.matrix, work.right, work.near
     for round_ in range(MOST_ROUNDS):
-        largest = 0.0
+        largest, longest = 0.0, 0.0
         for m in range(n):
-            rate = per_step * (approach[m] - before[m]) - rate_before[m]
-            mesh_law(meshes, m, turned[m], roll_rate[m], approach[m], rate, gathered, pairs, law)
-        for m in range(n):
-            off = free[m] - approach[m]
+            off, most = free[m] - approach[m], 0.0
             for k in range(n):
                 off -= compliance[m, k] * (law[k, layout.FORCE] - carried[k, layout.FORCE])
-                slope = law[k, layout.TANGENT] + per_step * law[k, layout.RATE_TANGENT]
-                matrix[m, k] = compliance[m, k] * slope
-            matrix[m, m] += 1.0
+                most += abs(compliance[m, k]) * (abs(law[k, layout.FORCE]) + abs(carried[k, layout.FORCE]))
             right[m] = off
+            if not abs(off) < np.inf:
+                return -1
+            near[m] = SETTLED * abs(approach[m]) + SETTLED_LEAST + ROUNDED * most
+            largest = max(largest, abs(off) / near[m])
+        if largest <= 1.0:
+            return round_
+        for k in range(n):
+            slope = law[k, layout.TANGENT] + per_step * law[k, layout.RATE_TANGENT]
+            for m in range(n):
+                matrix[m, k] = compliance[m, k] * slope
+            matrix[k, k] += 1.0
         eliminate(matrix, right)
         share = 1.0 if round_ < UNDAMPED else 0.5
         for m in range(n):
             approach[m] += share * right[m]
-            scale = SETTLED * abs(approach[m]) + SETTLED_LEAST
-            if not abs(right[m]) < np.inf:
-                return -1
-            largest = max(largest, abs(right[m]) / scale)
-        if largest <= 1.0:
-            for m in range(n):
-                slope = law[m, layout.TANGENT] + per_step * law[m, layout.RATE_TANGENT]
-                law[m, layout.FORCE] += share * slope * right[m]
+            longest = max(longest, abs(right[m]) / near[m])
+            rate = per_step * (approach[m] - before[m]) - rate_before[m]
+            mesh_law(meshes, m, turned[m], roll_rate[m], approach[m], rate, law, work)
+        if longest <= 1.0:
             return round_ + 1
     return -1

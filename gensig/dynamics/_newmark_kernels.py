@@ -8,24 +8,18 @@ Numba's cache knows the time of this file alone: touch it after a change of one 
 
 from __future__ import annotations
 
-import functools
 import math
-from typing import Any
-
-import numpy as np
-from numba import njit
 
 from gensig.dynamics import _line_layout as layout
 from gensig.dynamics._line_mesh_kernels import gather, mesh_law, solve_contact
-
-_compiled: Any = functools.partial(njit, nogil=True, cache=True, error_model="numpy")()
+from gensig.dynamics._vector import compiled
 
 ANGLE, SPEED, ACCELERATION, MESH_FORCE = range(4)  # kinds of channels
 MOST_PUSHES = 400
 AT_REST = 1e-10  # of the largest deviation
 
 
-@_compiled
+@compiled
 def factorize(matrix, first, reach, lower, inverse_pivot):
     """L and 1 / D of A = L D L^T (dof, dof) into a ``Factor``'s arrays; the first pivot that is not positive, or -1."""
     for i in range(len(reach)):
@@ -46,23 +40,34 @@ def factorize(matrix, first, reach, lower, inverse_pivot):
     return -1
 
 
-@_compiled
+@compiled
 def solve(factor, x):
     """Solve A y = x in place."""
     n = len(x)
-    for i in range(n):
-        at, start = factor.first[i], i - factor.reach[i]
+    for place in range(n):
+        i = factor.turn[place]
+        at, start, value = factor.first[i], i - factor.reach[i], x[i]
         for j in range(factor.reach[i]):
-            x[i] -= factor.lower[at + j] * x[start + j]
+            value -= factor.lower[at + j] * x[start + j]
+        x[i] = value
     for i in range(n):
         x[i] *= factor.inverse_pivot[i]
-    for i in range(n - 1, -1, -1):
-        at, start = factor.first[i], i - factor.reach[i]
+    for place in range(n - 1, -1, -1):
+        i = factor.turn[place]
+        at, start, value = factor.first[i], i - factor.reach[i], x[i]
         for j in range(factor.reach[i]):
-            x[start + j] -= factor.lower[at + j] * x[i]
+            x[start + j] -= factor.lower[at + j] * value
 
 
-@_compiled
+@compiled
+def add_product(matrix, share, x, out):
+    """Add ``share`` times a ``Padded`` matrix times x to ``out``."""
+    for j in range(len(matrix.value)):
+        for i in range(len(x)):
+            out[i] += share * (matrix.value[j, i] * x[matrix.column[j, i]])
+
+
+@compiled
 def respond(factor, direction, answer, compliance):
     """Fill ``answer`` = A^-1 D^T (mesh, dof) and ``compliance`` = D A^-1 D^T (mesh, mesh)."""
     for m in range(len(answer)):
@@ -75,7 +80,7 @@ def respond(factor, direction, answer, compliance):
             compliance[k, m] = compliance[m, k]
 
 
-@_compiled
+@compiled
 def row_product(rows, i, x):
     """Row i times x."""
     total = 0.0
@@ -84,18 +89,22 @@ def row_product(rows, i, x):
     return total
 
 
-@_compiled
-def energy(line, q, v, law):
+@compiled
+def energy(line, q, v, law, work):
     """Kinetic energy of the deviation and all that springs and meshes hold, J."""
+    work.moved[:] = 0.0
+    work.force[:] = 0.0
+    add_product(line.stiffness, 1.0, q, work.moved)
+    add_product(line.mass, 1.0, v, work.force)
     total = 0.0
     for i in range(len(q)):
-        total += 0.5 * (v[i] * row_product(line.mass, i, v) + q[i] * row_product(line.stiffness, i, q))
+        total += 0.5 * (v[i] * work.force[i] + q[i] * work.moved[i])
     for m in range(len(law)):
         total += law[m, layout.STORED]
     return total
 
 
-@_compiled
+@compiled
 def nominal(course, time, knot):
     """Nominal angle, speed and acceleration, the knot before ``time``, from ``knot`` on, and the share of the way to
     the next; constant speed outside the knots."""
@@ -111,7 +120,7 @@ def nominal(course, time, knot):
     return course.angle[knot] + (speed + 0.5 * gain * since) * since, speed + gain * since, gain, knot, share
 
 
-@_compiled
+@compiled
 def push(line, torques, angle, gain, knot, share, q, force):
     """Torques at an instant, and the inertia force of the nominal acceleration, into ``force`` (dof,)."""
     for i in range(len(force)):
@@ -132,7 +141,7 @@ def push(line, torques, angle, gain, knot, share, q, force):
         force[dof] += factor * value
 
 
-@_compiled
+@compiled
 def roll(meshes, angle, speed, q, v, turned, roll_rate):
     """Where the meshes have rolled to, in pitches, and how fast, (mesh,) each."""
     for m in range(len(turned)):
@@ -142,24 +151,22 @@ def roll(meshes, angle, speed, q, v, turned, roll_rate):
         roll_rate[m] = per_angle * speed + per_rad * v[dof]
 
 
-@_compiled
-def look(line, meshes, torques, course, time, state, pairs, gathered):
+@compiled
+def look(line, meshes, torques, course, time, state, work):
     """Torques, approaches and what the meshes do in a given state, so that ``advance`` can go on from there."""
     q, v, _, force, approach, rate, law = state
-    turned, roll_rate = np.empty(len(law)), np.empty(len(law))
+    turned, roll_rate = work.turned, work.roll_rate
     angle, speed, gain, knot, share = nominal(course, time, 0)
     push(line, torques, angle, gain, knot, share, q, force)
     roll(meshes, angle, speed, q, v, turned, roll_rate)
-    gathered[:] = False
+    work.gathered[:] = False
     for m in range(len(law)):
         approach[m], rate[m] = row_product(line.direction, m, q), row_product(line.direction, m, v)
-        mesh_law(meshes, m, turned[m], roll_rate[m], approach[m], rate[m], gathered, pairs, law)
+        mesh_law(meshes, m, turned[m], roll_rate[m], approach[m], rate[m], law, work)
 
 
-@_compiled
-def advance(
-    line, meshes, torques, course, state, step, first_step, n_steps, channels, out, tally, sums, pairs, gathered
-):
+@compiled
+def advance(line, meshes, torques, course, state, step, first_step, n_steps, channels, out, tally, sums, work):
     """Advance a line by ``n_steps`` from time ``first_step`` * ``step`` on.
 
     Parameters
@@ -169,6 +176,7 @@ def advance(
     channels : (channel, 2)    kind and index
     out : (step, column)    takes the channels' means over every step in its first columns
     tally, sums : (mesh, N_TALLY), (N_SUMS,)    are added to
+    work : ``Work``
 
     Returns
     -------
@@ -176,10 +184,8 @@ def advance(
     """
     q, v, mean, force, approach, rate, law = state
     n, n_meshes = len(q), len(law)
-    ahead_q, ahead_v, moved, force_1 = np.empty(n), np.empty(n), np.empty(n), np.empty(n)
-    turned, roll_rate, free, approach_1 = np.empty(n_meshes), np.empty(n_meshes), np.empty(n_meshes), np.empty(n_meshes)
-    right, matrix = np.empty(n_meshes), np.empty((n_meshes, n_meshes))
-    law_1 = np.empty_like(law)
+    ahead_q, ahead_v, moved, force_1 = work.ahead_q, work.ahead_v, work.moved, work.force
+    turned, roll_rate, free, approach_1, law_1 = work.turned, work.roll_rate, work.free, work.approach, work.law
     per_step, half = 2.0 / step, 0.5 * step
     angle, speed, gain, knot, share = nominal(course, first_step * step, 0)
     for place in range(first_step, first_step + n_steps):
@@ -190,14 +196,15 @@ def advance(
             ahead_q[i] = q[i] + step * (v[i] + half * mean[i])
         push(line, torques, angle, gain, knot, share, ahead_q, force_1)
         roll(meshes, angle, speed, ahead_q, ahead_v, turned, roll_rate)
-        gathered[:] = False
+        work.gathered[:] = False
         for i in range(n):
-            moved[i] = force[i] + force_1[i] - 2.0 * row_product(line.stiffness, i, q)
-            moved[i] += 2.0 * per_step * row_product(line.mass, i, v)
+            moved[i] = force[i] + force_1[i]
+        add_product(line.stiffness, -2.0, q, moved)
+        add_product(line.mass, 2.0 * per_step, v, moved)
         for m in range(n_meshes):
             approach_1[m] = row_product(line.direction, m, ahead_q)
             rate_1 = per_step * (approach_1[m] - approach[m]) - rate[m]
-            mesh_law(meshes, m, turned[m], roll_rate[m], approach_1[m], rate_1, gathered, pairs, law_1)
+            mesh_law(meshes, m, turned[m], roll_rate[m], approach_1[m], rate_1, law_1, work)
             along = law[m, layout.ALONG] + law_1[m, layout.ALONG]
             moved[meshes.place[m, layout.ROLL_DOF]] += along * meshes.number[m, layout.PITCHES_PER_RAD]
             for p in range(line.direction.first[m], line.direction.first[m + 1]):
@@ -206,9 +213,8 @@ def advance(
         for m in range(n_meshes):
             free[m] = approach[m] + row_product(line.direction, m, moved)
         rounds = solve_contact(
-            meshes, line.compliance, free, law, turned, roll_rate, approach, rate, per_step, approach_1, gathered,
-            pairs, law_1, matrix, right,
-        )  # fmt: skip
+            meshes, line.compliance, free, law, turned, roll_rate, approach, rate, per_step, approach_1, law_1, work
+        )
         if rounds < 0:
             return place
         sums[layout.ROUNDS] += rounds
@@ -226,11 +232,13 @@ def advance(
                 out[place - first_step, c] = per_step * (moved[i] / step - v[i])
             else:
                 out[place - first_step, c] = 0.5 * (law[i, layout.FORCE] + law_1[i, layout.FORCE])
-        work, lost = 0.0, 0.0
+        put_in, lost = 0.0, 0.0
+        drag = ahead_v
+        drag[:] = 0.0
+        add_product(line.damping, 1.0 / step, moved, drag)
         for i in range(n):
-            work += 0.5 * (force[i] + force_1[i]) * moved[i]
-            lost += moved[i] * row_product(line.damping, i, moved) / step
-        for i in range(n):
+            put_in += 0.5 * (force[i] + force_1[i]) * moved[i]
+            lost += moved[i] * drag[i]
             speed_1 = per_step * moved[i] - v[i]
             mean[i] = (speed_1 - v[i]) / step
             q[i] += moved[i]
@@ -249,15 +257,15 @@ def advance(
             tally[m, layout.BEHIND] += now < 0.0
             tally[m, layout.LARGEST] = max(tally[m, layout.LARGEST], now)
             tally[m, layout.LEAST] = min(tally[m, layout.LEAST], now)
-        sums[layout.INPUT] += work
+        sums[layout.INPUT] += put_in
         sums[layout.PASSING] += passing
         sums[layout.DISSIPATED] += lost
-        sums[layout.THROUGHPUT] += abs(work) + abs(passing)
+        sums[layout.THROUGHPUT] += abs(put_in) + abs(passing)
     return -1
 
 
-@_compiled
-def rest(line, meshes, force, angle, q, law, pairs, gathered):
+@compiled
+def rest(line, meshes, force, angle, q, law, work):
     """Where the line stands still under ``force`` (dof,) at a nominal angle: q in place.
 
     ``line`` holds the factor of sigma M + K. Each round solves (sigma M + K) q = f + sigma M q_before - D^T F(q), a
@@ -269,27 +277,28 @@ def rest(line, meshes, force, angle, q, law, pairs, gathered):
     rounds, or -1 where it does not come to rest
     """
     n, n_meshes = len(q), len(law)
-    moved, still, turned = np.empty(n), np.zeros(n), np.empty(n_meshes)
-    idle, before, free, approach = np.empty(n_meshes), np.empty(n_meshes), np.empty(n_meshes), np.empty(n_meshes)
-    right, matrix = np.empty(n_meshes), np.empty((n_meshes, n_meshes))
-    resting, law_1 = np.zeros(n_meshes), np.zeros_like(law)
+    moved, still, turned, idle, resting = work.moved, work.ahead_v, work.turned, work.roll_rate, work.rate
+    before, free, approach, law_1 = work.before, work.free, work.approach, work.law
+    still[:] = 0.0
+    resting[:] = 0.0
     for round_ in range(MOST_PUSHES):
         roll(meshes, angle, 0.0, q, still, turned, idle)
-        gathered[:] = False
+        work.gathered[:] = False
         for i in range(n):
-            moved[i] = force[i] - row_product(line.stiffness, i, q)
+            moved[i] = force[i]
+        add_product(line.stiffness, -1.0, q, moved)
         for m in range(n_meshes):
             before[m] = row_product(line.direction, m, q)
             approach[m] = before[m]
+            mesh_law(meshes, m, turned[m], 0.0, approach[m], 0.0, law_1, work)
             for p in range(line.direction.first[m], line.direction.first[m + 1]):
                 moved[line.direction.column[p]] -= law[m, layout.FORCE] * line.direction.value[p]
         solve(line.factor, moved)
         for m in range(n_meshes):
             free[m] = before[m] + row_product(line.direction, m, moved)
         rounds = solve_contact(
-            meshes, line.compliance, free, law, turned, resting, before, resting, 0.0, approach, gathered, pairs, law_1,
-            matrix, right,
-        )  # fmt: skip
+            meshes, line.compliance, free, law, turned, resting, before, resting, 0.0, approach, law_1, work
+        )
         if rounds < 0:
             return -1
         largest, most = 0.0, 0.0

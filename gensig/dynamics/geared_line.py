@@ -10,7 +10,7 @@ from numpy.typing import NDArray
 
 from gensig.dynamics import _line_layout as layout
 from gensig.dynamics import _newmark_kernels as kernels
-from gensig.dynamics._line_layout import Factor, Line, Meshes, Rows, Torques
+from gensig.dynamics._line_layout import Factor, Line, Meshes, Padded, Rows, Torques
 from gensig.dynamics.line_course import LineCourse, ShaftTorque
 from gensig.dynamics.line_mesh import LineMesh
 from gensig.errors import ConfigError, SimulationError
@@ -83,17 +83,18 @@ def pack_line(line: GearedLine, order: Index, mass_share: float, damping_share: 
     factor = _factor(mass_share * mass + damping_share * damping + stiffness, [line.names[i] for i in order], step)
     kernels.respond(factor, rows, answer, compliance)
     rotation = line.rotation[order]
-    sparse_mass = _rows(mass)
+    sparse_mass, carried = _padded(mass), np.zeros(len(order))
+    kernels.add_product(sparse_mass, 1.0, rotation, carried)
     return Line(
         mass=sparse_mass,
-        damping=_rows(damping),
-        stiffness=_rows(stiffness),
+        damping=_padded(damping),
+        stiffness=_padded(stiffness),
         direction=rows,
         factor=factor,
         answer=answer,
         compliance=compliance,
         rotation=rotation,
-        carried=np.array([float(kernels.row_product(sparse_mass, i, rotation)) for i in range(len(order))]),
+        carried=carried,
     )
 
 
@@ -188,12 +189,28 @@ def _rows(matrix: Array) -> Rows:
     )
 
 
+def _padded(matrix: Array) -> Padded:
+    filled = matrix != 0.0
+    width = max(1, int(filled.sum(axis=1).max()))
+    column = np.ascontiguousarray(np.argsort(~filled, axis=1, kind="stable")[:, :width].T).astype(np.int64)
+    return Padded(column=column, value=np.take_along_axis(matrix.T, column, axis=0))
+
+
 def _factor(matrix: Array, names: Sequence[str], step: str) -> Factor:
     n = len(matrix)
     reach = np.arange(n) - np.argmax(matrix != 0.0, axis=1)
     first = np.concatenate([[0], np.cumsum(reach)[:-1]]).astype(np.int64)
     lower, inverse_pivot = np.zeros(int(reach.sum())), np.zeros(n)
+    waits = np.zeros(n, dtype=np.int64)  # how many rows must be solved one after the other before a row
+    for i in range(n):
+        waits[i] = 1 + waits[i - reach[i] : i].max(initial=-1)
     failed = kernels.factorize(matrix, first, reach.astype(np.int64), lower, inverse_pivot)
     if failed >= 0:
         raise SimulationError(f"line: no positive pivot at '{names[failed]}' {step}; check its inertia and springs")
-    return Factor(first=first, reach=reach.astype(np.int64), lower=lower, inverse_pivot=inverse_pivot)
+    return Factor(
+        first=first,
+        reach=reach.astype(np.int64),
+        turn=np.argsort(waits, kind="stable"),
+        lower=lower,
+        inverse_pivot=inverse_pivot,
+    )

@@ -57,9 +57,9 @@ class ShaftTorque:
     """A torque on one degree of freedom over the angle that it has itself turned; both count as it nominally rotates.
 
     ``table`` (node,) N m stands at equal distances over ``period`` rad of that angle and is periodic, straight between
-    nodes; one number alone is constant. At time 0 the line stands ``phase`` rad into it. ``factor`` (knot,) multiplies it over the knots of
-    the course; None is 1. A torque over time alone is a constant 1 with a factor in N m. On a translation it is a
-    force along it and has one number only.
+    nodes; one number alone is constant. At time 0 the line stands ``phase`` rad into it. ``factor`` (knot,) multiplies
+    it over the knots of the course; None is 1. A torque over time alone is a constant 1 with a factor in N m. On a
+    translation it is a force along it, with one number only.
     """
 
     dof: int

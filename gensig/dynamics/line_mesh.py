@@ -115,8 +115,8 @@ def phase_mesh(
 
     Parameters
     ----------
-    stiffness : (1, node) or (n_teeth of gear a, node) N/m    over one pitch, or pitch after pitch over a turn of gear a,
-        its own irregular teeth among them; the node that closes a pitch is the first of the next
+    stiffness : (1, node) or (n_teeth of gear a, node) N/m    over one pitch, or pitch after pitch over a turn of gear
+        a, irregular teeth among them; the node that closes a pitch is the first of the next
     gap : the same shape, m    static transmission error and pitch errors, by which the teeth stand back; default 0
     """
     gaps = np.zeros_like(stiffness) if gap is None else np.broadcast_to(gap, stiffness.shape)

@@ -14,6 +14,7 @@ from numpy.typing import NDArray
 
 from gensig.dynamics import _line_layout as layout
 from gensig.dynamics import _newmark_kernels as kernels
+from gensig.dynamics._line_layout import Work
 from gensig.dynamics._vector import LANES
 from gensig.dynamics.decimation import decimator
 from gensig.dynamics.geared_line import GearedLine, elimination_order, pack_line, pack_meshes, pack_torques
@@ -92,7 +93,7 @@ def integrate_line(
     Parameters
     ----------
     channels : ("angle" | "speed" | "acceleration", degree of freedom) or ("mesh_force", mesh)
-    start : deviations and their rates, (dof,) each, where the integration begins; None is at rest under the mean torques
+    start : deviations and their rates, (dof,) each, where the integration begins; None is ``static_start``
 
     The low-pass looks ahead and back: integration begins and ends a few samples (``decimation.Decimator.margin``)
     further out.
@@ -144,8 +145,8 @@ def static_start(line: GearedLine, course: LineCourse, torques: Sequence[ShaftTo
     free = line.rotation @ line.stiffness @ line.rotation
     if free <= 1e-12 * float(np.abs(line.rotation) @ np.abs(line.stiffness) @ np.abs(line.rotation)):
         force -= still.carried * (force @ still.rotation) / (still.carried @ still.rotation)
-    law, pairs, gathered = _scratch(line)
-    if kernels.rest(still, meshes, force, angle, q, law, pairs, gathered) < 0:
+    law = np.zeros((len(line.meshes), layout.N_LAW))
+    if kernels.rest(still, meshes, force, angle, q, law, _scratch(line)) < 0:
         raise SimulationError(
             "line: it does not come to rest under its mean torques; give a start, or check torques and springs"
         )
@@ -170,7 +171,7 @@ class _Run:
         self.packed = pack_line(line, self.order, 4.0 / step**2, 2.0 / step, f"with a step of {step:.3g} s")
         self.meshes = pack_meshes(line, self.order)
         self.torques = pack_torques(line, self.order, torques, course)
-        self.law, self.pairs, self.gathered = _scratch(line)
+        self.law, self.work = np.zeros((len(line.meshes), layout.N_LAW)), _scratch(line)
         q, v = (np.array(part[self.order], dtype=np.float64) for part in start)
         mean, force = np.zeros((2, len(q)))
         approach, rate = np.zeros((2, len(line.meshes)))
@@ -186,18 +187,18 @@ class _Run:
         """Look at the start, ``place`` steps from time 0."""
         self.place = place
         time = place * self.solver.step
-        kernels.look(self.packed, self.meshes, self.torques, self.course, time, self.state, self.pairs, self.gathered)
+        kernels.look(self.packed, self.meshes, self.torques, self.course, time, self.state, self.work)
         self.energy = self._energy()
 
     def _energy(self) -> float:
         q, v, *_ = self.state
-        return float(kernels.energy(self.packed, q, v, self.law))
+        return float(kernels.energy(self.packed, q, v, self.law, self.work))
 
     def advance(self, n_steps: int, channels: NDArray[np.int64], out: Array) -> None:
         """Integrate on, and give out the means of channels over every step, (step, column)."""
         failed = kernels.advance(
             self.packed, self.meshes, self.torques, self.course, self.state, self.solver.step, self.place, n_steps,
-            channels, out, self.tally, self.sums, self.pairs, self.gathered,
+            channels, out, self.tally, self.sums, self.work,
         )  # fmt: skip
         q, v, *_ = self.state
         if failed >= 0:
@@ -259,13 +260,16 @@ class _Run:
         )
 
 
-def _scratch(line: GearedLine) -> tuple[Array, Array, NDArray[np.bool_]]:
-    """Law, gathered pairs and which flanks of them are gathered, of all meshes."""
-    n, most = len(line.meshes), max([1, *[mesh.n_pairs for mesh in line.meshes]])
-    return (
-        np.zeros((n, layout.N_LAW)),
-        np.zeros((n, layout.N_FLANKS, most, layout.N_GATHERED)),
-        np.zeros((n, layout.N_FLANKS), dtype=np.bool_),
+def _scratch(line: GearedLine) -> Work:
+    n, m = len(line.names), len(line.meshes)
+    most = max([1, *[mesh.n_pairs for mesh in line.meshes]])
+    return Work(
+        *np.zeros((4, n)),
+        *np.zeros((8, m)),
+        matrix=np.zeros((m, m)),
+        law=np.zeros((m, layout.N_LAW)),
+        pairs=np.zeros((m, layout.N_FLANKS, most, layout.N_GATHERED)),
+        gathered=np.zeros((m, layout.N_FLANKS), dtype=np.bool_),
     )
 
 
