@@ -16,7 +16,7 @@ from gensig.dynamics._vector import compiled
 
 ANGLE, SPEED, ACCELERATION, MESH_FORCE = range(4)  # kinds of channels
 MOST_PUSHES = 400
-AT_REST = 1e-10  # of the largest deviation
+AT_REST, NEARLY = 1e-10, 1e-5  # of the largest deviation; below the latter, what no longer shrinks is rounding
 
 
 @compiled
@@ -281,6 +281,7 @@ def rest(line, meshes, force, angle, q, law, work):
     before, free, approach, law_1 = work.before, work.free, work.approach, work.law
     still[:] = 0.0
     resting[:] = 0.0
+    before_most = math.inf
     for round_ in range(MOST_PUSHES):
         roll(meshes, angle, 0.0, q, still, turned, idle)
         work.gathered[:] = False
@@ -310,8 +311,9 @@ def rest(line, meshes, force, angle, q, law, work):
         for i in range(n):
             q[i] += moved[i]
             largest, most = max(largest, abs(q[i])), max(most, abs(moved[i]))
-        if most <= AT_REST * largest:
+        if most <= AT_REST * largest or before_most <= most <= NEARLY * largest:
             return round_ + 1
+        before_most = most
     return -1
 
 

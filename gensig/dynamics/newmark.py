@@ -27,7 +27,7 @@ KINDS = ("angle", "speed", "acceleration", "mesh_force")
 BLOCK = 512  # output samples that are integrated between two passes of the low-pass
 OUT_OF_BOUNDS = 1e6  # m, rad, m/s or rad/s
 LONGEST_STEP = 0.25  # pitches that a mesh may roll in a step
-STILL = (2.0 * math.pi * 0.1) ** 2  # 1/s2, far below every elastic mode
+STILL = (2.0 * math.pi) ** 2  # 1/s2, below elastic modes but not so far that rounding moves a free line
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -263,9 +263,21 @@ class _Run:
 def _scratch(line: GearedLine) -> Work:
     n, m = len(line.names), len(line.meshes)
     most = max([1, *[mesh.n_pairs for mesh in line.meshes]])
+    ahead_q, ahead_v, moved, force = np.zeros((4, n))
+    turned, roll_rate, free, approach, before, rate, right, near = np.zeros((8, m))
     return Work(
-        *np.zeros((4, n)),
-        *np.zeros((8, m)),
+        ahead_q=ahead_q,
+        ahead_v=ahead_v,
+        moved=moved,
+        force=force,
+        turned=turned,
+        roll_rate=roll_rate,
+        free=free,
+        approach=approach,
+        before=before,
+        rate=rate,
+        right=right,
+        near=near,
         matrix=np.zeros((m, m)),
         law=np.zeros((m, layout.N_LAW)),
         pairs=np.zeros((m, layout.N_FLANKS, most, layout.N_GATHERED)),
