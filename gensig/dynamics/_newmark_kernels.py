@@ -225,7 +225,8 @@ def advance(line, meshes, torques, course, state, step, first_step, n_steps, cha
         for c in range(len(channels)):
             kind, i = channels[c]
             if kind == ANGLE:
-                out[place - first_step, c] = q[i] + 0.5 * moved[i]
+                # of the cubic through the angles and speeds at both ends
+                out[place - first_step, c] = q[i] + moved[i] / 3.0 + step * v[i] / 6.0
             elif kind == SPEED:
                 out[place - first_step, c] = moved[i] / step
             elif kind == ACCELERATION:

@@ -116,8 +116,8 @@ def integrate_line(
     if start is None:
         start = static_start(line, course, torques, time=first_sample / solver.sampling_rate), np.zeros(n)
     run = _Run(line, course, torques, solver, start, channels)
-    run.begin(first_sample * solver.oversampling)
-    run.skip((-low_pass.margin - first_sample) * solver.oversampling - 1)
+    run.begin(first_sample * solver.oversampling - 1)
+    run.skip((-low_pass.margin - first_sample) * solver.oversampling)
     signals = run.record(n_samples)
     angle, speed = course.nominal(np.arange(n_samples) / solver.sampling_rate)
     return run.told(signals, angle, speed)
@@ -222,7 +222,7 @@ class _Run:
             n_steps -= n_block
 
     def record(self, n_samples: int) -> Array:
-        """Integrate and decimate block by block, (channel, sample)."""
+        """Integrate on from a step before the low-pass's reach, and decimate block by block, (channel, sample)."""
         factor, low_pass = self.solver.oversampling, decimator(self.solver.oversampling)
         n_groups = -(-len(self.channels) // LANES)
         n_kept = 2 * low_pass.margin * factor + 1
