@@ -134,11 +134,10 @@ def static_start(line: GearedLine, course: LineCourse, torques: Sequence[ShaftTo
     SimulationError    where it does not come to rest
     """
     order = elimination_order(line)
-    means = [
-        ShaftTorque(dof=torque.dof, table=np.array([torque.table.mean()]), factor=torque.factor) for torque in torques
-    ]
     still = pack_line(line, order, STILL, 0.0, "at rest")
-    meshes, pushed = pack_meshes(line, order), pack_torques(line, order, means, course)
+    meshes, pushed = pack_meshes(line, order), pack_torques(line, order, torques, course)
+    means = np.array([torque.table.mean() for torque in torques])
+    pushed = pushed._replace(first=np.arange(len(torques) + 1), table=means)
     angle, _, gain, knot, share = kernels.nominal(course.knots, time, 0)
     q, force = np.zeros((2, len(order)))
     kernels.push(still, pushed, angle, gain, knot, share, q, force)

@@ -171,7 +171,7 @@ class TestTorquesAndCourse:
             line, constant_speed(SPEED), [], LineSolver(sampling_rate=8000.0, oversampling=8), duration=0.02,
             channels=[("angle", 0), ("speed", 3)], start=start,
         )  # fmt: skip
-        margin = decimator(8).margin  # samples that the low-pass looks back: integration begins so long and a step before
+        margin = decimator(8).margin  # samples before time 0, and a step, at which integration begins
         for sample in (0, 30, 60):
             n_steps = 8 * (sample + margin) + 1
             q, v, _ = state_after(line, start, n_steps / 64000.0, n_steps)
@@ -206,7 +206,7 @@ class TestBacklash:
 
         solution = solve_ivp(
             slope, (0, cls.DURATION), np.concatenate(cls.START), method="DOP853", rtol=1e-11, atol=1e-15,
-            max_step=1e-6,
+            max_step=5e-6,
         )  # fmt: skip
         return solution.y[:, -1]
 
