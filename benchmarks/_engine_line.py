@@ -42,6 +42,7 @@ LOSS_FACTOR, LOSS_AT = 0.03, 2.0 * math.pi * 100.0  # of shafts, made viscous at
 BACKLASH, MESH_DAMPING = 1.5e-4, 2e-4  # m and s/m, assumed
 RIPPLE = (0.1, 0.03, 0.01)  # of mesh stiffness: shares of its first harmonics, assumed
 HOUSING_MASS = 20.0  # kg, what each bearing carries along, assumed
+END_GEARS, DRAG = (28, 39, 40, 41, 62, 64), 40.0  # places of the ends of the branches in the line; N m, assumed
 
 
 def base_radius(n_teeth: int, helix_angle: float) -> float:
@@ -112,7 +113,7 @@ def engine_torques(mean: float = 5e3, pulse: float = 30.0) -> list[ShaftTorque]:
         ShaftTorque(dof=3 + i, table=gas, period=4.0 * math.pi, phase=(7 * i % 10) * 0.4 * math.pi) for i in range(10)
     ]
     cam = -pulse * np.clip(np.sin(np.linspace(0.0, 2.0 * math.pi, 360, endpoint=False)), 0.0, None) ** 2
-    for i, dof in enumerate([*range(20, 40), *range(43, 63)]):
+    for i, dof in enumerate([*range(19, 29), *range(30, 40), *range(43, 63)]):
         torques.append(ShaftTorque(dof=dof, table=cam, phase=0.3 * math.pi * i))
     return [*torques, ShaftTorque(dof=16, table=np.array([-mean + 40 * 0.5 * 0.25 * pulse]))]
 

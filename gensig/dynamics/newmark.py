@@ -88,15 +88,15 @@ def integrate_line(
     lead_in: float = 0.0,
     start: tuple[Array, Array] | None = None,
 ) -> LineMotion:
-    """Integrate from ``lead_in`` s before time 0, and give out ``duration`` s from time 0 on.
+    """Integrate from ``lead_in`` s before time 0 or earlier, and give out ``duration`` s from time 0 on.
 
     Parameters
     ----------
     channels : ("angle" | "speed" | "acceleration", degree of freedom) or ("mesh_force", mesh)
     start : deviations and their rates, (dof,) each, where the integration begins; None is ``static_start``
 
-    The low-pass looks ahead and back: integration begins and ends a few samples (``decimation.Decimator.margin``)
-    further out.
+    The low-pass looks ahead and back: integration begins at least ``decimation.Decimator.margin`` samples and one
+    before time 0, and ends as many after the last.
 
     Raises
     ------
@@ -112,12 +112,12 @@ def integrate_line(
         raise ConfigError(f"line: start must be finite deviations and rates, ({n},) each")
     step, low_pass = solver.step, decimator(solver.oversampling)
     _check_step(line, course, step)
-    first_sample = -low_pass.margin - math.ceil(lead_in * solver.sampling_rate)
+    first_sample = -max(low_pass.margin + 1, math.ceil(lead_in * solver.sampling_rate))
     if start is None:
         start = static_start(line, course, torques, time=first_sample / solver.sampling_rate), np.zeros(n)
     run = _Run(line, course, torques, solver, start, channels)
-    run.begin(first_sample * solver.oversampling - 1)
-    run.skip((-low_pass.margin - first_sample) * solver.oversampling)
+    run.begin(first_sample * solver.oversampling)
+    run.skip((-low_pass.margin - first_sample) * solver.oversampling - 1)
     signals = run.record(n_samples)
     angle, speed = course.nominal(np.arange(n_samples) / solver.sampling_rate)
     return run.told(signals, angle, speed)

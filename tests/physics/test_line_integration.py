@@ -171,12 +171,42 @@ class TestTorquesAndCourse:
             line, constant_speed(SPEED), [], LineSolver(sampling_rate=8000.0, oversampling=8), duration=0.02,
             channels=[("angle", 0), ("speed", 3)], start=start,
         )  # fmt: skip
-        margin = decimator(8).margin  # samples before time 0, and a step, at which integration begins
+        margin = decimator(8).margin  # samples before time 0, and one, at which integration begins
         for sample in (0, 30, 60):
-            n_steps = 8 * (sample + margin) + 1
+            n_steps = 8 * (sample + margin + 1)
             q, v, _ = state_after(line, start, n_steps / 64000.0, n_steps)
             assert_allclose(motion.signals["angle", 0][sample], q[0], rtol=0, atol=1e-5 * np.abs(start[0]).max())
             assert_allclose(motion.signals["speed", 3][sample], v[3], rtol=0, atol=1e-4 * np.abs(v).max())
+
+
+class TestRippledMesh:
+    """A mesh whose stiffness ripples smoothly under load; the teeth stay together."""
+
+    @pytest.fixture(scope="class")
+    @classmethod
+    def run(cls):
+        u = np.arange(512) / 512
+        stiffness = STIFFNESS * (1 + 0.2 * np.cos(2 * np.pi * u) + 0.05 * np.cos(4 * np.pi * u))[None]
+        line = two_gears(stiffness=stiffness, gap=3e-6 * np.sin(2 * np.pi * u)[None], damping=2e-4, backlash=1e-4)
+        torques = constant_torques([200.0, -400.0])
+        course = constant_speed(400.0)
+        start = static_start(line, course, torques), np.zeros(2)
+        return lambda n_steps: state_after(line, start, 0.02, n_steps, torques=torques, course=course)
+
+    def test_order_two(self, run):
+        exact = run(128000)
+        errors = [np.abs(run(n)[1] - exact[1]).max() for n in (1000, 2000, 4000, 8000)]
+        assert order_of(errors) == pytest.approx(2.0, abs=0.1)
+        assert exact[2].contact_loss[0] < 1e-12
+
+    def test_energy(self, run):
+        assert run(2000)[2].energy_residual < 1e-3
+        assert run(16000)[2].energy_residual < 1e-5
+
+    def test_the_ripple_is_felt(self, run):
+        told = run(4000)[2]
+        assert told.largest_force[0] > 1.1 * 200.0 / RADII[0]
+        assert told.least_force[0] < 0.9 * 200.0 / RADII[0]
 
 
 class TestBacklash:
