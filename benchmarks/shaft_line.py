@@ -35,7 +35,7 @@ def engine_run(oversampling: int, duration: float, *, loaded: bool) -> tuple[Lin
         line,
         constant_speed(SPEED),
         torques,
-        LineSolver(sampling_rate=RATE, oversampling=oversampling),
+        LineSolver(sampling_rate=RATE, oversampling=oversampling, max_energy_residual=1e-3),
         duration=duration,
         channels=CHANNELS,
         lead_in=LEAD_IN,

@@ -66,7 +66,7 @@ def state_after(
     course: LineCourse | None = None,
 ) -> tuple[np.ndarray, np.ndarray, LineMotion]:
     """q and v (dof,) after ``n_steps`` steps from time 0, and what the run tells of itself."""
-    solver = LineSolver(sampling_rate=0.5 * n_steps / duration, oversampling=2)
+    solver = LineSolver(sampling_rate=0.5 * n_steps / duration, oversampling=2, max_energy_residual=1e-3)
     run = _Run(line, course or constant_speed(0.0), torques or [], solver, start, [])
     run.begin(0)
     run.skip(n_steps)

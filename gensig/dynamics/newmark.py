@@ -32,16 +32,22 @@ STILL = (2.0 * math.pi) ** 2  # 1/s2, below elastic modes but not so far that ro
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class LineSolver:
-    """How finely to integrate and what to give out: ``oversampling`` steps per sample at ``sampling_rate``."""
+    """How finely to integrate: ``oversampling`` steps per sample at ``sampling_rate``.
+
+    A run whose energy residual exceeds ``max_energy_residual`` is an error.
+    """
 
     sampling_rate: float
     oversampling: int
+    max_energy_residual: float
 
     def __post_init__(self) -> None:
         if not 0.0 < self.sampling_rate < math.inf:
             raise ConfigError(f"line solver: sampling rate {self.sampling_rate:g} Hz must be positive")
         if not 2 <= self.oversampling <= 256:
             raise ConfigError(f"line solver: oversampling {self.oversampling} must lie in 2..256")
+        if not 0.0 < self.max_energy_residual <= 1.0:
+            raise ConfigError(f"line solver: max_energy_residual {self.max_energy_residual:g} must lie in 0..1")
 
     @property
     def step(self) -> float:
@@ -101,7 +107,8 @@ def integrate_line(
     Raises
     ------
     ConfigError        for channels, torques or starts that the line has not
-    SimulationError    where the contact does not converge, the motion leaves all bounds, or a step passes a tooth
+    SimulationError    where the contact does not converge, the motion leaves all bounds, the energies do not balance,
+        or a step passes a tooth
     """
     n = len(line.names)
     _check_channels(line, channels)
@@ -120,7 +127,13 @@ def integrate_line(
     run.skip((-low_pass.margin - first_sample) * solver.oversampling - 1)
     signals = run.record(n_samples)
     angle, speed = course.nominal(np.arange(n_samples) / solver.sampling_rate)
-    return run.told(signals, angle, speed)
+    motion = run.told(signals, angle, speed)
+    if not motion.energy_residual <= solver.max_energy_residual:
+        raise SimulationError(
+            f"line: the energy balance misses {motion.energy_residual:.2g} of what goes through, more than "
+            f"{solver.max_energy_residual:g}; raise the oversampling above {solver.oversampling}"
+        )
+    return motion
 
 
 def static_start(line: GearedLine, course: LineCourse, torques: Sequence[ShaftTorque], *, time: float = 0.0) -> Array:

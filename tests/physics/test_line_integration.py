@@ -29,6 +29,10 @@ from gensig.faults.broken import MissingTooth
 SPEED = 100.0  # rad/s
 
 
+def steps(sampling_rate: float, oversampling: int) -> LineSolver:
+    return LineSolver(sampling_rate=sampling_rate, oversampling=oversampling, max_energy_residual=1e-3)
+
+
 def order_of(errors: list[float], ratio: float = 2.0) -> float:
     """Measured order over all the halvings."""
     return math.log(errors[0] / errors[-1], ratio) / (len(errors) - 1)
@@ -118,7 +122,7 @@ class TestTorquesAndCourse:
         table = amplitude * np.cos(np.arange(4096) / 4096 * 2 * np.pi)
         motion = integrate_line(
             line, constant_speed(SPEED), [ShaftTorque(dof=0, table=table, period=np.pi)],
-            LineSolver(sampling_rate=4000.0, oversampling=10), duration=2 * np.pi / SPEED * 10, lead_in=1.0,
+            steps(4000.0, 10), duration=2 * np.pi / SPEED * 10, lead_in=1.0,
             channels=[("angle", 0), ("speed", 0), ("acceleration", 0)],
         )  # fmt: skip
         rate = 2 * SPEED
@@ -168,7 +172,7 @@ class TestTorquesAndCourse:
         """What a run gives out at time 0 is the state that it passes there."""
         line, start = chain(4), (np.array([1e-3, 0, 0, -1e-3]), np.zeros(4))
         motion = integrate_line(
-            line, constant_speed(SPEED), [], LineSolver(sampling_rate=8000.0, oversampling=8), duration=0.02,
+            line, constant_speed(SPEED), [], steps(8000.0, 8), duration=0.02,
             channels=[("angle", 0), ("speed", 3)], start=start,
         )  # fmt: skip
         margin = decimator(8).margin  # samples before time 0, and one, at which integration begins
@@ -376,7 +380,7 @@ class TestEngine:
         def run(duration=0.15, oversampling=10):
             return integrate_line(
                 engine_line(), constant_speed(1688 * np.pi / 30), engine_torques(),
-                LineSolver(sampling_rate=10240.0, oversampling=oversampling), duration=duration,
+                steps(10240.0, oversampling), duration=duration,
                 channels=[("speed", 13), ("speed", 42), ("mesh_force", 5)],
             )  # fmt: skip
 
