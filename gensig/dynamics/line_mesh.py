@@ -113,6 +113,8 @@ def phase_mesh(
 ) -> LineMesh:
     """A mesh whose whole stiffness is known over its phase: one spring k(u) behind one gap e(u).
 
+    Gear a is either of the two, the irregular one where there is one.
+
     Parameters
     ----------
     stiffness : (1, node) or (n_teeth of gear a, node) N/m    over one pitch, or pitch after pitch over a turn of gear
@@ -149,6 +151,15 @@ def phase_mesh(
         backlash=backlash,
         damping=damping,
     )
+
+
+def loaded_gap(approach: Array, stiffness: Array, force: float) -> Array:
+    """Gap e(u) of a ``phase_mesh`` that statics at one load describe, (phase,) m.
+
+    ``approach`` and tangent ``stiffness`` (phase,) in m and N/m under a ``force`` in N, as ``mesh.slices`` gives them
+    for a helical pair: e = approach - F / k, so that the mesh is where statics put it under that force.
+    """
+    return np.asarray(approach - force / stiffness)
 
 
 def pair_mesh(

@@ -8,11 +8,13 @@ import pytest
 from line_tools import RADII, STIFFNESS, TEETH, law_at
 from numpy.testing import assert_allclose
 
+from gensig.config import read_request
 from gensig.dynamics import _line_layout as layout
-from gensig.dynamics.line_mesh import mesh_start, pair_mesh, phase_mesh, tooth_angle
+from gensig.dynamics.line_mesh import loaded_gap, mesh_start, pair_mesh, phase_mesh, tooth_angle
 from gensig.errors import ConfigError, GeometryError
 from gensig.faults.broken import MissingTooth
 from gensig.mesh.load_distribution import pair_states, static_mesh
+from gensig.systems.registry import read_sliced_pair
 
 DIRECTION = np.array([RADII[0], -RADII[1]])
 BITE = 5e-6  # m
@@ -91,6 +93,37 @@ class TestPhaseTable:
         assert law_at(mesh, 0.1, BITE, rate=-1e4)[layout.FORCE] == pytest.approx(0.0, abs=0.0)
         back = law_at(mesh, 0.1, -BACKLASH - BITE, rate=-10.0)
         assert_allclose(back[layout.FORCE], 1.02 * law_at(mesh, 0.1, -BACKLASH - BITE)[0], rtol=1e-9, atol=0)
+
+
+class TestHelicalStatics:
+    """A helical pair's loaded contact over a pitch as one spring behind one gap."""
+
+    @pytest.fixture(scope="class")
+    @classmethod
+    def pair(cls):
+        words = ["system=helical_pair", "mesh.n_slices=12", "mesh.slice_coupling=independent", "mesh.contact=linear"]
+        return read_sliced_pair(read_request(words).config)
+
+    @pytest.fixture(scope="class")
+    @classmethod
+    def contact(cls, pair):
+        return pair.transmission_error(n_phases=16).contact
+
+    @pytest.fixture(scope="class")
+    @classmethod
+    def mesh(cls, pair, contact):
+        gap = loaded_gap(contact.approach, contact.stiffness, pair.mesh_force)
+        return phases(stiffness=contact.stiffness[None], gap=gap[None])
+
+    def test_it_is_where_statics_put_it(self, pair, contact, mesh):
+        for place, approach in enumerate(contact.approach):
+            assert_allclose(law_at(mesh, place / 16, approach)[layout.FORCE], pair.mesh_force, rtol=1e-9, atol=0)
+
+    def test_near_that_load_it_answers_as_statics_do(self, pair, contact, mesh):
+        other = replace(pair, torque=1.02 * pair.torque).transmission_error(n_phases=16).contact
+        for place, approach in enumerate(other.approach):
+            found = law_at(mesh, place / 16, approach)[layout.FORCE] - pair.mesh_force
+            assert_allclose(found, 0.02 * pair.mesh_force, rtol=0.02, atol=0)
 
 
 class TestPairs:
