@@ -34,7 +34,8 @@ class Rows(NamedTuple):
 
 
 class Padded(NamedTuple):
-    """A sparse square matrix, its rows filled up to ``width`` numbers each: ``column``, ``value`` (width, dof)."""
+    """A symmetric matrix: where sparse, its rows filled up to ``width`` numbers, ``column`` and ``value`` (width, dof),
+    else ``value`` (dof, dof) alone and no ``column``."""
 
     column: Any
     value: Any
@@ -44,7 +45,8 @@ class Factor(NamedTuple):
     """A = L D L^T under the envelope of A: row i of L ends before its diagonal and has ``reach[i]`` numbers.
 
     ``lower`` holds the rows one after the other from ``first`` (dof,) on, ``inverse_pivot`` (dof,) is 1 / D. ``turn``
-    (dof,) is an order in which rows can be solved where neighbours do not wait for each other.
+    (dof,) is an order in which rows can be solved where neighbours do not wait for each other. ``inverse`` (dof, dof)
+    is that of A where A is so full that it costs less, else empty; ``spare`` (dof,) is its scratch.
     """
 
     first: Any
@@ -52,6 +54,8 @@ class Factor(NamedTuple):
     turn: Any
     lower: Any
     inverse_pivot: Any
+    inverse: Any
+    spare: Any
 
 
 class Meshes(NamedTuple):

@@ -41,9 +41,28 @@ def factorize(matrix, first, reach, lower, inverse_pivot):
 
 
 @compiled
+def add_full(matrix, share, x, out):
+    """Add ``share`` times a symmetric matrix (dof, dof) times x to ``out``."""
+    n = len(x)
+    for j in range(0, n - n % 4, 4):  # four rows at once share what they read and write of ``out``
+        p, q, r, s = share * x[j], share * x[j + 1], share * x[j + 2], share * x[j + 3]
+        for i in range(n):
+            out[i] += (p * matrix[j, i] + q * matrix[j + 1, i]) + (r * matrix[j + 2, i] + s * matrix[j + 3, i])
+    for j in range(n - n % 4, n):
+        for i in range(n):
+            out[i] += share * x[j] * matrix[j, i]
+
+
+@compiled
 def solve(factor, x):
     """Solve A y = x in place."""
     n = len(x)
+    if len(factor.inverse) > 0:
+        for i in range(n):
+            factor.spare[i] = x[i]
+            x[i] = 0.0
+        add_full(factor.inverse, 1.0, factor.spare, x)
+        return
     for place in range(n):
         i = factor.turn[place]
         at, start, value = factor.first[i], i - factor.reach[i], x[i]
@@ -62,6 +81,9 @@ def solve(factor, x):
 @compiled
 def add_product(matrix, share, x, out):
     """Add ``share`` times a ``Padded`` matrix times x to ``out``."""
+    if len(matrix.column) == 0:
+        add_full(matrix.value, share, x, out)
+        return
     for j in range(len(matrix.value)):
         for i in range(len(x)):
             out[i] += share * (matrix.value[j, i] * x[matrix.column[j, i]])

@@ -20,6 +20,7 @@ Index = NDArray[np.int64]
 
 CLOSING = 1e-6  # of its terms, by which nominal rotation may close a mesh: radii come rounded
 SYMMETRIC = 1e-9
+FULL = 0.5  # of a matrix that is filled, or of a triangle of its factor: from there on, all of it costs less
 
 
 @dataclass(frozen=True, slots=True, kw_only=True, eq=False)
@@ -27,8 +28,8 @@ class GearedLine:
     """M q'' + C q' + K q + sum over meshes of direction x force = torques; q is the deviation from nominal rotation.
 
     ``mass``, ``damping``, ``stiffness`` (dof, dof) without the meshes, SI; springs and dampers act on the deviation.
-    ``rotation`` (dof,) is how far each turns with the reference, signed, 0 for a translation. ``names`` name the
-    degrees of freedom.
+    ``rotation`` (dof,) is how far each turns with the reference, signed as its angle counts, 0 for a translation.
+    ``names`` name the degrees of freedom.
     """
 
     names: tuple[str, ...]
@@ -192,6 +193,8 @@ def _rows(matrix: Array) -> Rows:
 def _padded(matrix: Array) -> Padded:
     filled = matrix != 0.0
     width = max(1, int(filled.sum(axis=1).max()))
+    if width > FULL * len(matrix):
+        return Padded(column=np.empty((0, len(matrix)), dtype=np.int64), value=matrix)
     column = np.ascontiguousarray(np.argsort(~filled, axis=1, kind="stable")[:, :width].T).astype(np.int64)
     return Padded(column=column, value=np.take_along_axis(matrix.T, column, axis=0))
 
@@ -207,10 +210,18 @@ def _factor(matrix: Array, names: Sequence[str], step: str) -> Factor:
     failed = kernels.factorize(matrix, first, reach.astype(np.int64), lower, inverse_pivot)
     if failed >= 0:
         raise SimulationError(f"line: no positive pivot at '{names[failed]}' {step}; check its inertia and springs")
-    return Factor(
+    factor = Factor(
         first=first,
         reach=reach.astype(np.int64),
         turn=np.argsort(waits, kind="stable"),
         lower=lower,
         inverse_pivot=inverse_pivot,
+        inverse=np.empty((0, n)),
+        spare=np.zeros(n),
     )
+    if len(lower) <= FULL * n * (n - 1) / 2:
+        return factor
+    inverse = np.eye(n)
+    for row in inverse:
+        kernels.solve(factor, row)
+    return factor._replace(inverse=np.ascontiguousarray(0.5 * (inverse + inverse.T)))

@@ -1,6 +1,7 @@
 """Newmark's average acceleration for a geared line against exact solutions, scipy and the pair's own integrator."""
 
 import math
+from dataclasses import replace
 
 import numpy as np
 import pytest
@@ -16,7 +17,7 @@ from line_tools import (
 )
 from numpy.testing import assert_allclose
 from scipy.integrate import solve_ivp
-from scipy.linalg import expm
+from scipy.linalg import eigh, expm
 
 from benchmarks._engine_line import engine_line, engine_torques
 from gensig.dynamics.decimation import decimator
@@ -43,10 +44,17 @@ class TestLinear:
 
     DURATION = 0.05
 
-    @pytest.fixture(scope="class")
+    @pytest.fixture(scope="class", params=["shafts", "modal"])
     @classmethod
-    def line(cls):
-        return chain(6)
+    def line(cls, request):
+        """Damped by its shafts, or by a share of every mode, which is a full matrix."""
+        line = chain(6)
+        if request.param == "shafts":
+            return line
+        rates, shapes = eigh(line.stiffness, line.mass)
+        momentum = line.mass @ shapes
+        damping = (momentum * 0.02 * np.sqrt(np.abs(rates))) @ momentum.T
+        return replace(line, damping=0.5 * (damping + damping.T))
 
     @pytest.fixture(scope="class")
     @classmethod
@@ -354,8 +362,6 @@ class TestLowRank:
         )  # fmt: skip
 
     def test_the_printed_frequencies(self, welded):
-        from scipy.linalg import eigh
-
         n = 65  # rotations
         found = np.sqrt(np.abs(eigh(welded.stiffness[:n, :n], welded.mass[:n, :n], eigvals_only=True))) / (2 * np.pi)
         assert_allclose(found[1:5], [28.31, 68.72, 162.06, 215.97], rtol=0, atol=0.01)
