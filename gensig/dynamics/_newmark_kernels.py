@@ -15,7 +15,7 @@ from gensig.dynamics._line_mesh_kernels import gather, mesh_law, solve_contact
 from gensig.dynamics._vector import compiled
 
 ANGLE, SPEED, ACCELERATION, MESH_FORCE = range(4)  # kinds of channels
-MOST_PUSHES = 400
+MOST_PUSHES = 20000  # a soft drive of 0.05 Hz takes half of them
 AT_REST, NEARLY = 1e-10, 1e-5  # of the largest deviation; below the latter, what no longer shrinks is rounding
 
 

@@ -164,6 +164,13 @@ class TestRun:
         approach = line.meshes[0].direction @ q
         assert approach == pytest.approx(force / 3e8, rel=1e-6)
 
+    def test_rest_on_a_drive_as_soft_as_a_tenth_of_a_hertz(self):
+        """The drive's spring carries what is not balanced."""
+        spring = (0.01 + 0.05 * 0.5**2) * (2 * math.pi * 0.1) ** 2
+        line = two_gears(drive=(spring, 0.0))
+        q = static_start(line, constant_speed(10.0), constant_torques([1e-3, 0.0]))
+        assert q[0] == pytest.approx(1e-3 / spring, rel=1e-6)
+
     def test_rest_of_an_unloaded_line_is_where_it_is(self):
         assert np.abs(static_start(two_gears(backlash=1e-4), constant_speed(10.0), [])).max() < 1e-15
 
