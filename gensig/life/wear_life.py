@@ -17,8 +17,9 @@ Array = NDArray[np.float64]
 
 # What the solver may be off in one step, as a share of the depth and in m. Pressures hang on the curvature of what is
 # worn off, which takes a tenth, and makes the equations stiff: they are solved backwards, with the nodes next to each.
-ACCURACY = {"band": (1e-3, 1e-8), "fixed_intervals": (1e-3, 1e-9)}
+ACCURACY = {"band": (1e-3, 2e-9), "fixed_intervals": (1e-3, 1e-9)}
 BANDWIDTH = 13
+LARGEST_SHARE = 0.1  # of the threshold, worn in one step
 HORIZON = 50.0  # times the life at the rate of new flanks: sharing slows wear down, but never so much
 N_SNAPSHOTS = 41
 
@@ -153,7 +154,7 @@ def _solve(
         return function
 
     relative, absolute = ACCURACY[case.options.rule]
-    longest = case.options.step / float(case.rate(start).max())
+    longest = min(case.options.step, LARGEST_SHARE * case.options.threshold) / float(case.rate(start).max())
     if case.options.rule == "band":
         method: dict[str, Any] = {"method": "RK23"}  # Bogacki & Shampine
     else:
