@@ -226,7 +226,7 @@ def _write_option(life: WearLife, speed: float, target: Path) -> None:
     option = yaml.safe_dump(wear_fault(life.case, life.depth[-1]), sort_keys=False, width=110)
     with replaced_file(target) as path:
         path.write_text(
-            f"# Flanks of {pair.pinion.n_teeth}/{pair.wheel.n_teeth} teeth after {hours(life.life, speed):.5g} hours at "
+            f"# Flanks of {pair.pinion.n_teeth}/{pair.wheel.n_teeth} teeth after {hours(life.life, speed):.4g} h at "
             f"{life.case.torque:g} N m (gensig wear-life).\n{option}",
             encoding="utf-8",
         )

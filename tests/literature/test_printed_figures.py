@@ -6,7 +6,7 @@ from dataclasses import replace
 import pytest
 
 from gensig.errors import ConfigError
-from gensig.validation.checks import QUANTITIES, SLICED, evaluate, run_validation
+from gensig.validation.checks import QUANTITIES, SLICED, WEAR, evaluate, run_validation
 from gensig.validation.rows import (
     DIFFERS,
     FAILS,
@@ -45,7 +45,7 @@ def test_rows_are_unique_and_shortfalls_are_explained():
 
 
 def test_every_quantity_is_used():
-    assert {*QUANTITIES, *SLICED} == {row.quantity for row in ROWS}
+    assert {*QUANTITIES, *SLICED, *WEAR} == {row.quantity for row in ROWS}
 
 
 @pytest.mark.parametrize(
