@@ -144,3 +144,5 @@ def test_records_refuse_the_papers_pair_and_plans_its_keys(tmp_path, capsys):
     vary = "plan.vary={wear.threshold_um: {distribution: uniform, low: 10, high: 20}}"
     assert main(["plan", vary]) == 2
     assert "one value for a whole data set" in capsys.readouterr().err
+    assert main(["plan", "wear.rule=rust"]) == 2
+    assert "wear.rule = 'rust'; allowed: band, fixed_intervals" in capsys.readouterr().err
