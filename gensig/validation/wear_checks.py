@@ -116,9 +116,9 @@ def _intervals_effect(point: WearPoint, at: str) -> float:
 
 
 def _step_effect(point: WearPoint, at: str) -> float:
-    """Change of the life by half the step of the solver, relative."""
+    """Change of the life by half the step of the solver, relative, to four decimals."""
     finer = replace(point.case.options, step=0.05 * point.case.options.threshold)
-    return abs(wear_life(replace(point.case, options=finer)).life / point.life.life - 1.0)
+    return round(abs(wear_life(replace(point.case, options=finer)).life / point.life.life - 1.0), 4)
 
 
 def _degenerate(point: WearPoint, at: str) -> float:
