@@ -108,8 +108,7 @@ def _with_whole_parts(fault: dict[str, Any], config_dir: str | Path | None) -> d
 
 SECTIONS = (
     "system", "gear", "material", "strength", "modification", "heat", "fault", "operating", "sensing", "plan",
-    "executor",
-    "mesh", "solver", "quality", "dataset",
+    "executor", "mesh", "wear", "solver", "quality", "dataset",
 )  # fmt: skip
 PLAIN_KEYS = ("seed", "out")
 

@@ -32,6 +32,7 @@ FIXED_KEYS = (
     "modification.",
     "strength.",
     "heat.",
+    "wear.",
     "mesh.n_slices",
     "mesh.coupling_modules",
     "sensing.sampling_rate_hz",

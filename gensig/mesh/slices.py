@@ -225,6 +225,48 @@ def pair_positions(mesh: SlicedMesh, roll: Array) -> tuple[Array, NDArray[np.int
     return (roll[:, None] - index * pitch)[:, :, None] - mesh.lag, index
 
 
+@dataclass(frozen=True, slots=True, kw_only=True, eq=False)
+class ContactPhases:
+    """What every slice of every pair is at given rolls, whatever the force; new gaps are all that wear changes.
+
+    Parameters
+    ----------
+    roll : (phase,) m
+    pair_index : (phase, pair)    see ``LoadedContact``
+    position, structure, constant, gap, width : (phase, pair, slice), m, m2/N, 1, m, m: see ``SlicedMesh``; ``width`` is
+        that of the slice, less where the field of action cuts it
+    """
+
+    mesh: SlicedMesh
+    roll: Array
+    pair_index: NDArray[np.int64]
+    position: Array
+    structure: Array
+    constant: Array
+    gap: Array
+    width: Array
+
+
+def contact_phases(mesh: SlicedMesh, roll: Array, meeting: Meeting | None = None) -> ContactPhases:
+    """Prepare the loaded contact at rolls, (phase,) m; at 0 the first slice of a pair enters at A."""
+    position, index = pair_positions(mesh, roll)
+    share = np.ones_like(position)
+    if mesh.options.law == "paper":  # elsewhere the corners' gaps tell where contact ends
+        position, share = cut_by_field(mesh, position)
+    structure, gap = np.interp(position, mesh.position, mesh.structure), _gaps(mesh, position)
+    _add_teeth(mesh, position, index, meeting or Meeting(), structure, gap)
+    return ContactPhases(
+        mesh=mesh,
+        roll=roll,
+        pair_index=index,
+        position=position,
+        structure=structure,
+        constant=np.interp(position, mesh.position, mesh.contact_constant),
+        gap=gap,
+        width=mesh.slice_width * share,
+    )
+
+
 def loaded_contact(mesh: SlicedMesh, roll: Array, force: float, meeting: Meeting | None = None) -> LoadedContact:
     """Load of every slice of every pair under a total force along the transverse line of action.
 
@@ -238,24 +280,22 @@ def loaded_contact(mesh: SlicedMesh, roll: Array, force: float, meeting: Meeting
     ConfigError    for a force that is not positive
     GeometryError    where no slice can touch, or the bearing slices never settle
     """
+    return settled_contact(contact_phases(mesh, roll, meeting), force)
+
+
+def settled_contact(phases: ContactPhases, force: float) -> LoadedContact:
+    """The same at rolls that are prepared already."""
     if not force > 0.0:
         raise ConfigError(
             f"the mesh force is {force:g} N and must be positive; give a torque that the pinion drives with"
         )
-    position, index = pair_positions(mesh, roll)
-    share = np.ones_like(position)
-    if mesh.options.law == "paper":  # elsewhere the corners' gaps tell where contact ends
-        position, share = cut_by_field(mesh, position)
-    structure = np.interp(position, mesh.position, mesh.structure)
-    constant = np.interp(position, mesh.position, mesh.contact_constant)
-    gap, width = _gaps(mesh, position), mesh.slice_width * share
-    _add_teeth(mesh, position, index, meeting or Meeting(), structure, gap)
+    mesh, roll = phases.mesh, phases.roll
     approach, stiffness = np.empty_like(roll), np.empty_like(roll)
-    line_load = np.empty_like(position)
+    line_load = np.empty_like(phases.position)
     n_unsettled = solve_slices(
-        structure, mesh.contact_factor, constant, mesh.log_weight, gap, width, mesh.slice_width,
-        mesh.coupling_length_squared, mesh.shared_compliance, force, force / mesh.pair.face_width, approach, stiffness,
-        line_load,
+        phases.structure, mesh.contact_factor, phases.constant, mesh.log_weight, phases.gap, phases.width,
+        mesh.slice_width, mesh.coupling_length_squared, mesh.shared_compliance, force, force / mesh.pair.face_width,
+        approach, stiffness, line_load,
     )  # fmt: skip
     if n_unsettled or not np.isfinite(approach).all():
         raise GeometryError(
@@ -263,7 +303,12 @@ def loaded_contact(mesh: SlicedMesh, roll: Array, force: float, meeting: Meeting
             f"phases under {force:.4g} N; reduce the modification or raise the torque"
         )
     return LoadedContact(
-        roll=roll, pair_index=index, position=position, approach=approach, stiffness=stiffness, line_load=line_load
+        roll=roll,
+        pair_index=phases.pair_index,
+        position=phases.position,
+        approach=approach,
+        stiffness=stiffness,
+        line_load=line_load,
     )
 
 

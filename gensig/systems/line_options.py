@@ -8,7 +8,7 @@ from typing import Any
 
 from gensig.dynamics.bearing import BallBearing, support_stiffness
 from gensig.dynamics.bearing import Shaft as BearingShaft
-from gensig.dynamics.pair import Support
+from gensig.dynamics.pair import Body, Support
 from gensig.errors import ConfigError
 from gensig.material import Material
 from gensig.units import read, unit
@@ -62,7 +62,7 @@ class GearHolding:
         """The support of a gear of ``mass`` in kg."""
         across, along = support_stiffness(self.bearing, self.shaft, material, self.force)
         rigid = Support(stiffness_x=across, stiffness_y=along, damping_x=0.0, damping_y=0.0)
-        return rigid.damped(mass, self.damping_ratio, self.damping_ratio)
+        return rigid.damped(Body(mass=mass, inertia=0.0, support=rigid), self.damping_ratio, self.damping_ratio)
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)

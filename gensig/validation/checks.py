@@ -18,6 +18,7 @@ from gensig.validation.mesh_checks import MESH
 from gensig.validation.rows import SOURCES, Result, Row, judge, read_rows
 from gensig.validation.standard_checks import STANDARD
 from gensig.validation.strength_checks import STRENGTH, read_strength_case
+from gensig.validation.wear_checks import WEAR, read_wear_point
 
 # quantities by the kind of case that they are of, and what reads it
 KINDS: tuple[tuple[dict[str, Any], Callable[[tuple[str, ...]], Any]], ...] = (
@@ -26,6 +27,7 @@ KINDS: tuple[tuple[dict[str, Any], Callable[[tuple[str, ...]], Any]], ...] = (
     (STRENGTH, read_strength_case),
     (HOT, read_hot_case),
     (LINES, read_line_case),
+    (WEAR, read_wear_point),
 )
 
 

@@ -17,6 +17,8 @@ SOURCE_TITLES = {
     "engine_root_stress": "Root stress and safety factor of the diesel's injection pump drive",
     "engine_reference": "Reference numbers for the diesel's shaft line",
     "engine_paper": "What the paper on the diesel's timing gears prints",
+    "wear_reference": "Reference numbers for the wear life",
+    "wear_paper": "What the wear-life paper prints and claims",
 }
 SOURCE_TEXTS = {
     "spur_reference": "Computed independently of this project (rack geometry, potential-energy method, 2-D finite "
@@ -56,6 +58,14 @@ SOURCE_TEXTS = {
     "engine_paper": "Sun, Shi, Chen, Li & Liu (2024), 67 inertias and 66 stiffnesses as printed in table A1, gears as "
     "in table B1. Variants as above. No inertia or stiffness is fitted: many pairs of changed numbers meet all four "
     "frequencies within 0.01 %, so that a close fit would be no evidence.",
+    "wear_reference": "Computed independently of this project from table 1 of the wear-life paper, whose equations "
+    "(1) to (10) are lost: sliding, pressure, and wear of a mesh by the contact band (Flodin) and by the paper's fixed "
+    "intervals. A is where the wheel's tip meets the pinion's root, C the pitch point, E the pinion's tip. One pair, "
+    "new flanks; `spur`, `full_addendum` and `helical` are what gensig takes by default, with flanks that wear and "
+    "share the load by the loaded mesh.",
+    "wear_paper": "Pan, Zhao, Li & Wang (2012), gears 38/55, 200 N m, 4 pi rad/s, in the paper's setting: one pair, "
+    "new flanks, force over the reference radius. The threshold S and the number of intervals N_i are not printed; "
+    "hours are taken for the lives, whose unit the paper leaves out.",
 }
 TITLES = {
     "geometry": "Teeth and root transition curve",
@@ -139,6 +149,23 @@ TITLES = {
     "line_modes": "Natural frequencies of the whole line",
     "computed_modes": "Natural frequencies, as the paper computed them",
     "measured_modes": "Natural frequencies, as the paper measured them",
+    "wear_geometry": "Geometry",
+    "wear_sliding": "Sliding",
+    "wear_pressure": "Contact pressure",
+    "wear_per_mesh": "Wear of a mesh",
+    "wear_rate": "Wear of an hour",
+    "wear_exponent": "Exponents of the torque",
+    "wear_step": "Convergence",
+    "wear_life": "Lives that the paper's fits allow",
+    "wear_fits": "Local exponents of the printed fits",
+    "wear_drive": "Contact ratio",
+    "wear_sliding_paper": "Sliding",
+    "wear_pressure_paper": "Contact pressure",
+    "wear_depth_paper": "Wear depth",
+    "wear_step_paper": "The step of the paper's rule",
+    "wear_radius_paper": "Curvature radius after wear",
+    "wear_life_paper": "Lives as printed",
+    "wear_fits_paper": "The printed fits as fits of our law",
 }
 INTRO = """# Validation
 

@@ -1,6 +1,6 @@
 """Printed figures as data: one CSV per source, one row per figure or claim.
 
-The columns: ``id``; ``quantity`` and ``at``, what is computed and where (``gensig.validation.checks.QUANTITIES``);
+The columns: ``id``; ``quantity`` and ``at``, what is computed and where (``gensig.validation.checks.KINDS``);
 ``overrides``, the configuration it belongs to; ``printed``, ``unit`` and ``tolerance``; ``kind``; ``expected``, a
 verdict other than the good one that is known and explained; ``source`` (section, equation or table); ``reason``.
 
@@ -27,6 +27,8 @@ SOURCES = (
     "engine_root_stress",
     "engine_reference",
     "engine_paper",
+    "wear_reference",
+    "wear_paper",
 )
 REPRODUCED, DIFFERS = "reproduced", "differs"
 HOLDS, FAILS = "claim holds", "claim does not hold"
@@ -58,6 +60,11 @@ UNITS = {
     "Hz": 1.0,
     "r/min": 0.10471975511965977,
     "m/s2": 1.0,
+    "mm/s": 1e-3,
+    "nm": 1e-9,
+    "ms": 1e-3,
+    "um/h": 1e-6,
+    "1/Pa": 1.0,
 }
 
 

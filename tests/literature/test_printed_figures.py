@@ -70,6 +70,10 @@ def test_every_quantity_is_used():
         ("ours_pit.full_width_gap.1mm", "fault.pit_length_mm=1.2"),
         ("iso6336.single.c", "gear.clearance_coefficient=0.3"),
         ("line_modes.as_printed.mode_2", "system.viscous_damper_node=2"),
+        ("wear_pressure.base_radius.C", "wear.load_radius=reference"),
+        ("wear_per_mesh.band_wheel.A", "wear.wheel.hardness_hbs=190"),
+        ("wear_per_mesh.fixed_intervals.50", "wear.rule=band"),
+        ("wear_rate.both_flanks.band", "gear.wheel.n_teeth=56"),
     ],
 )
 def test_a_wrong_input_differs(row_id, word):
