@@ -32,6 +32,7 @@ Array = NDArray[np.float64]
 N_CHORDS = 8
 N_TRIED, N_SAMPLES = 32, 24  # depths and positions at which chords are chosen
 PER_SLICE = 4  # positions looked at from one slice's entry to the next one's
+SLICES_PER_STEP = 10  # few slices enter with a jolt: every node is looked at
 UNMET_STEP = 8  # nodes between the positions looked at for teeth that never meet on their working flanks
 DEEPEST = 3.0  # largest depth, in largest static ones
 LEAST_REACH = 1e-4  # m; first gaps up to here are tabulated, so that teeth that stand proud find their force
@@ -166,7 +167,7 @@ def sliced_table(
     loads = np.empty((*first.shape, len(frame.depth)))
     met = set(pinion_kind.tolist()), set(wheel_kind.tolist())
     # where all teeth have a common form the sound one is met by nobody, but the back flanks are sound
-    healthy = _curves(setting, _known(pinion[0]), _known(wheel[0]), 0 in met[0] and 0 in met[1])
+    healthy = _curves(setting, *_healthy(pair), 0 in met[0] and 0 in met[1])
     for a, one in enumerate(pinion):
         for b, other in enumerate(wheel):
             asked = a in met[0] and b in met[1] and one.present and other.present
@@ -239,6 +240,10 @@ def _known(tooth: Tooth) -> _Known:
     return _Known(key=b"".join([_digest(*arrays), *cracks, bytes([tooth.present])]), value=tooth)
 
 
+def _healthy(pair: GearPair) -> tuple[_Known, _Known]:
+    return _known(healthy_tooth(pair.pinion)), _known(healthy_tooth(pair.wheel))
+
+
 @lru_cache(maxsize=8)
 def _mesh(setting: _Setting, pinion: _Known, wheel: _Known) -> SlicedMesh:
     """The pair whose teeth are all the same two."""
@@ -260,9 +265,10 @@ def _frame(setting: _Setting) -> _Frame:
     highest = math.ceil(float(mesh.position[-1] + mesh.lag[-1]) / pitch)
     nodes = np.arange(FIRST_PITCH * per_pitch, highest * per_pitch + 1)
     first = _at(mesh, nodes * pitch / per_pitch)[1].min(axis=1)
+    sound = _at(_mesh(setting, *_healthy(setting.pair)), nodes * pitch / per_pitch)[1].min(axis=1)
     bite = contact.approach - mesh.shared_compliance * setting.force - first.min()
     set_depth, deepest = float(bite.mean()), DEEPEST * float(bite.max())
-    near = nodes[first <= first.min() + max(LEAST_REACH, deepest)]
+    near = nodes[sound <= sound.min() + max(LEAST_REACH, deepest)]
     first_pitch, last_pitch = math.floor(near[0] / per_pitch), math.ceil(near[-1] / per_pitch)
     depth = np.array([set_depth])
     if setting.options.law != "paper":
@@ -344,16 +350,14 @@ def _curves(setting: _Setting, pinion: _Known, wheel: _Known, are_met: bool) -> 
     frame, mesh = _frame(setting), _mesh(setting, pinion, wheel)
     looked = frame.position
     later = float(setting.pair.face_width * math.tan(setting.pair.base_helix_angle)) / setting.slices.n_slices
-    step = int(later / (PER_SLICE * (looked[1] - looked[0]))) if mesh.lag[-1] > 0.0 else 0
-    step = step if are_met else max(step, UNMET_STEP)
+    apart = int(later / (PER_SLICE * (looked[1] - looked[0]))) if mesh.lag[-1] > 0.0 else 0
+    step = min(apart, setting.slices.n_slices // SLICES_PER_STEP) if are_met else UNMET_STEP
     if step > 1:
         looked = np.append(looked[:-1:step], looked[-1])
     first, force = _bitten(setting, mesh, looked, frame.depth, frame.reach)
     found = np.flatnonzero(first <= frame.reach)
     if not len(found):  # no flank is left to touch: what is sound, out of reach
-        gears = setting.pair.pinion, setting.pair.wheel
-        sound = _curves(setting, *(_known(healthy_tooth(gear)) for gear in gears), False)
-        return np.full(len(frame.position), FARTHEST), sound[1]
+        return np.full(len(frame.position), FARTHEST), _curves(setting, *_healthy(setting.pair), False)[1]
     if setting.options.law == "paper":
         first, force = np.zeros_like(first), np.maximum(force, force.max() / OFF_PATH)
     else:  # beyond reach, the forces of the nearest position within

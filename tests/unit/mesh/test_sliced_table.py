@@ -76,6 +76,8 @@ def at_rest(table, roll, force, errors=None):
         ("mesh.contact=linear", "mesh.slice_coupling=independent", "mesh.pair_coupling=sum"),
         ("modification=beihang_both", "modification.misalignment_um=15"),
         ("gear=xiamen_23_84",),
+        ("mesh.n_slices=1",),
+        ("mesh.n_slices=12",),
     ],
 )
 def test_equilibrium_is_that_of_the_slices(words):
