@@ -31,6 +31,7 @@ UNITS: dict[str, tuple[float, str]] = {
     "rpm": (2.0 * math.pi / 60.0, "speed"),
     "nm": (1.0, "torque"),
     "kg": (1.0, "mass"),
+    "n": (1.0, "force"),
     "s": (1.0, "time"),
     "hz": (1.0, "frequency"),
     "gpa": (1e9, "stress"),
