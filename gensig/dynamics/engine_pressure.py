@@ -150,4 +150,6 @@ def read_pressure(given: PressureFile, n_points: int) -> Array:
         )
     if not np.all(pressure > 0.0):
         raise ConfigError(f"{where}: row {int(np.argmax(pressure <= 0.0)) + 2}, pressure is absolute and positive")
+    if gaps[-1] < 1e-9 * CYCLE:  # both ends of the cycle are given: they are one
+        angle, pressure = angle[:-1], pressure[:-1]
     return np.asarray(np.interp(cycle_angles(n_points), angle, pressure, period=CYCLE))

@@ -65,9 +65,7 @@ class Dynamometer:
 
     def __post_init__(self) -> None:
         if not 0.0 <= self.disturbance_share <= 1.0:
-            raise ConfigError(
-                f"excitation.dynamometer.disturbance_share = {self.disturbance_share:g} must lie in 0..1"
-            )
+            raise ConfigError(f"excitation.dynamometer.disturbance_share = {self.disturbance_share:g} must lie in 0..1")
         if not self.disturbance_frequency > 0.0:
             raise ConfigError(
                 f"excitation.dynamometer.disturbance_frequency_hz = {self.disturbance_frequency:g} must be positive"
@@ -113,9 +111,7 @@ class Engine:
             )
         for bank, nodes in self.valve_nodes.items():
             if bank not in self.layout.banks:
-                raise ConfigError(
-                    f"excitation.valve_nodes: no bank {bank!r}; there are {', '.join(self.layout.banks)}"
-                )
+                raise ConfigError(f"excitation.valve_nodes: no bank {bank!r}; there are {', '.join(self.layout.banks)}")
             if len(nodes) not in (0, n_throws):
                 raise ConfigError(f"excitation.valve_nodes.{bank} has {len(nodes)} nodes for {n_throws} throws")
         for name in self.plunger_nodes:
@@ -140,8 +136,9 @@ class EngineTorques:
     """Torques at one operating point; positive turns a node in its own sense of rotation.
 
     ``nodes`` (excited,) are node numbers, ``torque`` (excited, point) N m over the crank angles ``angle`` (point,) rad
-    of one cycle. ``pressure`` (point,) Pa is that of a cylinder from its own firing top dead center on. ``brake_torque``
-    and ``indicated_torque`` are those of the whole engine at the crank, N m.
+    of one cycle. ``pressure`` (point,) Pa is that of a cylinder from its own firing top dead center on, ``fuel_volume``
+    m3 what it burns in a cycle. ``brake_torque`` and ``indicated_torque`` are those of the whole engine at the crank,
+    N m. The disturbance is a torque of its own frequency, not one over the cycle.
     """
 
     speed: float
@@ -189,21 +186,19 @@ def engine_torques(
     if not speed > 0.0:
         raise ConfigError(f"the speed of the crank, {speed * 30.0 / math.pi:g} r/min, must be positive")
     share = speed / engine.reference.speed
-    steady = _loads(engine, share)
-    for part in _valve_torques(engine, speed, n_points):
-        steady.append(part)
-    taken = engine.friction_torque - sum(ratios[node] * float(np.mean(row)) for node, row in steady)
+    parts = [*_loads(engine, share), *_valve_torques(engine, speed, n_points)]
+    taken = engine.friction_torque - sum(ratios[node] * float(np.mean(row)) for node, row in parts)
     plungers = partial(_plunger_torques, engine, speed, share, n_points=n_points)
     if isinstance(engine.pressure, PressureFile):
         pressure, indicated, brake = _measured(engine, torque, taken, plungers, n_points)
     else:
         pressure, indicated, brake = _burned(engine, speed, torque, taken, plungers, n_points)
     volume = _fuel(engine, indicated)
-    steady += [*plungers(volume), (engine.dynamometer.node, np.array(-brake / ratios[engine.dynamometer.node]))]
-    steady += _cylinder_torques(engine, pressure, speed)
-    nodes = tuple(sorted({node for node, _ in steady}))
+    parts += [*plungers(volume), (engine.dynamometer.node, np.array(-brake / ratios[engine.dynamometer.node]))]
+    parts += _cylinder_torques(engine, pressure, speed)
+    nodes = tuple(sorted({node for node, _ in parts}))
     torques = np.zeros((len(nodes), n_points))
-    for node, row in steady:
+    for node, row in parts:
         torques[nodes.index(node)] += row
     return EngineTorques(
         speed=speed,
@@ -223,7 +218,7 @@ def engine_torques(
 def _check_nodes(engine: Engine, ratios: Mapping[int, float]) -> None:
     """Every node is there, throws turn with the crank, cams at half its speed."""
     cams = [node for nodes in engine.valve_nodes.values() for node in nodes] + list(engine.plunger_nodes.values())
-    wanted = [("throw_nodes", node, 1.0) for node in engine.throw_nodes]
+    wanted: list[tuple[str, int, float | None]] = [("throw_nodes", node, 1.0) for node in engine.throw_nodes]
     wanted += [("valve_nodes or injection_pump.nodes", node, CAM_RATIO) for node in cams]
     wanted += [(f"loads.{name}.node", load.node, None) for name, load in engine.loads.items()]
     wanted += [("dynamometer.node", engine.dynamometer.node, None)]
@@ -232,7 +227,7 @@ def _check_nodes(engine: Engine, ratios: Mapping[int, float]) -> None:
             raise ConfigError(f"excitation.{key}: the shaft line has no node {node}")
         if ratio is not None and not math.isclose(ratios[node], ratio, rel_tol=1e-9):
             raise ConfigError(
-                f"excitation.{key}: node {node} turns {ratios[node]:.6g} times as fast as the crank; {ratio:g} is needed"
+                f"excitation.{key}: node {node} turns {ratios[node]:.6g} times as fast as the crank; it needs {ratio:g}"
             )
 
 

@@ -10,6 +10,7 @@ from __future__ import annotations
 import math
 from collections.abc import Callable, Iterable, Sequence
 from dataclasses import dataclass
+from typing import Protocol
 
 import numpy as np
 from numpy.typing import NDArray
@@ -20,6 +21,7 @@ Array = NDArray[np.float64]
 ComplexArray = NDArray[np.complex128]
 
 TURNS_PER_CYCLE = 2
+USUAL_ORDERS = 200  # half orders: up to order 100
 UNBALANCED = 1e-6  # of the largest mean torque, that a free line may be left with
 RIGID = 1e-9  # of the largest stiffness eigenvalue: nothing holds such a motion
 ASYMMETRIC = 1e-9
@@ -86,6 +88,59 @@ class Elements:
         return np.asarray((self.directions.T * self.loss) @ self.directions)
 
 
+class Matrices(Protocol):
+    """A line with its gear meshes apart, each with a direction (dof,) along its line of action."""
+
+    @property
+    def mass(self) -> Array:
+        """(dof, dof)."""
+
+    @property
+    def damping(self) -> Array:
+        """(dof, dof), viscous."""
+
+    @property
+    def stiffness(self) -> Array:
+        """(dof, dof), without the meshes."""
+
+    @property
+    def loss_stiffness(self) -> Array:
+        """(dof, dof), loss factor times stiffness."""
+
+    @property
+    def directions(self) -> Array:
+        """(mesh, dof)."""
+
+    @property
+    def mesh_stiffness(self) -> Array:
+        """(mesh,) N/m."""
+
+    @property
+    def mesh_loss_factor(self) -> Array:
+        """(mesh,)."""
+
+    @property
+    def mesh_damping(self) -> Array:
+        """(mesh,) N s/m."""
+
+
+def closed_line(matrices: Matrices) -> tuple[LinearLine, Elements]:
+    """A line whose meshes never lose contact, each a spring of its stiffness, and those meshes."""
+    meshes = Elements(
+        directions=matrices.directions,
+        stiffness=matrices.mesh_stiffness,
+        loss=matrices.mesh_loss_factor * matrices.mesh_stiffness,
+    )
+    dampers = (matrices.directions.T * matrices.mesh_damping) @ matrices.directions
+    line = LinearLine(
+        mass=matrices.mass,
+        stiffness=matrices.stiffness + meshes.stiffness_matrix(),
+        loss=matrices.loss_stiffness + meshes.loss_matrix(),
+        damping=matrices.damping + dampers,
+    )
+    return line, meshes
+
+
 @dataclass(frozen=True, slots=True, kw_only=True, eq=False)
 class SteadyResponse:
     """Steady vibration at one speed (rad/s) of the crank.
@@ -111,7 +166,7 @@ class SteadyResponse:
 
     def fluctuation(self) -> Array:
         """Half the peak to peak of the speed over the cycle, (dof,) rad/s: what is printed as plus or minus."""
-        return np.asarray(0.5 * np.ptp(self.speed_over_cycle(16 * len(self.orders)), axis=1))
+        return np.asarray(0.5 * np.ptp(self.speed_over_cycle(32 * len(self.orders)), axis=1))
 
     def element_forces(self, elements: Elements) -> tuple[Array, ComplexArray]:
         """Mean (element,) and complex amplitudes (element, order) of what the elements carry, N m or N."""
@@ -151,14 +206,14 @@ def cycle_orders(torque: Array, n_orders: int) -> tuple[Array, ComplexArray]:
     return np.asarray(spectrum[..., 0].real), np.asarray(2.0 * spectrum[..., 1 : n_orders + 1])
 
 
-def steady_response(line: LinearLine, torque: Array, speed: float, *, n_orders: int = 80) -> SteadyResponse:
+def steady_response(line: LinearLine, torque: Array, speed: float, *, n_orders: int = USUAL_ORDERS) -> SteadyResponse:
     """Steady vibration of a line under torques over the cycle.
 
     Parameters
     ----------
     torque : (dof, point) N m    over two turns of the crank, from angle 0
     speed : rad/s                of the crank
-    n_orders : half orders taken, 80 up to order 40
+    n_orders : half orders taken; 200 reach order 100, where injection pulses end
 
     Raises
     ------
@@ -208,7 +263,7 @@ def run_of_speeds(
     speeds: Iterable[float],
     dofs: Sequence[int],
     *,
-    n_orders: int = 80,
+    n_orders: int = USUAL_ORDERS,
 ) -> list[Waterfall]:
     """Steady vibration at each of a run of speeds, one waterfall for each degree of freedom asked.
 
@@ -243,7 +298,7 @@ def _mean_twist(line: LinearLine, mean: Array) -> Array:
     rest = vectors[:, ~held].T @ mean
     if rest.size and np.max(np.abs(rest)) > UNBALANCED * max(float(np.max(np.abs(mean))), 1e-300):
         raise SimulationError(
-            f"the mean torques leave {np.max(np.abs(rest)):.4g} N m on a line that nothing holds; balance drive and load"
+            f"the mean torques leave {np.max(np.abs(rest)):.4g} N m on a line that nothing holds; balance them"
         )
     twist = vectors[:, held] @ ((vectors[:, held].T @ mean) / values[held])
     free = vectors[:, ~held]
