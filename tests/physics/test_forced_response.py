@@ -174,7 +174,7 @@ def test_more_orders_than_usual_change_little():
 
 def test_waterfall_lines_rise_with_the_speed_and_resonate_at_the_modes():
     line, _, _ = engine_line()
-    speeds = np.arange(650.0, 1751.0, 50.0) * RPM
+    speeds = np.arange(675.0, 1726.0, 150.0) * RPM
 
     def torques(speed):
         return torques_of(option(), speed, 0.0).on(NODES)
