@@ -16,7 +16,7 @@ from gensig import generation, records
 from gensig.dataset.shard import ShardWriter
 from gensig.dynamics import _kernels, integrator
 from gensig.dynamics.decimation import Decimator, decimator
-from gensig.systems import lead_in, spur_pair
+from gensig.systems import lead_in, pair_machine, spur_pair
 
 PLAN, TABLES, EQUATIONS = "machine and plan row", "mesh tables", "equations and packing"
 SETTLING, RECORDING, CHECKING = "integration: settling", "integration: recording", "integration: error check"
@@ -30,14 +30,14 @@ CLOCKED: tuple[tuple[Any, str, str], ...] = (
     (records, "row_run", PLAN),
     (records, "twin_start", PLAN),
     (spur_pair, "_mesh_table", TABLES),
-    (spur_pair.Run, "dynamics", EQUATIONS),
-    (spur_pair, "settling_oversampling", EQUATIONS),
+    (pair_machine.Run, "dynamics", EQUATIONS),
+    (pair_machine, "settling_oversampling", EQUATIONS),
     (integrator, "settling_time", EQUATIONS),
     (integrator, "pack", EQUATIONS),
     (integrator.PairDynamics, "static_start", EQUATIONS),
     (integrator._Run, "advance", SETTLING),
     (integrator._Run, "record", RECORDING),
-    (spur_pair, "_checks", CHECKING),
+    (pair_machine, "_checks", CHECKING),
     (records, "_finish", NOISE),
     (generation, "open_shard", WRITING),
     (ShardWriter, "__enter__", WRITING),
@@ -79,9 +79,9 @@ class Stages:
     @contextmanager
     def watching(self, n_whole: int) -> Iterator[None]:
         """Clock the product's functions; recordings of fewer samples than ``n_whole`` are those of the error check."""
-        counted = self._counted(spur_pair.simulate_together)
+        counted = self._counted(pair_machine.simulate_together)
         with ExitStack() as patches:
-            for owner in (spur_pair, lead_in):
+            for owner in (pair_machine, lead_in):
                 patches.enter_context(mock.patch.object(owner, "simulate_together", counted))
             for owner, name, stage in CLOCKED:
                 clocked = self._clocked(getattr(owner, name), stage, n_whole)

@@ -30,8 +30,9 @@ from gensig.faults.registry import read_faults
 from gensig.mesh.face import slice_gaps
 from gensig.mesh.load_distribution import pair_states, static_mesh
 from gensig.mesh.pair_table import PairTable, flank_sides, pair_table
+from gensig.systems.pair_machine import Run
 from gensig.systems.registry import read_system
-from gensig.systems.spur_pair import Run, SpurPair
+from gensig.systems.spur_pair import SpurPair
 
 Array = NDArray[np.float64]
 

@@ -29,8 +29,8 @@ from gensig.faults.registry import read_faults
 from gensig.generation import begin_folder, run_folder, write_shard
 from gensig.mesh.load_distribution import sound_load
 from gensig.systems import spur_pair
+from gensig.systems.pair_machine import Run, Start, simulate_together
 from gensig.systems.registry import read_system
-from gensig.systems.spur_pair import Run, Start, simulate_together
 
 DURATIONS = (0.05, 0.16, 0.5, 1.6, 5.0, 16.0, 50.0)  # s
 COUNTS = (8, 80, 800, 8000)  # records

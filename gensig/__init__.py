@@ -22,7 +22,7 @@ if TYPE_CHECKING:
     from gensig.dataset.reader import Dataset
     from gensig.pairs import FaultPairs
     from gensig.streaming import RecordStream
-    from gensig.systems.spur_pair import SpurPair
+    from gensig.systems.pair_machine import PairMachine
 
 __all__ = ["__version__", "fault_pairs", "generate", "load_system", "open_dataset", "stream"]
 
@@ -34,7 +34,7 @@ def open_dataset(path: str | Path, *, allow_incomplete: bool = False) -> Dataset
     return reader.open_dataset(path, allow_incomplete=allow_incomplete)
 
 
-def load_system(*overrides: str, config_dir: str | Path | None = None) -> SpurPair:
+def load_system(*overrides: str, config_dir: str | Path | None = None) -> PairMachine:
     """The machine that overrides describe, as the commands would build it."""
     from gensig.config import read_request
     from gensig.systems.registry import read_system

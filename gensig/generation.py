@@ -32,8 +32,8 @@ from gensig.execution.base import Executor, ShardFailure
 from gensig.planning import check_switches, make_plan
 from gensig.records import signal_shapes, simulate_records
 from gensig.rows import read_seed
+from gensig.systems.pair_machine import PairMachine
 from gensig.systems.registry import read_system
-from gensig.systems.spur_pair import SpurPair
 from gensig.units import from_si
 from gensig.version import __version__
 
@@ -249,7 +249,7 @@ def open_shard(path: Path, config: Mapping[str, Any], n_records: int, params: Se
     )
 
 
-def _shaft_sensors(config: Mapping[str, Any], system: SpurPair) -> dict[str, Any]:
+def _shaft_sensors(config: Mapping[str, Any], system: PairMachine) -> dict[str, Any]:
     """What a reader of the stored shaft signals has to know."""
     tacho, encoder = system.sensing.tacho, system.sensing.encoder
     of_tacho = {"tacho_shaft": tacho.shaft, "tacho_pulses_per_turn": tacho.pulses_per_turn}
@@ -259,7 +259,7 @@ def _shaft_sensors(config: Mapping[str, Any], system: SpurPair) -> dict[str, Any
     )
 
 
-def root_attributes(config: Mapping[str, Any], system: SpurPair) -> dict[str, Any]:
+def root_attributes(config: Mapping[str, Any], system: PairMachine) -> dict[str, Any]:
     """What is the same for every record of a data set."""
     pair = system.pair
     rotation = [name.endswith("rotation") for name in system.sensing.channel_names]

@@ -33,8 +33,8 @@ from gensig.rows import (
 from gensig.sensing.instrument import Instrument
 from gensig.streaming import epoch_seed
 from gensig.systems.lead_in import simulate_with_lead_in
+from gensig.systems.pair_machine import CleanRecord, PairMachine, Run
 from gensig.systems.registry import read_system
-from gensig.systems.spur_pair import CleanRecord, Run, SpurPair
 
 Array = NDArray[np.float64]
 
@@ -243,12 +243,12 @@ def _planned(
     ]
 
 
-def _sound(config: Mapping[str, Any], system: SpurPair, row: Mapping[str, Any]) -> Run:
+def _sound(config: Mapping[str, Any], system: PairMachine, row: Mapping[str, Any]) -> Run:
     """The healthy twin that sets the noise of a data set."""
     return replace(row_run(config, system, row), faults=(), start=twin_start(config, system, row))
 
 
-def _noise_power(system: SpurPair, instrument: Instrument, sound: CleanRecord) -> Array:
+def _noise_power(system: PairMachine, instrument: Instrument, sound: CleanRecord) -> Array:
     reference = instrument.power(instrument.measure(sound.acceleration))
     return reference * system.sensing.noise_factor(float(system.sensing.snr or 0.0))
 
@@ -268,7 +268,7 @@ def _power_at_set_point(config: Mapping[str, Any], n_units: int) -> Array:
     return np.stack(powers)
 
 
-def _noise_shape(config: Mapping[str, Any], system: SpurPair, rows: Sequence[Mapping[str, Any]]) -> Array:
+def _noise_shape(config: Mapping[str, Any], system: PairMachine, rows: Sequence[Mapping[str, Any]]) -> Array:
     """Density of each unit's noise at power 1, averaged over draws and neighbouring bins, (unit, channel, bin)."""
     n_samples = round(system.operating.duration * system.sensing.sampling_rate)
     silent = np.zeros((len(system.sensing.channel_names), n_samples))

@@ -22,12 +22,13 @@ from gensig.faults.registry import COMPOUND, fault_parts, read_faults
 from gensig.mesh.pair_table import check_teeth
 from gensig.records import signal_shapes
 from gensig.rows import MISSING, Stream, read_seed, record_system, replace_key, stream, whole_number
+from gensig.systems.pair_machine import PairMachine, severity
 from gensig.systems.registry import read_system
 from gensig.systems.shaft_sensors import SWITCHES
-from gensig.systems.spur_pair import SpurPair, severity
-from gensig.units import from_si
+from gensig.units import from_si, split_unit, to_si
 
 SHARD_BYTES = 65_536_000  # 80 records of 4 x 51,200 float32 samples
+SCALED = ("low", "high", "mean", "std", "values")  # of a distribution that is a share of a size
 MOST_IN_GRID = 1_000_000  # records; a product of levels is soon larger than meant
 KEYS = (
     "n_records", "n_units", "n_gearboxes", "conditions_per_unit", "n_repeats", "classes", "design", "vary", "sham",
@@ -204,7 +205,7 @@ def _fitting(plan: Mapping[str, Any], n_records: int, counts: tuple[int, ...]) -
 
 def _row(
     config: Mapping[str, Any],
-    system: SpurPair,
+    system: PairMachine,
     fault: dict[str, Any],
     values: dict[str, float],
     start: np.random.Generator,
@@ -312,7 +313,7 @@ def _fault_specs(
             if key not in part or key == "vary":
                 raise ConfigError(f"fault.vary: '{key}' is no key of fault={part['kind']}")
             name = f"parts.{place}.{key}" if fault["kind"] == COMPOUND else key
-            specs[name], places[name] = _tooth_range(config, part["gear"], spec), (place, key)
+            specs[name], places[name] = _for_gear(config, part["gear"], key, spec), (place, key)
     return specs, places
 
 
@@ -333,8 +334,27 @@ def _draw_faults(
     return faults
 
 
-def _tooth_range(config: Mapping[str, Any], gear: str, spec: Any) -> Any:
-    """``distribution: tooth`` as whole numbers over the gear's teeth, anything else as it is."""
-    if not (isinstance(spec, Mapping) and spec.get("distribution") == "tooth"):
+def _for_gear(config: Mapping[str, Any], gear: str, key: str, spec: Any) -> Any:
+    """A distribution for the faulted gear: ``distribution: tooth`` over its teeth, ``of`` as shares of a size of it."""
+    if not isinstance(spec, Mapping):
         return spec
-    return {**spec, "distribution": "integers", "low": 0, "high": config["gear"][gear]["n_teeth"] - 1}
+    own = config["gear"][gear]
+    if spec.get("distribution") == "tooth":
+        return {**spec, "distribution": "integers", "low": 0, "high": own["n_teeth"] - 1}
+    if "of" not in spec:
+        return spec
+    sizes = {"normal_module": config["gear"]["normal_module_mm"], "face_width": own["face_width_mm"]}
+    unit = split_unit(key)[1]
+    if spec["of"] not in sizes or unit not in ("mm", "um"):
+        raise ConfigError(
+            f"fault.vary.{key}: of = {spec['of']!r}; a length may be drawn as a share of {', '.join(sizes)}"
+        )
+    size = from_si(key, to_si("size_mm", sizes[spec["of"]]))
+
+    def scaled(value: Any) -> Any:
+        return [scaled(one) for one in value] if isinstance(value, list) else value * size
+
+    try:
+        return {name: scaled(value) if name in SCALED else value for name, value in spec.items() if name != "of"}
+    except TypeError:
+        raise ConfigError(f"fault.vary.{key}: {', '.join(SCALED)} must be numbers, or lists of them") from None

@@ -30,8 +30,8 @@ from gensig.sensing.instrument import Instrument
 from gensig.systems.lead_in import simulate_with_lead_in
 from gensig.systems.mesh_signals import mesh_signals
 from gensig.systems.operation import operating_signals
+from gensig.systems.pair_machine import CleanRecord, PairMachine, Run
 from gensig.systems.shaft_sensors import SWITCHES
-from gensig.systems.spur_pair import CleanRecord, Run, SpurPair
 from gensig.units import from_si
 from gensig.version import __version__
 
@@ -57,7 +57,7 @@ def simulate_records(config: Mapping[str, Any], rows: Sequence[Mapping[str, Any]
     A record's bits do not depend on what it is simulated beside. A motion that does not stay finite becomes a record
     marked as failed.
     """
-    made: dict[tuple[tuple[str, float], ...], SpurPair] = {}
+    made: dict[tuple[tuple[str, float], ...], PairMachine] = {}
     machines = []
     for row in rows:  # the records of a condition share their machine
         drawn = tuple(row_values(row).items())
@@ -93,7 +93,7 @@ def simulate_records(config: Mapping[str, Any], rows: Sequence[Mapping[str, Any]
 
 def _finish(
     config: Mapping[str, Any],
-    system: SpurPair,
+    system: PairMachine,
     row: Mapping[str, Any],
     twin: TwinKey,
     result: CleanRecord | SimulationError,
@@ -184,7 +184,7 @@ def _healthy_twin(
     return power if isinstance(power, SimulationError) else row_healthy_twin(config, row, instrument, clean, power)
 
 
-def signal_shapes(config: Mapping[str, Any], system: SpurPair) -> dict[str, tuple[int, ...]]:
+def signal_shapes(config: Mapping[str, Any], system: PairMachine) -> dict[str, tuple[int, ...]]:
     """Shape of every array of one record, by signal name."""
     dataset, n_channels = config["dataset"], len(system.sensing.channel_names)
     n_samples = round(system.operating.duration * system.sensing.sampling_rate)

@@ -19,9 +19,9 @@ from gensig.geometry.gear import Gear
 from gensig.sensing.instrument import Instrument, draw_instrument
 from gensig.sensing.manufacturing import Gearbox, Quality, Specimen, draw_gearbox, draw_specimen, with_damping_ratio
 from gensig.systems.nuisances import with_nuisances
+from gensig.systems.pair_machine import CleanRecord, PairMachine, Run, Start
 from gensig.systems.registry import read_system
 from gensig.systems.shaft_sensors import shaft_signals
-from gensig.systems.spur_pair import CleanRecord, Run, SpurPair, Start
 
 Array = NDArray[np.float64]
 MISSING = float("nan")
@@ -85,7 +85,7 @@ def whole_number(key: str, value: Any, *, at_least: int) -> int:
     return value
 
 
-def record_system(config: Mapping[str, Any], values: Mapping[str, float]) -> SpurPair:
+def record_system(config: Mapping[str, Any], values: Mapping[str, float]) -> PairMachine:
     """The machine of one record: the configuration with the drawn values put in."""
     varied = {key.partition(".")[0] for key in values}
     own = {name: copy.deepcopy(part) if name in varied else part for name, part in config.items()}
@@ -129,7 +129,7 @@ def _row_stream(config: Mapping[str, Any], row: Mapping[str, Any], cause: Stream
 
 
 def row_shaft_signals(
-    config: Mapping[str, Any], system: SpurPair, row: Mapping[str, Any], record: CleanRecord | None
+    config: Mapping[str, Any], system: PairMachine, row: Mapping[str, Any], record: CleanRecord | None
 ) -> dict[str, NDArray[Any]]:
     """What the sensors on the shafts of a row tell."""
     gearbox = int(str(row["gearbox_id"]).rpartition("-")[2])
@@ -151,7 +151,7 @@ def row_faults(row: Mapping[str, Any]) -> list[Fault]:
     return [fault for part in json.loads(str(row["faults_json"])) for fault in read_faults(part, "faults_json")]
 
 
-def row_run(config: Mapping[str, Any], system: SpurPair, row: Mapping[str, Any]) -> Run:
+def row_run(config: Mapping[str, Any], system: PairMachine, row: Mapping[str, Any]) -> Run:
     """What one row of a plan asks to simulate."""
     specimen, gearbox = _unit(config, system, row)
     faults = () if config["plan"]["sham"] else tuple(row_faults(row))
@@ -173,7 +173,7 @@ def _row_start(row: Mapping[str, Any]) -> Start:
     )
 
 
-def row_instrument(config: Mapping[str, Any], system: SpurPair, row: Mapping[str, Any]) -> Instrument:
+def row_instrument(config: Mapping[str, Any], system: PairMachine, row: Mapping[str, Any]) -> Instrument:
     """Transfer path and sensors of a row's gearbox, drawn from their own streams."""
     seed, gearbox = read_seed(config), int(str(row["gearbox_id"]).rpartition("-")[2])
     causes = (stream(seed, cause, gearbox) for cause in (Stream.PATH, Stream.SENSOR))
@@ -201,7 +201,7 @@ def shaken(
     return with_nuisances(run, result, units, stream(seed, own, place[name]))
 
 
-def twin_start(config: Mapping[str, Any], system: SpurPair, row: Mapping[str, Any]) -> Start:
+def twin_start(config: Mapping[str, Any], system: PairMachine, row: Mapping[str, Any]) -> Start:
     """Where the healthy twin of a unit at a condition starts."""
     rng = stream(read_seed(config), Stream.TWIN, int(str(row["condition_id"]).rpartition("-")[2]))
     return Start(
@@ -211,7 +211,7 @@ def twin_start(config: Mapping[str, Any], system: SpurPair, row: Mapping[str, An
     )
 
 
-def _unit(config: Mapping[str, Any], system: SpurPair, row: Mapping[str, Any]) -> tuple[Specimen, Gearbox]:
+def _unit(config: Mapping[str, Any], system: PairMachine, row: Mapping[str, Any]) -> tuple[Specimen, Gearbox]:
     """Specimen and gearbox of a row, drawn from their own streams."""
     seed, quality = read_seed(config), system.quality
     specimen, gearbox = (int(str(row[name]).rpartition("-")[2]) for name in ("specimen_id", "gearbox_id"))

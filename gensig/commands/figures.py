@@ -11,6 +11,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from gensig.faults.base import Fault
+from gensig.systems.pair_machine import PairMachine
 from gensig.systems.spur_pair import SpurPair, StiffnessCurves
 
 matplotlib.use("Agg")
@@ -104,7 +105,7 @@ def _terms(axes: Any, curves: StiffnessCurves) -> None:
     axes.legend(fontsize="x-small", ncols=2, loc="lower right")
 
 
-def plot_record(system: SpurPair, acceleration: NDArray[np.float32], values: dict[str, Any], path: Path) -> None:
+def plot_record(system: PairMachine, acceleration: NDArray[np.float32], values: dict[str, Any], path: Path) -> None:
     """Signal, spectrum and envelope spectrum of the most telling channel, shaft and mesh frequencies marked."""
     from gensig.signals.envelope import envelope_spectrum
     from gensig.signals.spectrum import amplitude_spectrum
@@ -154,15 +155,15 @@ def save(figure: Any, path: Path) -> None:
     pyplot.close(figure)
 
 
-def _n_teeth(system: SpurPair, faults: Sequence[Fault]) -> int:
+def _n_teeth(system: PairMachine, faults: Sequence[Fault]) -> int:
     return system.pair.wheel.n_teeth if faults and faults[0].gear == "wheel" else system.pair.pinion.n_teeth
 
 
-def _fault_angle(system: SpurPair, fault: Fault) -> float:
+def _fault_angle(system: PairMachine, fault: Fault) -> float:
     """Roll angle at which the faulty tooth enters contact, degrees."""
     return 360.0 * max(fault.first_tooth, 0) / _n_teeth(system, [fault])
 
 
-def _contact_angle(system: SpurPair, fault: Fault) -> float:
+def _contact_angle(system: PairMachine, fault: Fault) -> float:
     """Roll angle over which one tooth is in contact, degrees."""
     return 360.0 / _n_teeth(system, [fault]) * system.pair.transverse_contact_ratio

@@ -15,6 +15,7 @@ from gensig.commands.console import replaced_file
 from gensig.config import read_request
 from gensig.errors import ConfigError
 from gensig.faults.registry import read_faults, without_vary
+from gensig.systems.pair_machine import PairMachine
 from gensig.systems.registry import SLICED, read_system
 from gensig.systems.spur_pair import SpurPair, StiffnessCurves
 
@@ -43,6 +44,7 @@ def stiffness(arguments: Namespace) -> int:
 
         return sliced_stiffness(request.config, arguments)
     system = read_system(request.config)
+    assert isinstance(system, SpurPair)  # the other kind has gone
     faults = read_faults(request.config["fault"])
     curves = system.stiffness_curves(faults)
     if system.pair.transverse_contact_ratio < 1.0:
@@ -159,7 +161,7 @@ def _show(config: dict[str, Any], record: Record, arguments: Namespace) -> int:
     return 0
 
 
-def _write_record(config: dict[str, Any], system: SpurPair, record: Record, output: str) -> None:
+def _write_record(config: dict[str, Any], system: PairMachine, record: Record, output: str) -> None:
     """One record as a shard of one row, or as a table with time and channels."""
     path = Path(output)
     if path.suffix != ".csv":
@@ -180,7 +182,7 @@ def _unit_suffix(channel: str) -> str:
     return "rad_per_s2" if channel.endswith("rotation") else "m_per_s2"
 
 
-def _print_record(system: SpurPair, acceleration: NDArray[np.float32], values: dict[str, Any]) -> None:
+def _print_record(system: PairMachine, acceleration: NDArray[np.float32], values: dict[str, Any]) -> None:
     from gensig.signals.indicators import crest_factor, kurtosis, rms
 
     print(f"class {values['label_name']}, severity {values['severity']:.3f}")

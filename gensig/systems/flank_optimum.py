@@ -2,7 +2,8 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Sequence
+import math
+from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, replace
 
 import numpy as np
@@ -20,6 +21,7 @@ LARGEST_DEPTH, LARGEST_HEIGHT = 0.02, 0.65
 N_VARIABLES = 9  # tip and root relief, each with depth and height, of both gears; crowning of the pair
 N_PHASES, N_SLICES = 32, 28  # of the search; what it finds is judged with the pair's own
 POPULATION, GENERATIONS = 8, 60  # of differential evolution; the population counts for each variable
+BETWEEN = 0.5  # of these generations where a search starts from the front of those before
 REFUSED = 1e3  # times the unmodified value, for flanks that overlap or lose contact
 
 
@@ -74,7 +76,8 @@ def optimise(
     ----------
     system : its own modification is replaced; slices and mesh law are kept
     n_front : 1 for the least ripple alone, 2 for it and the least line load, more for points between: the least ripple
-        under a bound on the line load (epsilon constraint), so also where the front is hollow
+        under a bound on the line load (epsilon constraint), so also where the front is hollow; of all that was tried,
+        what nothing beats is spread over the front
     seed : of the search; the same seed gives the same result
 
     Returns
@@ -98,14 +101,14 @@ def optimise(
                 seen[key] = REFUSED, REFUSED
         return seen[key]
 
-    def run(objective: Callable[[Array], float], start: Sequence[Array], number: int) -> Array:
-        point = _minimum(objective, start, seed=seed + number, generations=generations)
+    def run(objective: Callable[[Array], float], start: Sequence[Array], number: int, n_generations: int) -> Array:
+        point = _minimum(objective, start, seed=seed + number, generations=n_generations)
         on_done(number + 1, n_front)
         return point
 
-    points = [run(lambda point: values(point)[0], [np.zeros(N_VARIABLES)], 0)]
+    points = [run(lambda point: values(point)[0], [np.zeros(N_VARIABLES)], 0, generations)]
     if n_front > 1:
-        points.append(run(lambda point: values(point)[1], [np.zeros(N_VARIABLES), points[0]], 1))
+        points.append(run(lambda point: values(point)[1], [np.zeros(N_VARIABLES), points[0]], 1, generations))
         most, least = values(points[0])[1], values(points[1])[1]
         for number, bound in enumerate(np.linspace(most, least, n_front)[1:-1], start=2):
 
@@ -113,9 +116,25 @@ def optimise(
                 ripple, load = values(point)
                 return ripple + 100.0 * max(load / bound - 1.0, 0.0)
 
-            points.append(run(bounded, points, number))
+            run(bounded, _spread(seen, POPULATION * N_VARIABLES // 2), number, math.ceil(BETWEEN * generations))
+        points = _spread(seen, n_front)
     found = [judge(system, unpacked(point, system), cases) for point in points]
     return _not_beaten(found)
+
+
+def _spread(seen: Mapping[bytes, tuple[float, float]], n_points: int) -> list[Array]:
+    """Points of all that were tried that no other beats, at most so many, spread evenly over the front's length."""
+    order = sorted(seen, key=lambda key: seen[key])
+    front = [order[0]]
+    for key in order:
+        if seen[key][1] < seen[front[-1]][1]:
+            front.append(key)
+    value = np.array([seen[key] for key in front])
+    size = np.maximum(np.ptp(value, axis=0), 1e-12)
+    along = np.append(0.0, np.cumsum(np.hypot(*(np.diff(value, axis=0) / size).T)))
+    wanted = np.linspace(0.0, along[-1], n_points)
+    chosen = np.unique(np.abs(along[:, None] - wanted).argmin(axis=0))
+    return [np.frombuffer(front[place]) for place in chosen.tolist()]
 
 
 def _minimum(objective: Callable[[Array], float], start: Sequence[Array], *, seed: int, generations: int) -> Array:

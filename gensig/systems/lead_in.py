@@ -10,7 +10,7 @@ import numpy as np
 
 from gensig.dynamics.mesh_state import MeshState
 from gensig.errors import SimulationError
-from gensig.systems.spur_pair import CleanRecord, Run, Start, simulate_together
+from gensig.systems.pair_machine import CleanRecord, Run, Start, simulate_together
 
 
 def simulate_with_lead_in(runs: Sequence[Run]) -> list[CleanRecord | SimulationError]:

@@ -15,8 +15,8 @@ from gensig.dynamics.response import accelerations
 from gensig.operating import Nominal
 from gensig.sensing.nuisance import draw_tones
 from gensig.sensing.tones import SENSE, TURN, Tones, shaft
+from gensig.systems.pair_machine import CleanRecord, Run, Start
 from gensig.systems.shaft_sensors import gear_angle
-from gensig.systems.spur_pair import CleanRecord, Run, Start
 
 Array = NDArray[np.float64]
 Complex = NDArray[np.complex128]

@@ -16,6 +16,7 @@ from gensig.mesh.options import read_mesh_options, read_slice_options
 from gensig.sensing.manufacturing import Quality
 from gensig.sensing.reading import read_sensing
 from gensig.systems.operation import read_operating
+from gensig.systems.pair_machine import PairMachine
 from gensig.systems.sliced_pair import SlicedPair
 from gensig.systems.spur_pair import SpurPair
 from gensig.systems.supports import AS_GIVEN, on_bearings, put_on_bearings, read_holding
@@ -121,10 +122,10 @@ def read_modification(config: Mapping[str, Any]) -> PairModification:
     return read(PairModification, own, "modification", **sides)
 
 
-SYSTEMS: dict[str, Callable[[Mapping[str, Any]], SpurPair]] = {"spur_pair": read_spur_pair}
+SYSTEMS: dict[str, Callable[[Mapping[str, Any]], PairMachine]] = {"spur_pair": read_spur_pair}
 
 
-def read_system(config: Mapping[str, Any]) -> SpurPair:
+def read_system(config: Mapping[str, Any]) -> PairMachine:
     """Build the system that ``system.kind`` names.
 
     Raises

@@ -11,13 +11,13 @@ from numpy.typing import NDArray
 
 from gensig.sensing.encoder import draw_disc
 from gensig.sensing.tachometer import draw_mark, pulse_train
-from gensig.systems.spur_pair import CleanRecord, SpurPair, Start
+from gensig.systems.pair_machine import CleanRecord, PairMachine, Start
 
 Array = NDArray[np.float64]
 SWITCHES = {"store_tacho": "tacho", "store_encoder": "encoder_angle", "store_shaft_angle": "shaft_angle"}
 
 
-def gear_angle(system: SpurPair, shaft: str, start: Start, shaft_angle: Array) -> Array:
+def gear_angle(system: PairMachine, shaft: str, start: Start, shaft_angle: Array) -> Array:
     """Angle of a gear in its own sense of rotation, 0 where its tooth 0 enters contact, (sample,) rad.
 
     The wheel's is that of the pinion over the ratio: its lag under load and its own vibration are left out.
@@ -33,7 +33,7 @@ def gear_angle(system: SpurPair, shaft: str, start: Start, shaft_angle: Array) -
 
 def shaft_signals(
     switches: Mapping[str, Any],
-    system: SpurPair,
+    system: PairMachine,
     start: Start,
     record: CleanRecord | None,
     gearbox_rng: np.random.Generator,

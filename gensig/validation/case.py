@@ -20,7 +20,7 @@ from gensig.geometry.contact import GearPair
 from gensig.geometry.gear import Gear
 from gensig.material import Material
 from gensig.mesh.pair_table import PairTable, pair_table
-from gensig.systems.registry import read_system
+from gensig.systems.registry import read_spur_pair
 from gensig.systems.spur_pair import SpurPair
 
 Array = NDArray[np.float64]
@@ -99,7 +99,7 @@ def read_case(overrides: tuple[str, ...]) -> Case:
 def _read_machine(overrides: tuple[str, ...]) -> SpurPair:
     keys = [word.partition("=")[0] for word in overrides]
     if not all("." in key and not key.startswith("gear.rated_") for key in keys):
-        return read_system(compose("generate", overrides))  # groups, and values that others are made of
+        return read_spur_pair(compose("generate", overrides))  # groups, and values that others are made of
     values = deepcopy(_default_machine())
     for key, word in zip(keys, overrides, strict=True):
         *groups, last = key.split(".")
@@ -109,7 +109,7 @@ def _read_machine(overrides: tuple[str, ...]) -> SpurPair:
         if last not in place:
             raise ConfigError(f"'{word}': the machine has no key '{key}'")
         place[last] = yaml.safe_load(word.partition("=")[2])
-    return read_system(values)
+    return read_spur_pair(values)
 
 
 @lru_cache(maxsize=1)

@@ -13,7 +13,7 @@ from gensig.faults.crack import Crack
 from gensig.mesh.load_distribution import pair_states, static_mesh
 from gensig.mesh.pair_table import N_PAIRS
 from gensig.sensing.chain import detectability
-from gensig.systems.spur_pair import Run, simulate_together
+from gensig.systems.pair_machine import Run, simulate_together
 
 RATE = 51200.0
 QUICK = {"operating.duration_s": 0.1, "solver.max_error": None}

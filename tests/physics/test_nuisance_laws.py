@@ -12,7 +12,7 @@ from gensig.operating import Profile
 from gensig.sensing.nuisance import draw_tones, read_nuisances
 from gensig.sensing.tones import SENSE, Tones
 from gensig.systems.nuisances import nuisance_acceleration
-from gensig.systems.spur_pair import Run, Start
+from gensig.systems.pair_machine import Run, Start
 
 RATE, DURATION = 51200.0, 0.2
 UNBALANCE = {"kind": "unbalance", "gear": "pinion", "iso21940_grade": 6.3, "used_share": [1.0, 1.0],

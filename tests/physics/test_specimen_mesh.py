@@ -11,7 +11,7 @@ from gensig.dynamics._layout import BACKLASH
 from gensig.faults.flank_form import ProfileError
 from gensig.mesh.load_distribution import static_mesh
 from gensig.sensing.manufacturing import draw_specimen, perfect_specimen
-from gensig.systems.spur_pair import Run, simulate_together
+from gensig.systems.pair_machine import Run, simulate_together
 
 UM = 1e-6
 SIZE = 6 * UM  # of an eccentricity

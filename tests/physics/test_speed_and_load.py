@@ -10,7 +10,7 @@ from gensig.config import read_request
 from gensig.planning import make_plan
 from gensig.records import simulate_records
 from gensig.systems.lead_in import simulate_with_lead_in
-from gensig.systems.spur_pair import Run, simulate_together
+from gensig.systems.pair_machine import Run, simulate_together
 
 RATE = 51200.0
 # so that nothing but the course moves the shaft

@@ -12,7 +12,7 @@ from gensig.records import forget_twins, simulate_record, simulate_records
 from gensig.reproduction import simulate_twin
 from gensig.rows import record_system, row_run, row_values, shaken
 from gensig.systems.nuisances import with_nuisances
-from gensig.systems.spur_pair import CleanRecord
+from gensig.systems.pair_machine import CleanRecord
 
 BASE = ("plan.n_records=4", "plan.n_units=1", "plan.classes=[healthy,missing_tooth]", "operating.duration_s=0.1",
         "dataset.store_source=true", "dataset.store_clean=true", "dataset.store_shaft_angle=true",

@@ -12,8 +12,8 @@ from gensig.config import DerivedValueWarning, read_request
 from gensig.errors import ConfigError, GensigError
 from gensig.faults.base import faulty_teeth
 from gensig.faults.registry import read_faults
+from gensig.systems.pair_machine import severity
 from gensig.systems.registry import read_system
-from gensig.systems.spur_pair import severity
 
 FOUR = "plan.classes=[healthy,crack,pitting,missing_tooth]"
 

@@ -12,8 +12,8 @@ from gensig.courses import Profile
 from gensig.errors import ConfigError
 from gensig.systems.lead_in import earlier
 from gensig.systems.operation import read_operating
+from gensig.systems.pair_machine import Run
 from gensig.systems.registry import read_system
-from gensig.systems.spur_pair import Run
 
 SPEED, TORQUE = "operating.speed_profile", "operating.torque_profile"
 WALK = {"kind": "random_walk", "scatter": 0.01, "correlation_time_s": 0.1}

@@ -12,7 +12,7 @@ from gensig.dynamics._vector import LANES
 from gensig.dynamics.integrator import integrate
 from gensig.dynamics.pair import PINION_ROTATION, PINION_Y
 from gensig.faults.broken import MissingTooth
-from gensig.systems.spur_pair import Run, simulate_together
+from gensig.systems.pair_machine import Run, simulate_together
 
 RATE, DRIVE = 51200.0, 20.0
 QUICK = {"operating.duration_s": 0.03, "solver.max_error": None, "operating.drive_frequency_hz": DRIVE,

@@ -14,7 +14,7 @@ from gensig.dynamics.decimation import in_band_error
 from gensig.errors import SimulationError
 from gensig.faults.broken import MissingTooth
 from gensig.sensing.manufacturing import Specimen
-from gensig.systems.spur_pair import Run, Start, simulate_together
+from gensig.systems.pair_machine import Run, Start, simulate_together
 
 LANES = n_lanes("float32")
 RATE = 51200.0

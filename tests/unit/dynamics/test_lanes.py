@@ -12,7 +12,7 @@ from gensig.dynamics.lanes import pack
 from gensig.errors import SimulationError
 from gensig.faults.broken import MissingTooth
 from gensig.sensing.manufacturing import Gearbox, Specimen
-from gensig.systems.spur_pair import CleanRecord, Run, Start, simulate_together
+from gensig.systems.pair_machine import CleanRecord, Run, Start, simulate_together
 
 LAWS = {
     "one_sided": {},

@@ -14,7 +14,7 @@ from gensig.faults.broken import MissingTooth
 from gensig.faults.crack import Crack
 from gensig.faults.pitting import Pitting
 from gensig.faults.registry import COMPOUND, FAULTS, fault_parts, read_faults
-from gensig.systems.spur_pair import severity
+from gensig.systems.pair_machine import severity
 
 CRACK, PIT, MISSING = ({**option(kind), "tooth": 3} for kind in ("crack", "pitting", "missing_tooth"))
 

@@ -17,8 +17,8 @@ from gensig.planning import make_plan
 from gensig.records import simulate_record
 from gensig.rows import Stream, record_system, row_run, row_values, stream
 from gensig.sensing.manufacturing import draw_gearbox, nominal_gearbox, with_damping_ratio
+from gensig.systems.pair_machine import Run
 from gensig.systems.registry import read_system
-from gensig.systems.spur_pair import Run
 from gensig.systems.supports import read_holding
 
 BEARINGS = {
