@@ -19,7 +19,7 @@ from gensig.geometry.tooth import Tooth, healthy_tooth
 from gensig.material import Material
 from gensig.mesh._slice_kernels import solve_slices
 from gensig.mesh.body_coupling import shared_body_compliance
-from gensig.mesh.local_contact import contact_law, relative_radius
+from gensig.mesh.local_contact import contact_law
 from gensig.mesh.options import MeshOptions, SliceOptions
 from gensig.mesh.pair_table import FIRST_PITCH, LAST_PITCH, node_positions, structural_compliance
 from gensig.mesh.slice_teeth import NO_FLANK, GearSlices, check_independent, merged_edges, slices_of_gears
@@ -388,17 +388,3 @@ def single_pair_stiffness(
             softness, share = softness + softer, share * (gap < closed) * side.present[kind]
     alone = np.sum(mesh.slice_width * share / softness, axis=1)
     return alone / (1.0 + mesh.shared_compliance * alone)
-
-
-def contact_pressure(mesh: SlicedMesh, contact: LoadedContact, material: Material) -> Array:
-    """Largest Hertzian pressure of every slice, (phase, pair, slice) Pa.
-
-    Source: Hertz, p = sqrt(w E' / (2 pi rho)) with E' = E / (1 - nu^2) for two like flanks. Load along the normal and
-    per length of the contact line are w / cos(beta_b) and times cos(beta_b), and the relative radius in the normal
-    section is the transverse one over cos(beta_b): p takes the root of cos(beta_b).
-    """
-    on_path = np.clip(contact.position, 0.0, mesh.pair.path_of_contact)
-    radius = relative_radius(mesh.pair, on_path)
-    reduced = material.youngs_modulus / (1.0 - material.poisson_ratio**2)
-    slant = math.cos(mesh.pair.base_helix_angle)
-    return np.sqrt(contact.line_load * slant * reduced / (2.0 * math.pi * radius))

@@ -5,7 +5,8 @@ from __future__ import annotations
 from collections.abc import Sequence
 from dataclasses import dataclass
 
-from gensig.errors import GeometryError
+from gensig.dynamics._layout import MOST_PAIRS
+from gensig.errors import ConfigError, GeometryError
 from gensig.faults.base import Fault
 from gensig.mesh.sliced_table import SlicedTable
 from gensig.systems.pair_machine import PairMachine
@@ -25,8 +26,17 @@ class HelicalPair(PairMachine):
         """Force over phase and approach of every distinct pair of teeth, with the given faults."""
         return self.flanks.mesh_table(faults)
 
+    @property
+    def most_pairs(self) -> int:
+        """Pairs of teeth that may be followed at once; how many are depends on the load."""
+        return MOST_PAIRS
+
     def require_drive(self) -> None:
         """Raise unless at least one pair is always in contact, by the overlap of the face too."""
+        if self.flanks.slices.slices_in_phase:
+            raise ConfigError(
+                "mesh.slices_in_phase = true is for comparing statics; records have the helix in: take false"
+            )
         if self.pair.total_contact_ratio < 1.0:
             raise GeometryError(
                 f"the total contact ratio {self.pair.total_contact_ratio:.4f} is below 1, so the drive is interrupted "

@@ -29,7 +29,7 @@ from gensig.faults.base import Fault, faulty_teeth
 from gensig.geometry.contact import GearPair
 from gensig.material import Material
 from gensig.mesh.options import MeshOptions
-from gensig.mesh.pair_table import PairTable
+from gensig.mesh.pair_table import N_PAIRS, PairTable
 from gensig.mesh.sliced_table import SlicedTable
 from gensig.operating import Operating
 from gensig.sensing.agreement import agreement
@@ -92,6 +92,11 @@ class PairMachine(ABC):
     @abstractmethod
     def mesh_table(self, faults: Sequence[Fault] = ()) -> PairTable | SlicedTable:
         """Compliance and gap tables with the given faults."""
+
+    @property
+    def most_pairs(self) -> int:
+        """Pairs of teeth that may be followed at once."""
+        return N_PAIRS
 
     def require_drive(self) -> None:
         """Raise GeometryError unless at least one pair is always in contact."""

@@ -16,12 +16,12 @@ from gensig.material import Material
 from gensig.mesh.modification import PairModification
 from gensig.mesh.options import MeshOptions, SliceOptions
 from gensig.mesh.pair_table import node_positions
+from gensig.mesh.slice_pressure import contact_pressure
 from gensig.mesh.sliced_table import SlicedTable, sliced_table
 from gensig.mesh.slices import (
     LoadedContact,
     Meeting,
     SlicedMesh,
-    contact_pressure,
     loaded_contact,
     single_pair_stiffness,
     slice_places,

@@ -20,7 +20,8 @@ from gensig.mesh.body_coupling import cross_compliance
 from gensig.mesh.load_distribution import loaded_pair_table, pair_states, static_mesh
 from gensig.mesh.options import read_mesh_options, read_slice_options
 from gensig.mesh.pair_table import structural_compliance
-from gensig.mesh.slices import contact_pressure, loaded_contact, single_pair_stiffness, sliced_mesh
+from gensig.mesh.slice_pressure import contact_pressure
+from gensig.mesh.slices import loaded_contact, single_pair_stiffness, sliced_mesh
 from gensig.units import read, to_si
 
 STEEL = Material(youngs_modulus=210e9, poisson_ratio=0.3, density_kg_per_m3=7850.0)
