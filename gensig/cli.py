@@ -50,6 +50,17 @@ def _stiffness(parser: argparse.ArgumentParser) -> None:
     parser.add_argument("--plot", metavar="FILE", help="write a figure (PNG, SVG or PDF)")
 
 
+def _modes(parser: argparse.ArgumentParser) -> None:
+    _overrides(parser)
+    parser.add_argument(
+        "--json",
+        metavar="FILE",
+        help="write all modes: natural_frequencies_hz, damping_ratio, shapes (by degree of freedom, largest 1), "
+        "kinetic_energy_share (by node), mesh_strain_energy_share",
+    )
+    parser.add_argument("--plot", metavar="FILE", help="write a figure: Campbell diagram and shapes (PNG, SVG or PDF)")
+
+
 def _modify_flank(parser: argparse.ArgumentParser) -> None:
     _overrides(parser)
     parser.add_argument("--out", required=True, metavar="FILE", help="option to write: DIR/modification/NAME.yaml")
@@ -218,6 +229,13 @@ VERBS: dict[str, Verb] = {
         "gensig stiffness fault=crack fault.crack_depth_mm=1.5 --json crack.json --plot crack.png",
         "gensig.commands.physics:stiffness",
         _stiffness,
+    ),
+    "modes": Verb(
+        "natural frequencies, damping, shapes of a pair or of a drive line from tables",
+        "gensig modes system=engine_gear_train --json modes.json --plot modes.png\n"
+        "  gensig modes system=shaft_line system.shafting_csv=mine.csv system.gears_csv=my_gears.csv",
+        "gensig.commands.modes:modes",
+        _modes,
     ),
     "twin": Verb(
         "a configuration like a measured healthy machine",

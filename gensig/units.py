@@ -23,6 +23,9 @@ UNITS: dict[str, tuple[float, str]] = {
     "n_per_m": (1.0, "stiffness"),
     "ns_per_m": (1.0, "damping"),
     "nm_per_rad": (1.0, "torsional stiffness"),
+    "knm_per_rad": (1e3, "torsional stiffness"),
+    "mnm_per_rad": (1e6, "torsional stiffness"),  # mega, as shaft lines print it
+    "nms_per_rad": (1.0, "torsional damping"),
     "mm": (1e-3, "length"),
     "um": (1e-6, "length"),
     "m": (1.0, "length"),

@@ -32,6 +32,7 @@ COMMON_GEAR_KEYS = (
 )
 BODY_KEYS = ("mass_kg", "inertia_kg_m2", "support", "bearing", "shaft")
 SLICED = "helical_pair"
+LINE = "shaft_line"
 SYSTEM_KEYS = ("kind", "supports", "motor", "load")
 
 
@@ -82,6 +83,7 @@ def read_spur_pair(config: Mapping[str, Any]) -> SpurPair:
 
 def read_sliced_pair(config: Mapping[str, Any]) -> SlicedPair:
     """Build a spur or helical pair cut into slices from the boundary keys of a configuration, whatever its system."""
+    _refuse_line(config)
     mesh = section(config, "mesh")
     return SlicedPair(
         pair=read_pair(config),
@@ -133,14 +135,25 @@ def read_system(config: Mapping[str, Any]) -> PairMachine:
     ConfigError, GeometryError    for keys or values that make no machine
     """
     kind = section(config, "system").get("kind")
+    _refuse_line(config)
     if kind == SLICED:
         raise ConfigError(
             f"system={kind} has statics so far: take gensig stiffness or gensig transmission-error; records "
             f"are made by system={', '.join(SYSTEMS)}"
         )
     if kind not in SYSTEMS:
-        raise ConfigError(f"system.kind = {kind!r}; allowed: {', '.join((*SYSTEMS, SLICED))}")
+        raise ConfigError(f"system.kind = {kind!r}; allowed: {', '.join((*SYSTEMS, SLICED, LINE))}")
     return SYSTEMS[kind](config)
+
+
+def _refuse_line(config: Mapping[str, Any]) -> None:
+    """Raise for a drive line where a single pair is wanted."""
+    machine = section(config, "system")
+    if machine.get("kind") == LINE:
+        raise ConfigError(
+            f"system={machine.get('name')} is a drive line from tables: so far it has its modes, gensig modes; this is "
+            f"done with system={', '.join(SYSTEMS)}"
+        )
 
 
 def section(config: Mapping[str, Any], *path: str) -> Mapping[str, Any]:

@@ -11,6 +11,7 @@ from gensig.validation.dynamics_checks import DYNAMICS
 from gensig.validation.fault_checks import FAULT
 from gensig.validation.geometry_checks import GEOMETRY, Check
 from gensig.validation.helical_checks import SLICED, read_sliced_case
+from gensig.validation.line_checks import LINES, read_line_case
 from gensig.validation.mesh_checks import MESH
 from gensig.validation.rows import SOURCES, Result, Row, judge, read_rows
 from gensig.validation.standard_checks import STANDARD
@@ -27,6 +28,8 @@ def evaluate(row: Row) -> Result:
     """
     if row.quantity in SLICED:
         return judge(row, SLICED[row.quantity](read_sliced_case(row.overrides), row.at))
+    if row.quantity in LINES:
+        return judge(row, LINES[row.quantity](read_line_case(row.overrides), row.at))
     if row.quantity not in QUANTITIES:
         raise ConfigError(f"{row.origin}.csv, {row.id}: no quantity '{row.quantity}'; see gensig.validation.checks")
     return judge(row, QUANTITIES[row.quantity](read_case(row.overrides), row.at))

@@ -18,7 +18,15 @@ from importlib import resources
 
 from gensig.errors import ConfigError
 
-SOURCES = ("spur_reference", "spur_paper", "helical_reference", "helical_error_paper", "helical_heat_paper")
+SOURCES = (
+    "spur_reference",
+    "spur_paper",
+    "helical_reference",
+    "helical_error_paper",
+    "helical_heat_paper",
+    "engine_reference",
+    "engine_paper",
+)
 REPRODUCED, DIFFERS = "reproduced", "differs"
 HOLDS, FAILS = "claim holds", "claim does not hold"
 NOT_PRINTED = "not printed"
