@@ -136,6 +136,11 @@ def read_system(config: Mapping[str, Any]) -> PairMachine:
     """
     kind = section(config, "system").get("kind")
     _refuse_line(config)
+    if config.get("excitation") is not None:
+        raise ConfigError(
+            f"excitation turns a drive line (system=engine_gear_train, gensig forced-response); system={kind} is turned "
+            "as operating says, leave excitation out"
+        )
     if kind == SLICED:
         raise ConfigError(
             f"system={kind} has statics so far: take gensig stiffness or gensig transmission-error; records "
