@@ -65,7 +65,6 @@ def engine_line(damper="as_printed"):
         ends.append((first, second))
     stiffness = np.array([1e6 * float(row["stiffness_mnm_per_rad"]) for row in joints])
     loss = np.array([LOSS[row["edge_kind"]] for row in joints])
-    loss[ends.index((53, 54))] = LOSS["shaft"]  # the pump camshafts' own coupling
     elements = Elements(directions=directions, stiffness=stiffness, loss=loss * stiffness)
     line = LinearLine(
         mass=np.diag(inertia),
