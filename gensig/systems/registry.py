@@ -138,7 +138,7 @@ def read_system(config: Mapping[str, Any]) -> PairMachine:
     _refuse_line(config)
     if config.get("excitation") is not None:
         raise ConfigError(
-            f"excitation turns a drive line (system=engine_gear_train, gensig forced-response); system={kind} is turned "
+            f"excitation turns a drive line (system=engine_gear_train, gensig forced-response); system={kind} turns "
             "as operating says, leave excitation out"
         )
     if kind == SLICED:

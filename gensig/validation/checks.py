@@ -8,6 +8,7 @@ from gensig.errors import ConfigError
 from gensig.validation.body_checks import BODY
 from gensig.validation.case import read_case
 from gensig.validation.dynamics_checks import DYNAMICS
+from gensig.validation.engine_response_checks import FORCED, read_forced_case
 from gensig.validation.fault_checks import FAULT
 from gensig.validation.geometry_checks import GEOMETRY, Check
 from gensig.validation.helical_checks import SLICED, read_sliced_case
@@ -28,6 +29,8 @@ def evaluate(row: Row) -> Result:
     """
     if row.quantity in SLICED:
         return judge(row, SLICED[row.quantity](read_sliced_case(row.overrides), row.at))
+    if row.quantity in FORCED:
+        return judge(row, FORCED[row.quantity](read_forced_case(row.overrides), row.at))
     if row.quantity in LINES:
         return judge(row, LINES[row.quantity](read_line_case(row.overrides), row.at))
     if row.quantity not in QUANTITIES:

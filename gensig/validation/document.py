@@ -16,6 +16,7 @@ SOURCE_TITLES = {
     "helical_heat_paper": "What the paper on helical stiffness with temperature prints: cold gears",
     "engine_reference": "Reference numbers for the diesel's shaft line",
     "engine_paper": "What the paper on the diesel's timing gears prints",
+    "engine_response": "What the same paper prints of the running engine",
 }
 SOURCE_TEXTS = {
     "spur_reference": "Computed independently of this project (rack geometry, potential-energy method, 2-D finite "
@@ -49,6 +50,9 @@ SOURCE_TEXTS = {
     "engine_paper": "Sun, Shi, Chen, Li & Liu (2024), 67 inertias and 66 stiffnesses as printed in table A1, gears as "
     "in table B1. Variants as above. No inertia or stiffness is fitted: many pairs of changed numbers meet all four "
     "frequencies within 0.01 %, so that a close fit would be no evidence.",
+    "engine_response": "1688 r/min, 12.68 kN m, linear: meshes never part. The paper prints no size, pressure, cam, "
+    "pump or firing order; all are assumed (`excitation=engine_v20`, docs/theory/engine_excitation.md), none is tuned. Two "
+    "firing orders: `least_couples` of the crank, the default, and `in_sequence`.",
 }
 TITLES = {
     "geometry": "Teeth and root transition curve",
@@ -118,6 +122,13 @@ TITLES = {
     "line_modes": "Natural frequencies of the whole line",
     "computed_modes": "Natural frequencies, as the paper computed them",
     "measured_modes": "Natural frequencies, as the paper measured them",
+    "fluctuation_computed": "Speed fluctuation, as the paper computed it",
+    "fluctuation_measured": "Speed fluctuation, as the paper measured it",
+    "engine_alone": "Speed fluctuation by the cylinders alone",
+    "ratios": "Pump end against flywheel",
+    "spectrum": "Orders of the largest lines",
+    "tooth_force": "Forces of the pump drive's teeth",
+    "cycle": "The assumed cycle",
 }
 INTRO = """# Validation
 

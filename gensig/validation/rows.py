@@ -26,6 +26,7 @@ SOURCES = (
     "helical_heat_paper",
     "engine_reference",
     "engine_paper",
+    "engine_response",
 )
 REPRODUCED, DIFFERS = "reproduced", "differs"
 HOLDS, FAILS = "claim holds", "claim does not hold"
