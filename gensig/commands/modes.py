@@ -48,9 +48,10 @@ def read_line(config: Mapping[str, Any]) -> DriveLine:
         raise ConfigError(
             f"fault={config['fault']['kind']}: modes are those of sound teeth at mean stiffness; take fault=healthy"
         )
-    if section(config, "system").get("kind") == LINE:
+    kind = section(config, "system").get("kind")
+    if kind == LINE:
         return read_drive_line(config)
-    return drive_line_of_pair(read_system(config))
+    return drive_line_of_pair(read_system(config), str(kind))
 
 
 def modes_content(line: DriveLine, found: Modes) -> dict[str, Any]:

@@ -26,9 +26,9 @@ from gensig.systems.line_rows import (
     rows_of_nodes,
     shaft_of,
 )
+from gensig.systems.pair_machine import PairMachine, Run
 from gensig.systems.registry import read_material, section
 from gensig.systems.shaft_tables import read_gears, read_shafting, shipped_tables
-from gensig.systems.spur_pair import Run, SpurPair
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -110,7 +110,7 @@ def read_drive_line(config: Mapping[str, Any]) -> DriveLine:
     )
 
 
-def drive_line_of_pair(system: SpurPair) -> DriveLine:
+def drive_line_of_pair(system: PairMachine, name: str) -> DriveLine:
     """A single pair, with its motor and load, as the line of two to four nodes that it is; without the soft drive.
 
     The mesh is held at the mean stiffness of sound teeth under the set torque.
@@ -118,23 +118,23 @@ def drive_line_of_pair(system: SpurPair) -> DriveLine:
     dynamics = Run(system=system, faults=()).dynamics()
     pair = system.pair
     sides = (("pinion", pair.pinion, dynamics.pinion, system.motor), ("wheel", pair.wheel, dynamics.wheel, system.load))
-    nodes = [Node(name=name, inertia=body.inertia) for name, _, body, _ in sides]
+    nodes = [Node(name=side, inertia=body.inertia) for side, _, body, _ in sides]
     gears = [
         LineGear(
-            name=name,
+            name=side,
             node=place,
             n_teeth=gear.n_teeth,
             base_radius=gear.base_radius,
             mass=body.mass,
             support=body.support,
         )
-        for place, (name, gear, body, _) in enumerate(sides)
+        for place, (side, gear, body, _) in enumerate(sides)
     ]
     shafts = []
-    for place, (name, (_, _, body, rotor)) in enumerate(zip(("motor", "load"), sides, strict=True)):
+    for place, (rotor_name, (_, _, body, rotor)) in enumerate(zip(("motor", "load"), sides, strict=True)):
         if rotor is not None:
             shafts.append(_coupling(rotor, place, len(nodes), body.inertia))
-            nodes.append(Node(name=name, inertia=rotor.inertia))
+            nodes.append(Node(name=rotor_name, inertia=rotor.inertia))
     mesh = GearMesh(
         driving=0,
         driven=1,
@@ -145,7 +145,7 @@ def drive_line_of_pair(system: SpurPair) -> DriveLine:
     )
     n_teeth = pair.pinion.n_teeth
     return DriveLine(
-        name="spur_pair",
+        name=name,
         line=ShaftLine(nodes=tuple(nodes), shafts=tuple(shafts), gears=tuple(gears), meshes=(mesh,)),
         numbers=tuple(range(1, len(nodes) + 1)),
         pairs=(pair,),

@@ -23,7 +23,7 @@ def lines(machine):
          for lateral in ("false", "true")]
         for name in ("engine_gear_train", "two_stage_gearbox")
     )  # fmt: skip
-    pairs = [drive_line_of_pair(machine(changes)) for changes in ({}, ROTORS)]
+    pairs = [drive_line_of_pair(machine(changes), "pair") for changes in ({}, ROTORS)]
     return dict(zip(LINES, (*engine, *gearbox, *pairs), strict=True))
 
 
@@ -221,7 +221,7 @@ def test_softer_meshes_and_heavier_discs_lower_every_mode(lines):
 def test_the_single_pair_is_the_same_code_with_two_nodes(machine, dynamics_of, rotors):
     """Matrices and frequencies of the line equal those of the pair's equations without their soft drive."""
     system = machine(rotors)
-    dynamics, line = dynamics_of(system), drive_line_of_pair(system)
+    dynamics, line = dynamics_of(system), drive_line_of_pair(system, "pair")
     own, matrices = dynamics.system(), line.matrices()
     places = {
         "pinion": "pinion_rotation",
@@ -255,6 +255,6 @@ def test_the_single_pair_is_the_same_code_with_two_nodes(machine, dynamics_of, r
 
 def test_torsion_alone_of_the_pair_is_its_equivalent_mass_on_the_mesh(machine, dynamics_of):
     dynamics = dynamics_of(machine())
-    found = natural_modes(line_matrices(drive_line_of_pair(machine()).line))
+    found = natural_modes(line_matrices(drive_line_of_pair(machine(), "pair").line))
     expected = np.sqrt(dynamics.mean_mesh_stiffness / dynamics.equivalent_mass) / (2.0 * np.pi)
     assert_allclose(found.frequency, [0.0, expected], rtol=1e-12, atol=0)

@@ -143,7 +143,6 @@ def test_a_spoilt_table_names_row_and_column(tmp_path, capsys, node, column, val
         (["modes", ENGINE, "system.shafting_csv=engine_gears"], "column face_width_mm: unknown"),
         (["modes", ENGINE, "system.viscous_damper_node=99"], "has no such node"),
         (["modes", "fault=crack"], "modes are those of sound teeth"),
-        (["modes", "system=helical_pair"], "system=helical_pair has statics so far"),
         (["modes", "--plot", "modes.txt"], "the name must end in .png"),
         (["generate", ENGINE, "out=never"], "system=engine_gear_train is a drive line from tables"),
         (["plan", ENGINE], "is a drive line from tables"),
