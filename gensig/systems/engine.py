@@ -30,7 +30,6 @@ KEYS = (
     "loads",
     "dynamometer",
 )
-PRESSURES: dict[str, type[WiebeCycle] | type[PressureFile]] = {"wiebe": WiebeCycle, "file": PressureFile}
 
 
 def read_engine(values: Mapping[str, Any]) -> Engine:
@@ -70,11 +69,12 @@ def read_engine(values: Mapping[str, Any]) -> Engine:
 
 
 def _read_pressure(values: Any) -> WiebeCycle | PressureFile:
+    """The cycle, or the file in its place where one is given."""
     _check_group(f"{PLACE}.pressure", values)
-    kind = values.get("kind")
-    if kind not in PRESSURES:
-        raise ConfigError(f"{PLACE}.pressure.kind = {kind!r}; allowed: {', '.join(PRESSURES)}")
-    return read(PRESSURES[kind], {key: one for key, one in values.items() if key != "kind"}, f"{PLACE}.pressure")
+    cycle = read(WiebeCycle, {key: one for key, one in values.items() if key != "file"}, f"{PLACE}.pressure")
+    if values.get("file") is None:
+        return cycle
+    return read(PressureFile, {"file": values["file"]}, f"{PLACE}.pressure")
 
 
 def _read_train(name: str, values: Any) -> ValveTrain:

@@ -114,7 +114,7 @@ def pressure_file(folder, scale=1.0):
     path = folder / "measured.csv"
     table = np.column_stack([np.degrees(found.angle), scale * found.pressure * 1e-6])
     np.savetxt(path, table, delimiter=",", header="crank_angle_deg,pressure_mpa", comments="")
-    return option(pressure={"kind": "file", "file": str(path)}), found
+    return changed("pressure.file", str(path)), found
 
 
 def test_a_measured_pressure_gives_the_torque_back(tmp_path):
@@ -173,7 +173,8 @@ def test_a_torque_below_the_friction_is_refused():
         ("reference.speed_rpm", 0, "excitation.reference: speed_rpm and torque_nm must be positive"),
         ("friction_mean_pressure_mpa", -1, "excitation.friction_mean_pressure_mpa = -1 must not be negative"),
         ("friction_mean_pressure_mpa", "much", "excitation.friction_mean_pressure_mpa = 'much' is not a number"),
-        ("pressure.kind", "otto", "excitation.pressure.kind = 'otto'; allowed: wiebe, file"),
+        ("pressure.file", 3, "excitation.pressure.file = 3 is not text"),
+        ("pressure.kind", "otto", "excitation.pressure: unknown key 'kind'"),
         ("pressure.boost_pressure", 1, "'boost_pressure' has the wrong unit; write it as 'boost_pressure_mpa'"),
         ("kind", "motor", "excitation.kind = 'motor'; allowed: engine"),
         ("sound", 1, "excitation: unknown key 'sound'"),
