@@ -98,9 +98,7 @@ def _find(line: EngineLine, arguments: Namespace) -> Found:
     measured = line.engine.pressure_decides_torque
     torque = None if measured else reference.torque if arguments.torque is None else arguments.torque
     if measured and (arguments.torque is not None or arguments.run is not None):
-        raise ConfigError(
-            "excitation.pressure.kind = file: the pressure decides the torque; leave --torque and --run out"
-        )
+        raise ConfigError("excitation.pressure.file decides the torque; leave --torque and --run out")
     nodes = tuple(arguments.nodes or (line.engine.throw_nodes[0], line.engine.dynamometer.node))
     for node in nodes:
         if node not in ratios:

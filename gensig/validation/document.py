@@ -51,8 +51,8 @@ SOURCE_TEXTS = {
     "in table B1. Variants as above. No inertia or stiffness is fitted: many pairs of changed numbers meet all four "
     "frequencies within 0.01 %, so that a close fit would be no evidence.",
     "engine_response": "1688 r/min, 12.68 kN m, linear: meshes never part. The paper prints no size, pressure, cam, "
-    "pump or firing order; all are assumed (`excitation=engine_v20`, docs/theory/engine_excitation.md), none is tuned. Two "
-    "firing orders: `least_couples` of the crank, the default, and `in_sequence`.",
+    "pump or firing order; all are assumed (`excitation=engine_v20`, docs/theory/engine_excitation.md), none is tuned. "
+    "Two firing orders: `least_couples` of the crank, the default, and `in_sequence`.",
 }
 TITLES = {
     "geometry": "Teeth and root transition curve",
