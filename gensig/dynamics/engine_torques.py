@@ -193,13 +193,15 @@ def engine_torques(
     share = speed / engine.reference.speed
     parts = [*_loads(engine, share), *_valve_torques(engine, speed, n_points)]
     taken = engine.friction_torque - sum(ratios[node] * float(np.mean(row)) for node, row in parts)
-    plungers = partial(_plunger_torques, engine, speed, share, n_points=n_points)
+    one_plunger = partial(_plunger_torque, engine, speed, share, n_points=n_points)
     if isinstance(engine.pressure, PressureFile):
-        pressure, indicated, brake = _measured(engine, torque, taken, plungers, n_points)
+        pressure, indicated, brake = _measured(engine, torque, taken, one_plunger, n_points)
     else:
-        pressure, indicated, brake = _burned(engine, speed, torque, taken, plungers, n_points)
+        pressure, indicated, brake = _burned(engine, speed, torque, taken, one_plunger, n_points)
     volume = _fuel(engine, indicated)
-    parts += [*plungers(volume), (engine.dynamometer.node, np.array(-brake / ratios[engine.dynamometer.node]))]
+    pulses, firing = one_plunger(volume), engine.layout.firing_angles()
+    parts += [(node, delayed(pulses, firing[name])) for name, node in engine.plunger_nodes.items()]
+    parts += [(engine.dynamometer.node, np.array(-brake / ratios[engine.dynamometer.node]))]
     parts += _cylinder_torques(engine, pressure, speed)
     nodes = tuple(sorted({node for node, _ in parts}))
     torques = np.zeros((len(nodes), n_points))
@@ -252,16 +254,12 @@ def _valve_torques(engine: Engine, speed: float, n_points: int) -> list[tuple[in
     return parts
 
 
-def _plunger_torques(
-    engine: Engine, speed: float, speed_share: float, volume: float, *, n_points: int
-) -> list[tuple[int, Array]]:
-    """Torques of the plungers on their nodes, (point,) each."""
+def _plunger_torque(engine: Engine, speed: float, speed_share: float, volume: float, *, n_points: int) -> Array:
+    """Torque of the plunger of a cylinder that fires at crank angle 0 on its node, (point,)."""
     if engine.plunger is None:
-        return []
+        return np.zeros(n_points)
     angle = CAM_RATIO * (cycle_angles(n_points) - engine.plunger.delivery_begin)
-    one = plunger_torque(engine.plunger, angle, CAM_RATIO * speed, volume, speed_share)
-    firing = engine.layout.firing_angles()
-    return [(node, delayed(one, firing[name])) for name, node in engine.plunger_nodes.items()]
+    return plunger_torque(engine.plunger, angle, CAM_RATIO * speed, volume, speed_share)
 
 
 def _cylinder_torques(engine: Engine, pressure: Array, speed: float) -> list[tuple[int, Array]]:
@@ -289,13 +287,13 @@ def _indicated(engine: Engine, pressure: Array) -> float:
     return float(np.mean(torque)) * len(engine.layout.cylinders)
 
 
-def _taken_by(parts: list[tuple[int, Array]]) -> float:
-    """Mean torque at the crank of what turns at camshaft speed, N m."""
-    return -CAM_RATIO * sum(float(np.mean(row)) for _, row in parts)
+def _taken_by(engine: Engine, one_plunger: Array) -> float:
+    """Mean torque of all plungers at the crank, N m."""
+    return -CAM_RATIO * len(engine.plunger_nodes) * float(np.mean(one_plunger))
 
 
 def _measured(
-    engine: Engine, torque: float | None, taken: float, plungers: partial[list[tuple[int, Array]]], n_points: int
+    engine: Engine, torque: float | None, taken: float, one_plunger: partial[Array], n_points: int
 ) -> tuple[Array, float, float]:
     """Pressure, indicated and brake torque with a measured pressure."""
     assert isinstance(engine.pressure, PressureFile)
@@ -305,7 +303,7 @@ def _measured(
         )
     pressure = read_pressure(engine.pressure, n_points)
     indicated = _indicated(engine, pressure)
-    lost = taken + _taken_by(plungers(_fuel(engine, max(indicated, 0.0))))
+    lost = taken + _taken_by(engine, one_plunger(_fuel(engine, max(indicated, 0.0))))
     if not indicated > lost:
         raise ConfigError(
             f"excitation.pressure.file = {engine.pressure.file} gives {indicated:.4g} N m, below the {lost:.4g} N m of "
@@ -319,7 +317,7 @@ def _burned(
     speed: float,
     torque: float | None,
     taken: float,
-    plungers: partial[list[tuple[int, Array]]],
+    one_plunger: partial[Array],
     n_points: int,
 ) -> tuple[Array, float, float]:
     """Pressure, indicated and brake torque with a Wiebe cycle."""
@@ -334,7 +332,7 @@ def _burned(
     motored, fired = wiebe_parts(engine.pressure, engine.cylinder, n_points, power_share)
     indicated = torque + taken
     for _ in range(ROUNDS):
-        before, indicated = indicated, torque + taken + _taken_by(plungers(_fuel(engine, indicated)))
+        before, indicated = indicated, torque + taken + _taken_by(engine, one_plunger(_fuel(engine, indicated)))
         if abs(indicated - before) <= ROUNDING * indicated:
             break
     without, unit_heat = _indicated(engine, motored), _indicated(engine, engine.crankcase_pressure + fired)

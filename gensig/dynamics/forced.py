@@ -10,6 +10,7 @@ from __future__ import annotations
 import math
 from collections.abc import Callable, Iterable, Sequence
 from dataclasses import dataclass
+from functools import lru_cache
 from typing import Protocol
 
 import numpy as np
@@ -291,9 +292,16 @@ def run_of_speeds(
     ]
 
 
+@lru_cache(maxsize=4)
+def _statics(line: LinearLine) -> tuple[Array, Array]:
+    """Eigenvalues and vectors of the stiffness, kept for the next speed."""
+    values, vectors = np.linalg.eigh(line.stiffness)
+    return values, vectors
+
+
 def _mean_twist(line: LinearLine, mean: Array) -> Array:
     """Static deflection under mean torques that balance over the motions which nothing holds."""
-    values, vectors = np.linalg.eigh(line.stiffness)
+    values, vectors = _statics(line)
     held = values > RIGID * values[-1]
     rest = vectors[:, ~held].T @ mean
     if rest.size and np.max(np.abs(rest)) > UNBALANCED * max(float(np.max(np.abs(mean))), 1e-300):
