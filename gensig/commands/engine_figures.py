@@ -101,7 +101,7 @@ def _speeds(axes: Any, line: EngineLine, found: Found) -> None:
         )
     axes.set(title="Speed less its mean", xlabel="crank angle, degrees", ylabel="r/min", xlim=(0, 720))
     axes.set_xticks(range(0, 721, 90))
-    axes.margins(y=0.2)
+    axes.margins(y=0.25)
     axes.legend(loc="upper right", fontsize=8)
 
 
@@ -115,7 +115,7 @@ def _spectra(axes: Any, line: EngineLine, found: Found) -> None:
         axes.plot(hz[shown], amplitude[shown], marker, color=colour, markersize=3, label=_name(line, node))
     axes.set(title="Angular displacement", xlabel="frequency, Hz", ylabel="amplitude, degrees", yscale="log")
     top = np.degrees(np.abs(found.response.angle[:, shown]).max())
-    axes.set_ylim(1e-5 * top, 2.0 * top)
+    axes.set_ylim(1e-5 * top, 30.0 * top)
     axes.legend(fontsize=8)
 
 
