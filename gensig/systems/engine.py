@@ -12,6 +12,7 @@ from gensig.dynamics.engine_torques import Dynamometer, Engine, Load, Reference,
 from gensig.dynamics.firing import Layout
 from gensig.dynamics.injection_pump import Plunger
 from gensig.errors import ConfigError
+from gensig.sensing.toothed_wheel import ToothedWheel
 from gensig.units import read, to_si
 
 PLACE = "excitation"
@@ -29,6 +30,7 @@ KEYS = (
     "injection_pump",
     "loads",
     "dynamometer",
+    "toothed_wheels",
 )
 
 
@@ -66,6 +68,15 @@ def read_engine(values: Mapping[str, Any]) -> Engine:
         loads={name: _read(Load, one, f"loads.{name}", "load") for name, one in _items("loads", values["loads"])},
         dynamometer=read(Dynamometer, values["dynamometer"], f"{PLACE}.dynamometer"),
     )
+
+
+def read_wheels(values: Mapping[str, Any]) -> dict[str, ToothedWheel]:
+    """The toothed wheels of the group ``excitation``, by their names; none where it is null."""
+    _check_group(PLACE, values)
+    return {
+        name: _read(ToothedWheel, one, f"toothed_wheels.{name}", "toothed_wheel")
+        for name, one in _items("toothed_wheels", values.get("toothed_wheels"))
+    }
 
 
 def _read_pressure(values: Any) -> WiebeCycle | PressureFile:

@@ -12,7 +12,7 @@ from gensig.dynamics.engine_cycle import CYCLE
 from gensig.dynamics.engine_torques import engine_torques
 from gensig.dynamics.forced import cycle_orders
 from gensig.errors import ConfigError
-from gensig.systems.engine import read_engine
+from gensig.systems.engine import read_engine, read_wheels
 
 NODES = tuple(ratios())
 THROWS = range(3, 13)
@@ -186,6 +186,17 @@ def test_what_makes_no_engine_is_refused_in_one_line(path, value, message):
     with pytest.raises(ConfigError, match=re.escape(message)) as caught:
         torques_of(changed(path, value))
     assert "\n" not in str(caught.value)
+
+
+def test_toothed_wheels_are_read_by_name():
+    wheels = read_wheels(option())
+    assert {name: wheel.node for name, wheel in wheels.items()} == {"flywheel": 14, "pump_end": 45}
+    assert read_wheels(option(toothed_wheels=None)) == {}
+    with pytest.raises(ConfigError, match=r"excitation\.toothed_wheels\.flywheel\.n_teeth = 2 must lie in 4\.\.1000"):
+        read_wheels(changed("toothed_wheels.flywheel.n_teeth", 2))
+    without_node = {key: one for key, one in option()["toothed_wheels"]["flywheel"].items() if key != "node"}
+    with pytest.raises(ConfigError, match=r"excitation\.toothed_wheels\.flywheel: missing node"):
+        read_wheels(option(toothed_wheels={"flywheel": without_node}))
 
 
 def test_missing_keys_are_named():
