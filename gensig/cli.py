@@ -65,7 +65,7 @@ def _forced_response(parser: argparse.ArgumentParser) -> None:
     _overrides(parser)
     parser.add_argument("--speed", type=float, metavar="RPM", help="of the crank (default: excitation.reference)")
     parser.add_argument("--torque", type=float, metavar="NM", help="brake torque (default: excitation.reference)")
-    parser.add_argument("--nodes", type=int, nargs="+", metavar="N", help="to show (default: first throw, dynamometer)")
+    parser.add_argument("--nodes", type=int, nargs="+", metavar="N", help="to show (default: with toothed wheels)")
     parser.add_argument(
         "--run", type=float, nargs=3, metavar=("LOW", "HIGH", "STEP"), help="waterfall of speeds, r/min"
     )
@@ -258,8 +258,7 @@ VERBS: dict[str, Verb] = {
     ),
     "forced-response": Verb(
         "steady vibration of a drive line under its engine: speed fluctuation, spectra, waterfalls, tooth forces",
-        "gensig forced-response system=engine_gear_train excitation=engine_v20 --nodes 14 45 --run 650 1750 10 "
-        "--plot response.png",
+        "gensig forced-response system=engine_gear_train excitation=engine_v20 --run 650 1750 10 --plot response.png",
         "gensig.commands.forced_response:forced_response",
         _forced_response,
     ),

@@ -26,10 +26,14 @@ RUN_ORDERS = 80  # half orders of a run: up to order 40
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Found:
-    """What the verb writes: the operating point, the steady vibration, the nodes looked at, and the run of speeds."""
+    """What the verb writes: the operating point, the steady vibration, the nodes looked at, and the run of speeds.
+
+    ``seen`` is half the peak to peak of the speed that each toothed wheel shows, rad/s.
+    """
 
     torques: EngineTorques
     response: SteadyResponse
+    seen: dict[str, float]
     nodes: tuple[int, ...]
     run: tuple[Waterfall, ...]
 
@@ -38,8 +42,9 @@ def forced_response(arguments: Namespace) -> int:
     """Speed fluctuation, spectra and tooth forces: JSON, a figure, or a summary."""
     if arguments.plot is not None and Path(arguments.plot).suffix not in FIGURE_TYPES:
         raise ConfigError(f"--plot {arguments.plot}: the name must end in {', '.join(FIGURE_TYPES)}")
-    line = read_engine_line(read_request(arguments.overrides, config_dir=arguments.config_dir).config)
-    found = _find(line, arguments)
+    config = read_request(arguments.overrides, config_dir=arguments.config_dir).config
+    line = read_engine_line(config)
+    found = _find(line, arguments, config["seed"])
     content = response_content(line, found)
     if arguments.json:
         with replaced_file(arguments.json) as path:
@@ -70,6 +75,7 @@ def response_content(line: EngineLine, found: Found) -> dict[str, Any]:
         "nodes": [node.name for node in line.drive.line.nodes],
         "mean_speed_rpm": [line.ratios[number] * from_si("speed_rpm", response.speed) for number in numbers],
         "speed_fluctuation_rpm": from_si("speed_rpm", 1.0) * response.fluctuation()[: len(numbers)],
+        "toothed_wheel_fluctuation_rpm": {name: from_si("speed_rpm", value) for name, value in found.seen.items()},
         "orders": response.orders,
         "shown_nodes": list(found.nodes),
         "angle_deg": np.degrees(np.abs(response.angle[places])),
@@ -92,14 +98,15 @@ def response_content(line: EngineLine, found: Found) -> dict[str, Any]:
     return {key: _plain(value) for key, value in content.items()}
 
 
-def _find(line: EngineLine, arguments: Namespace) -> Found:
+def _find(line: EngineLine, arguments: Namespace, seed: int) -> Found:
     reference, ratios = line.engine.reference, line.ratios
     speed = reference.speed if arguments.speed is None else to_si("speed_rpm", arguments.speed)
     measured = line.engine.pressure_decides_torque
     torque = None if measured else reference.torque if arguments.torque is None else arguments.torque
     if measured and (arguments.torque is not None or arguments.run is not None):
         raise ConfigError("excitation.pressure.file decides the torque; leave --torque and --run out")
-    nodes = tuple(arguments.nodes or (line.engine.throw_nodes[0], line.engine.dynamometer.node))
+    measured_nodes = tuple(wheel.node for wheel in line.wheels.values())
+    nodes = tuple(arguments.nodes or measured_nodes or (line.engine.throw_nodes[0], line.engine.dynamometer.node))
     for node in nodes:
         if node not in ratios:
             raise ConfigError(f"--nodes {node}: the shaft line has no such node; it has {min(ratios)} to {max(ratios)}")
@@ -120,7 +127,9 @@ def _find(line: EngineLine, arguments: Namespace) -> Found:
             places,
             n_orders=RUN_ORDERS,
         )
-    return Found(torques=torques, response=line.response(speed, torque), nodes=nodes, run=tuple(run))
+    response, rng = line.response(speed, torque), np.random.default_rng(seed)
+    seen = {name: 0.5 * float(np.ptp(line.seen_by(wheel, response, rng))) for name, wheel in line.wheels.items()}
+    return Found(torques=torques, response=response, seen=seen, nodes=nodes, run=tuple(run))
 
 
 def _print(content: dict[str, Any]) -> None:
@@ -135,6 +144,8 @@ def _print(content: dict[str, Any]) -> None:
             f"  node {node:>3} {content['nodes'][place]:<34} {content['mean_speed_rpm'][place]:8.1f} r/min "
             f"+- {content['speed_fluctuation_rpm'][place]:.2f}"
         )
+    for name, value in content["toothed_wheel_fluctuation_rpm"].items():
+        print(f"  toothed wheel {name} shows +- {value:.2f} r/min")
     for name, low, mean, high in zip(
         content["meshes"],
         content["least_tooth_force_n"],

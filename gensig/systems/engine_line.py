@@ -9,14 +9,19 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
+from gensig.dynamics.engine_cycle import CYCLE
 from gensig.dynamics.engine_torques import Engine, EngineTorques, engine_torques
-from gensig.dynamics.forced import Elements, LinearLine, SteadyResponse, closed_line, steady_response
+from gensig.dynamics.forced import Elements, LinearLine, SteadyResponse, closed_line, over_cycle, steady_response
 from gensig.errors import ConfigError
-from gensig.systems.engine import read_engine
+from gensig.sensing.toothed_wheel import ToothedWheel, draw_wheel, instantaneous_speed
+from gensig.systems.engine import read_engine, read_wheels
 from gensig.systems.registry import LINE, section
 from gensig.systems.shaft_line import DriveLine, read_drive_line
 
 Array = NDArray[np.float64]
+
+SAMPLES_PER_CYCLE = 7200  # about 100 kHz at 1688 r/min
+SEEN_CYCLES = 6
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -25,6 +30,7 @@ class EngineLine:
 
     drive: DriveLine
     engine: Engine
+    wheels: Mapping[str, ToothedWheel]
 
     @property
     def ratios(self) -> dict[int, float]:
@@ -59,6 +65,15 @@ class EngineLine:
         """Steady vibration at a speed of the crank (rad/s) and a brake torque (N m)."""
         return steady_response(self.linear()[0], self.on_line(self.torques(speed, torque)), speed)
 
+    def seen_by(self, wheel: ToothedWheel, response: SteadyResponse, rng: np.random.Generator) -> Array:
+        """Speed that a toothed wheel of this machine shows, over `SEEN_CYCLES` cycles, (sample,) rad/s."""
+        place = self._place(wheel.node, "toothed_wheels")
+        one = over_cycle(response.angle[place], SAMPLES_PER_CYCLE)
+        crank = CYCLE / SAMPLES_PER_CYCLE * np.arange(SEEN_CYCLES * SAMPLES_PER_CYCLE)
+        angle = np.asarray(self.ratios[wheel.node] * crank + np.tile(one, SEEN_CYCLES), dtype=np.float64)
+        rate = SAMPLES_PER_CYCLE * response.speed / CYCLE
+        return instantaneous_speed(wheel, draw_wheel(rng, wheel), angle, rate)
+
     def _place(self, number: int, key: str) -> int:
         if number not in self.drive.numbers:
             raise ConfigError(f"excitation.{key}: the shaft line has no node {number}")
@@ -77,4 +92,5 @@ def read_engine_line(config: Mapping[str, Any]) -> EngineLine:
         raise ConfigError(f"system.kind = {kind!r} is no drive line; take system=engine_gear_train or shaft_line")
     if config.get("excitation") is None:
         raise ConfigError("no excitation is chosen; take excitation=engine_v20, or your own option of that group")
-    return EngineLine(drive=read_drive_line(config), engine=read_engine(config["excitation"]))
+    values = config["excitation"]
+    return EngineLine(drive=read_drive_line(config), engine=read_engine(values), wheels=read_wheels(values))

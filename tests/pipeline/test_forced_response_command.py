@@ -27,6 +27,9 @@ def test_it_writes_the_response_of_every_node(tmp_path, capsys):
     assert_allclose(content["mean_speed_rpm"][44], 844.0)
     assert np.shape(content["angle_deg"]) == (2, len(content["orders"]))
     assert content["orders"][:3] == [0.5, 1.0, 1.5]
+    seen = content["toothed_wheel_fluctuation_rpm"]
+    assert own[13] < seen["flywheel"] < 1.3 * own[13]  # teeth out of place add to it
+    assert 0.5 * own[44] < seen["pump_end"] < 1.1 * own[44]  # a mean over one spacing loses what 120 teeth cannot hold
     drive = content["meshes"].index("21/45")
     assert content["least_tooth_force_n"][drive] < 0.0 < content["mean_tooth_force_n"][drive]
     printed = capsys.readouterr().out
