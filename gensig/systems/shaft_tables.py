@@ -19,6 +19,7 @@ from gensig.units import UNITS, split_unit, to_si
 EDGE_KINDS = ("shaft", "coupling", "rigid", "gear_mesh")
 TEXT = ("name", "note")  # beginnings of columns that only people read
 MOST_ROWS = 10_000
+LEAST, MOST = 1e-12, 1e15  # SI, of anything but 0
 
 # bare name of a column: the unit that it is shown with, "" for a plain number, None for text
 SHAFTING_COLUMNS: dict[str, str | None] = {
@@ -66,7 +67,10 @@ class TableRow:
             value = math.nan
         if not math.isfinite(value):
             raise ConfigError(f"{self.place(column)}: '{cell}' is no number")
-        return to_si(self.headers[column], value)
+        value = to_si(self.headers[column], value)
+        if value != 0.0 and not LEAST <= abs(value) <= MOST:
+            raise ConfigError(f"{self.place(column)}: {cell} is beyond any machine; check its unit")
+        return value
 
     def positive(self, column: str) -> float | None:
         """A number above 0, None where the cell is empty."""
@@ -140,14 +144,9 @@ def _read(key: str, file: str, columns: Mapping[str, str | None], needed: tuple[
     ]
     if not lines:
         raise ConfigError(f"{table} is empty; its first line names the columns: {', '.join(_shown(columns))}")
-    try:
-        cells = [[cell.strip() for cell in row] for row in csv.reader([line for _, line in lines], strict=True)]
-    except csv.Error as error:
-        raise ConfigError(f"{table}: {error}; give cells between commas, text with commas in double quotes") from None
-    if len(cells) != len(lines):
-        raise ConfigError(f"{table}: a quoted text goes on over several lines; keep every row on one line")
-    if len(cells) > MOST_ROWS:
-        raise ConfigError(f"{table} has {len(cells)} rows; at most {MOST_ROWS} are read")
+    if len(lines) > MOST_ROWS:
+        raise ConfigError(f"{table} has {len(lines)} rows; at most {MOST_ROWS} are read")
+    cells = [_cells(f"{table}, row {number}", line) for number, line in lines]
     names = _header(f"{table}, row {lines[0][0]}", cells[0], columns, needed)
     rows = []
     for (number, _), row in zip(lines[1:], cells[1:], strict=True):
@@ -164,6 +163,16 @@ def _read(key: str, file: str, columns: Mapping[str, str | None], needed: tuple[
     if not rows:
         raise ConfigError(f"{table} has a header and no rows")
     return rows
+
+
+def _cells(place: str, line: str) -> list[str]:
+    try:
+        (row,) = csv.reader([line], strict=True)
+    except csv.Error:
+        raise ConfigError(
+            f"{place}: a double quote is open or out of place; give cells between commas, text with commas in quotes"
+        ) from None
+    return [cell.strip() for cell in row]
 
 
 def _header(place: str, header: list[str], columns: Mapping[str, str | None], needed: tuple[str, ...]) -> list[str]:

@@ -139,7 +139,8 @@ def test_shafts_alone_need_no_gears(line_of):
         ("edge_kind", "name_of_edge", "there is no column edge_kind"),
         ("teeth_from,teeth_to", "teeth_to,teeth_to", "column teeth_to: there are two of it"),
         ("4,fan,0.2,0.5,,,,,,,", "4,fan,0.2", "row 6: 3 cells under 11 column names"),
-        ("4,fan,0.2", '4,"fan,0.2', "give cells between commas"),
+        ("4,fan,0.2", '4,"fan,0.2', "row 6: a double quote is open or out of place"),
+        ("4,fan,0.2", "4,fan,1e300", "row 6 .*column inertia_kg_m2: 1e300 is beyond any machine"),
     ],
 )  # fmt: skip
 def test_a_mistake_in_the_line_names_row_and_column(line_of, old, new, message):
