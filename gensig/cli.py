@@ -68,6 +68,25 @@ def _modes(parser: argparse.ArgumentParser) -> None:
     parser.add_argument("--plot", metavar="FILE", help="write a figure: Campbell diagram and shapes (PNG, SVG or PDF)")
 
 
+def _forced_response(parser: argparse.ArgumentParser) -> None:
+    _overrides(parser)
+    parser.add_argument("--speed", type=float, metavar="RPM", help="of the crank (default: excitation.reference)")
+    parser.add_argument("--torque", type=float, metavar="NM", help="brake torque (default: excitation.reference)")
+    parser.add_argument("--nodes", type=int, nargs="+", metavar="N", help="to show (default: with toothed wheels)")
+    parser.add_argument(
+        "--run", type=float, nargs=3, metavar=("LOW", "HIGH", "STEP"), help="waterfall of speeds, r/min"
+    )
+    parser.add_argument(
+        "--run-torque", type=float, default=0.0, metavar="NM", help="brake torque of the run (default: 0)"
+    )
+    parser.add_argument(
+        "--json",
+        metavar="FILE",
+        help="write speed_fluctuation_rpm, angle_deg by orders, tooth forces, and the run",
+    )
+    parser.add_argument("--plot", metavar="FILE", help="write a figure (PNG, SVG or PDF)")
+
+
 def _modify_flank(parser: argparse.ArgumentParser) -> None:
     _overrides(parser)
     parser.add_argument("--out", required=True, metavar="FILE", help="option to write: DIR/modification/NAME.yaml")
@@ -268,6 +287,12 @@ VERBS: dict[str, Verb] = {
         "  gensig modes system=shaft_line system.shafting_csv=mine.csv system.gears_csv=my_gears.csv",
         "gensig.commands.modes:modes",
         _modes,
+    ),
+    "forced-response": Verb(
+        "steady vibration of a drive line under its engine: speed fluctuation, spectra, waterfalls, tooth forces",
+        "gensig forced-response system=engine_gear_train excitation=engine_v20 --run 650 1750 10 --plot response.png",
+        "gensig.commands.forced_response:forced_response",
+        _forced_response,
     ),
     "twin": Verb(
         "a configuration like a measured healthy machine",

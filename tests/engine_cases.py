@@ -12,10 +12,10 @@ from gensig.dynamics.engine_torques import engine_torques
 from gensig.dynamics.forced import Elements, LinearLine, steady_response
 from gensig.systems.engine import read_engine
 
-ROOT = Path(__file__).resolve().parent
-TABLE = ROOT / "reference" / "data" / "engine_shafting.csv"
-OPTION = ROOT.parent / "configs" / "excitation" / "engine_v20.yaml"
-LOSS = {"shaft": 0.03, "rigid": 0.03, "coupling": 0.15, "gear_mesh": 0.08}
+CONFIGS = Path(__file__).resolve().parents[1] / "configs"
+TABLE = CONFIGS / "tables" / "engine_shafting.csv"
+OPTION = CONFIGS / "excitation" / "engine_v20.yaml"
+LOSS = {"shaft": 0.03, "rigid": 0.0, "coupling": 0.15, "gear_mesh": 0.08}
 DAMPER_STATES = {"as_printed": 1.0, "half_ring": 0.5, "detached": 1e-6}  # of the damper's outer inertia
 RPM = np.pi / 30.0
 SPEED, TORQUE = 1688 * RPM, 12680.0
@@ -32,7 +32,7 @@ def option(**changes):
 @lru_cache(maxsize=1)
 def rows():
     with TABLE.open(encoding="utf-8") as stream:
-        return tuple(csv.DictReader(stream))
+        return tuple(csv.DictReader(line for line in stream if not line.startswith("#")))
 
 
 def ratios():

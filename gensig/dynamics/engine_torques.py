@@ -125,6 +125,11 @@ class Engine:
                 raise ConfigError(f"excitation.{key} = {value * 1e-6:g} must not be negative")
 
     @property
+    def pressure_decides_torque(self) -> bool:
+        """Whether the pressure was measured, so that it says what torque the engine gives."""
+        return isinstance(self.pressure, PressureFile)
+
+    @property
     def friction_torque(self) -> float:
         """Of the whole engine at the crank, N m: mean pressure times swept volume over 4 pi."""
         volume = self.cylinder.swept_volume * len(self.layout.cylinders)

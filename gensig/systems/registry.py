@@ -177,6 +177,11 @@ def read_system(config: Mapping[str, Any]) -> PairMachine:
     """
     kind = section(config, "system").get("kind")
     _refuse_line(config)
+    if config.get("excitation") is not None:
+        raise ConfigError(
+            f"excitation turns a drive line (system=engine_gear_train, gensig forced-response); system={kind} turns "
+            "as operating says, leave excitation out"
+        )
     if kind not in SYSTEMS:
         raise ConfigError(f"system.kind = {kind!r}; allowed: {', '.join((*SYSTEMS, LINE))}")
     return SYSTEMS[kind](config)

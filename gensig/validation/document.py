@@ -19,6 +19,7 @@ SOURCE_TITLES = {
     "engine_paper": "What the paper on the diesel's timing gears prints",
     "wear_reference": "Reference numbers for the wear life",
     "wear_paper": "What the wear-life paper prints and claims",
+    "engine_response": "What the same paper prints of the running engine",
 }
 SOURCE_TEXTS = {
     "spur_reference": "Computed independently of this project (rack geometry, potential-energy method, 2-D finite "
@@ -66,6 +67,9 @@ SOURCE_TEXTS = {
     "wear_paper": "Pan, Zhao, Li & Wang (2012), gears 38/55, 200 N m, 4 pi rad/s, in the paper's setting: one pair, "
     "new flanks, force over the reference radius. The threshold S and the number of intervals N_i are not printed; "
     "hours are taken for the lives, whose unit the paper leaves out.",
+    "engine_response": "1688 r/min, 12.68 kN m, linear: meshes never part. The paper prints no size, pressure, cam, "
+    "pump or firing order; all are assumed (`excitation=engine_v20`, docs/theory/engine_excitation.md), none is tuned. "
+    "Two firing orders: `least_couples` of the crank, the default, and `in_sequence`.",
 }
 TITLES = {
     "geometry": "Teeth and root transition curve",
@@ -166,6 +170,13 @@ TITLES = {
     "wear_radius_paper": "Curvature radius after wear",
     "wear_life_paper": "Lives as printed",
     "wear_fits_paper": "The printed fits as fits of our law",
+    "fluctuation_computed": "Speed fluctuation, as the paper computed it",
+    "fluctuation_measured": "Speed fluctuation, as the paper measured it",
+    "engine_alone": "Speed fluctuation by the cylinders alone",
+    "ratios": "Pump end against flywheel",
+    "spectrum": "Orders of the largest lines",
+    "tooth_force": "Forces of the pump drive's teeth",
+    "cycle": "The assumed cycle",
 }
 INTRO = """# Validation
 

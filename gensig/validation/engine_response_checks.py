@@ -5,16 +5,33 @@ from __future__ import annotations
 import math
 from collections.abc import Callable, Mapping
 from dataclasses import dataclass
-from functools import cached_property
+from functools import cached_property, lru_cache
 
 import numpy as np
 
+from gensig.compose import compose
 from gensig.dynamics.engine_torques import Engine, EngineTorques, engine_torques
 from gensig.dynamics.forced import Elements, LinearLine, SteadyResponse, over_cycle, steady_response
+from gensig.systems.engine_line import read_engine_line
 
 ForcedCheck = Callable[["ForcedCase", str], float]
 
 POINTS = 5760  # of a cycle, over which forces are looked at
+
+
+@lru_cache(maxsize=16)
+def read_forced_case(overrides: tuple[str, ...]) -> ForcedCase:
+    """Compose the engine and its line of a row."""
+    whole = read_engine_line(compose("generate", overrides))
+    line, meshes = whole.linear()
+    return ForcedCase(
+        line=line,
+        meshes=meshes,
+        mesh_names=whole.mesh_names,
+        nodes=whole.drive.numbers,
+        ratios=whole.ratios,
+        engine=whole.engine,
+    )
 
 
 @dataclass(frozen=True, eq=False)

@@ -27,6 +27,7 @@ SOURCES = (
     "engine_root_stress",
     "engine_reference",
     "engine_paper",
+    "engine_response",
     "wear_reference",
     "wear_paper",
 )

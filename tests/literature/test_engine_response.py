@@ -8,63 +8,30 @@ from engine_cases import (
     RPM,
     engine_line,
     option,
-    ratio_of_teeth,
-    ratios,
     response_of,
     with_throws,
 )
+from numpy.testing import assert_allclose
 
-from gensig.dynamics.forced import Elements
-from gensig.systems.engine import read_engine
-from gensig.validation import rows as validation_rows
-from gensig.validation.engine_response_checks import FORCED, ForcedCase
-from gensig.validation.rows import judge, read_rows
+from gensig.validation.engine_response_checks import read_forced_case
 
 FLYWHEEL, CRANK_GEAR, PUMP_GEAR, FAR_END = 13, 2, 44, 64
 BASE_RADIUS = 0.081 * np.cos(np.radians(20.0))  # both gears of the pump drive: 54 teeth, module 3 mm, table 2
-SOURCE = "engine_response"
 
 
-@pytest.fixture
-def source(monkeypatch):
-    monkeypatch.setattr(validation_rows, "SOURCES", (*validation_rows.SOURCES, SOURCE))
-    return read_rows(SOURCE)
-
-
-def case_of(overrides):
-    """The line of plain arrays with the excitation that a row's words choose."""
-    values = option()
-    if "excitation=engine_v20_in_sequence" in overrides:
-        values = with_throws(values, IN_SEQUENCE)
-    for word in overrides:
-        if word.endswith("=null"):
-            values[word.removeprefix("excitation.").removesuffix("=null")] = None
-    line, elements, ends = engine_line("half_ring" if "system.viscous_damper_node=1" in overrides else "as_printed")
-    place = ends.index((21, 45))
-    along = BASE_RADIUS * elements.directions[[place]]  # m along the line of action; ratio 1
-    mesh = Elements(
-        directions=along,
-        stiffness=elements.stiffness[[place]] / BASE_RADIUS**2,
-        loss=elements.loss[[place]] / BASE_RADIUS**2,
+def test_the_table_reader_and_plain_arrays_give_the_same_response():
+    """The tests' own line, from the table's torsional stiffnesses, against the one that the program builds."""
+    case = read_forced_case(("system=engine_gear_train", "excitation=engine_v20"))
+    own = response_of(option())
+    assert_allclose(case.response.fluctuation(), own.fluctuation(), rtol=1e-6)
+    _, elements, ends = engine_line()
+    mean, _ = own.element_forces(elements)
+    drive = ends.index((21, 45))
+    assert_allclose(
+        case.response.element_forces(case.meshes)[0][case.mesh_names.index("21/45")],
+        mean[drive] / BASE_RADIUS,
+        rtol=1e-6,
     )
-    return ForcedCase(
-        line=line,
-        meshes=mesh,
-        mesh_names=("21/45",),
-        nodes=tuple(ratios()),
-        ratios=ratio_of_teeth(),
-        engine=read_engine(values),
-    )
-
-
-def test_printed_response_has_the_declared_verdicts(source):
-    assert {row.quantity for row in source} == set(FORCED)
-    cases = {}
-    for row in source:
-        case = cases.setdefault(row.overrides, case_of(row.overrides))
-        result = judge(row, FORCED[row.quantity](case, row.at))
-        assert result.as_expected, f"{row.id}: {result.computed:g} {row.unit}, {result.verdict}"
-        assert row.reason or result.verdict in ("reproduced", "not printed"), row.id
 
 
 @pytest.mark.parametrize("damper", list(DAMPER_STATES))

@@ -74,6 +74,7 @@ def test_every_quantity_is_used():
         ("wear_per_mesh.band_wheel.A", "wear.wheel.hardness_hbs=190"),
         ("wear_per_mesh.fixed_intervals.50", "wear.rule=band"),
         ("wear_rate.both_flanks.band", "gear.wheel.n_teeth=56"),
+        ("fluctuation_computed.flywheel.in_sequence", "excitation.cylinder.reciprocating_mass_kg=40"),
     ],
 )
 def test_a_wrong_input_differs(row_id, word):
