@@ -18,8 +18,8 @@ from gensig.systems.registry import read_system
 
 SMALL = (
     "experiment=helical", "plan.n_records=10", "plan.n_units=2", "plan.n_gearboxes=2", "operating.duration_s=0.05",
-    "mesh.n_slices=16", "dataset.store_mesh_state=true", "sensing.snr_db=30",
-    "plan.classes=[healthy,crack,pitting,chipped,missing_tooth]", "sensing.channels=[pinion_y,pinion_z,wheel_y,wheel_z]",
+    "mesh.n_slices=16", "dataset.store_mesh_state=true", "sensing.channels=[pinion_y,pinion_z,wheel_y,wheel_z]",
+    "plan.classes=[healthy,crack,pitting,chipped,missing_tooth]", "sensing.snr_db=30",
 )  # fmt: skip
 
 
