@@ -45,9 +45,10 @@ class CrackGrowthOptions:
     start_scatter: float
 
     def __post_init__(self) -> None:
-        for key, low, high in (("coefficient", 0.0, 1e-6), ("exponent", 0.5, 10.0), ("threshold", -1.0, 1e9)):
+        for key, low, high in (("coefficient", 0.0, 1e-6), ("exponent", 0.5, 10.0), ("threshold", -1e-9, 1e9)):
             if not low < getattr(self, key) <= high:
-                raise ConfigError(f"life.crack.{key} = {getattr(self, key):g} must lie above {max(low, 0):g}, to {high:g}")
+                allowed = "must not be negative" if low < 0.0 else f"must lie above 0, to {high:g}"
+                raise ConfigError(f"life.crack.{key} = {getattr(self, key):g}: it {allowed}")
         if not 0.0 < self.width_share <= 1.0:
             raise ConfigError(f"life.crack.width_share = {self.width_share:g} must lie above 0, to 1")
         if self.end_share > DEEPEST:
@@ -55,7 +56,7 @@ class CrackGrowthOptions:
                 f"life.crack.end_share = {self.end_share:g}: cracks are known up to {DEEPEST:g} of the root chord"
             )
         smallest, largest = (self.start_share * factor for factor in (1.0 / self.most, self.most))
-        if not LEAST_DEPTH <= smallest or not largest < self.end_share:
+        if smallest < LEAST_DEPTH or largest >= self.end_share:
             raise ConfigError(
                 f"life.crack.start_share = {self.start_share:g} spreads from {smallest:.3g} to {largest:.3g} among "
                 f"units; it must stay from {LEAST_DEPTH:g} to below end_share = {self.end_share:g}"

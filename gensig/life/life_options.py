@@ -75,9 +75,7 @@ class LifeOptions:
         if self.snapshot_count < 3:
             raise ConfigError(f"life.snapshot_count = {self.snapshot_count}: a life needs 3 snapshots or more")
         if self.snapshot_spacing not in SPACINGS:
-            raise ConfigError(
-                f"life.snapshot_spacing = {self.snapshot_spacing!r}; allowed: {', '.join(SPACINGS)}"
-            )
+            raise ConfigError(f"life.snapshot_spacing = {self.snapshot_spacing!r}; allowed: {', '.join(SPACINGS)}")
         if self.snapshot_every is not None and not (self.snapshot_every > 0.0 and self.snapshot_spacing == "linear"):
             raise ConfigError(
                 f"life.snapshot_every_h = {self.snapshot_every / 3600.0:g} must be positive, and goes with "
@@ -105,7 +103,9 @@ def read_life(life: Mapping[str, Any]) -> LifeOptions:
         own.pop(kind, None)
     drift = own.pop("drift", None) or {}
     if not isinstance(drift, Mapping):
-        raise ConfigError(f"life.drift = {drift!r} must be a group of configuration keys, each with change, time_h and scatter")
+        raise ConfigError(
+            f"life.drift = {drift!r} must be a group of configuration keys, each with change, time_h and scatter"
+        )
     drawn = DrawnBlocks(
         shortest=_hours(own, "block_low_h"),
         longest=_hours(own, "block_high_h"),

@@ -109,7 +109,9 @@ def contact_stress(pair: GearPair, material: Material, torque: float) -> float:
 
     Hertz's largest pressure of the two flanks at the pitch point, the whole load on one pair (ISO 6336-2, sigma_H0).
     """
-    curvature = 1.0 / float(pair.pinion_curvature(pair.pitch_point)) + 1.0 / float(pair.wheel_curvature(pair.pitch_point))
+    curvature = 1.0 / float(pair.pinion_curvature(pair.pitch_point)) + 1.0 / float(
+        pair.wheel_curvature(pair.pitch_point)
+    )
     reduced = material.youngs_modulus / (1.0 - material.poisson_ratio**2)
     load = torque / pair.pinion.base_radius / pair.face_width
     return math.sqrt(load * reduced * curvature / (2.0 * math.pi))
