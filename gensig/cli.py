@@ -65,6 +65,16 @@ def _modify_flank(parser: argparse.ArgumentParser) -> None:
     parser.add_argument("--plot", metavar="FILE", help="write a figure (PNG, SVG or PDF)")
 
 
+def _wear_life(parser: argparse.ArgumentParser) -> None:
+    _overrides(parser)
+    parser.add_argument("--json", metavar="FILE", help="write life, wear, sliding and pressure along the flank")
+    parser.add_argument("--plot", metavar="FILE", help="write a figure (PNG, SVG or PDF)")
+    parser.add_argument("--map", action="store_true", help="lives over torque and speed, and laws fitted to them")
+    parser.add_argument("--torques", type=float, nargs="+", metavar="NM", help="of the map (default: 1/4 to 3/2)")
+    parser.add_argument("--speeds", type=float, nargs="+", metavar="RPM", help="of the map (default: 1/4 to twice)")
+    parser.add_argument("--out", metavar="FILE", help="write the worn flanks as an option: DIR/fault/NAME.yaml")
+
+
 def _simulate(parser: argparse.ArgumentParser) -> None:
     _overrides(parser)
     parser.add_argument("--from", dest="folder", metavar="DIR", help="a record of this data set, made again")
@@ -205,6 +215,13 @@ VERBS: dict[str, Verb] = {
         "--out mine/modification/robust.yaml --plot front.png",
         "gensig.commands.modify:modify_flank",
         _modify_flank,
+    ),
+    "wear-life": Verb(
+        "how long flanks last until they are worn, and what their wear looks like",
+        "gensig wear-life gear=harbin_38_55 wear.threshold_um=50 --json life.json --plot life.png\n"
+        "  gensig wear-life operating.torque_nm=40 --map --out mine/fault/worn.yaml",
+        "gensig.commands.wear:wear_life_verb",
+        _wear_life,
     ),
     "simulate": Verb(
         "one record: signal, spectrum, figure",

@@ -108,7 +108,7 @@ def _with_whole_parts(fault: dict[str, Any], config_dir: str | Path | None) -> d
 
 SECTIONS = (
     "system", "gear", "material", "modification", "fault", "operating", "sensing", "plan", "life", "executor",
-    "mesh", "solver", "quality", "dataset",
+    "mesh", "wear", "solver", "quality", "dataset",
 )  # fmt: skip
 PLAIN_KEYS = ("seed", "out")
 

@@ -30,6 +30,7 @@ FIXED_KEYS = (
     "gear.",
     "system.",
     "modification.",
+    "wear.",
     "mesh.n_slices",
     "mesh.coupling_modules",
     "sensing.sampling_rate_hz",

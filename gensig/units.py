@@ -37,6 +37,7 @@ UNITS: dict[str, tuple[float, str]] = {
     "hz": (1.0, "frequency"),
     "gpa": (1e9, "stress"),
     "mpa": (1e6, "stress"),
+    "hbs": (9.80665e6, "hardness"),  # Brinell with a steel ball, kgf/mm2
     "db": (1.0, "level"),
 }
 

@@ -13,8 +13,8 @@ from gensig.units import unit
 class Drift:
     """One number of the configuration that moves with the running time t as 1 + change (1 - exp(-t / time)).
 
-    ``change`` is its last relative change, log-normal among units with ``scatter``. Assumed: the form, one time constant,
-    and that the drift does not feed back on how damage grows.
+    ``change`` is its last relative change, log-normal among units with ``scatter``. Assumed: the form, one time
+    constant, and that the drift does not feed back on how damage grows.
     """
 
     change: float

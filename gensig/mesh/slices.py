@@ -159,6 +159,43 @@ def pair_positions(mesh: SlicedMesh, roll: Array) -> Array:
     return (roll[:, None] - index * pitch)[:, :, None] - mesh.lag
 
 
+@dataclass(frozen=True, slots=True, kw_only=True, eq=False)
+class ContactPhases:
+    """What every slice of every pair is at given rolls, whatever the force; new gaps are all that wear changes.
+
+    Parameters
+    ----------
+    roll : (phase,) m
+    position, structure, constant, gap, width : (phase, pair, slice), m, m2/N, 1, m, m: see ``SlicedMesh``; ``width`` is
+        that of the slice, less where the field of action cuts it
+    """
+
+    mesh: SlicedMesh
+    roll: Array
+    position: Array
+    structure: Array
+    constant: Array
+    gap: Array
+    width: Array
+
+
+def contact_phases(mesh: SlicedMesh, roll: Array) -> ContactPhases:
+    """Prepare the loaded contact at rolls, (phase,) m; at 0 the first slice of a pair enters at A."""
+    position = pair_positions(mesh, roll)
+    share = np.ones_like(position)
+    if mesh.options.law == "paper":  # elsewhere the corners' gaps tell where contact ends
+        position, share = _cut_by_field(mesh, position)
+    return ContactPhases(
+        mesh=mesh,
+        roll=roll,
+        position=position,
+        structure=np.interp(position, mesh.position, mesh.structure),
+        constant=np.interp(position, mesh.position, mesh.contact_constant),
+        gap=_gaps(mesh, position),
+        width=mesh.slice_width * share,
+    )
+
+
 def loaded_contact(mesh: SlicedMesh, roll: Array, force: float) -> LoadedContact:
     """Load of every slice of every pair under a total force along the transverse line of action.
 
@@ -172,31 +209,32 @@ def loaded_contact(mesh: SlicedMesh, roll: Array, force: float) -> LoadedContact
     ConfigError    for a force that is not positive
     GeometryError    where no slice can touch, or the bearing slices never settle
     """
+    return settled_contact(contact_phases(mesh, roll), force)
+
+
+def settled_contact(phases: ContactPhases, force: float) -> LoadedContact:
+    """The same at rolls that are prepared already."""
     if not force > 0.0:
         raise ConfigError(
             f"the mesh force is {force:g} N and must be positive; give a torque that the pinion drives with"
         )
-    position = pair_positions(mesh, roll)
-    share = np.ones_like(position)
-    if mesh.options.law == "paper":  # elsewhere the corners' gaps tell where contact ends
-        position, share = _cut_by_field(mesh, position)
-    structure = np.interp(position, mesh.position, mesh.structure)
-    constant = np.interp(position, mesh.position, mesh.contact_constant)
-    gap, width = _gaps(mesh, position), mesh.slice_width * share
+    mesh, roll = phases.mesh, phases.roll
     approach, stiffness = np.empty_like(roll), np.empty_like(roll)
-    line_load = np.empty_like(position)
+    line_load = np.empty_like(phases.position)
     length = mesh.slices.coupling_modules * mesh.pair.pinion.normal_module
     coupling = (length / mesh.slice_width) ** 2 if mesh.slices.slice_coupling == "coupled" else 0.0
     n_unsettled = solve_slices(
-        structure, mesh.contact_factor, constant, mesh.log_weight, gap, width, coupling, mesh.shared_compliance,
-        force, force / mesh.pair.face_width, approach, stiffness, line_load,
+        phases.structure, mesh.contact_factor, phases.constant, mesh.log_weight, phases.gap, phases.width, coupling,
+        mesh.shared_compliance, force, force / mesh.pair.face_width, approach, stiffness, line_load,
     )  # fmt: skip
     if n_unsettled or not np.isfinite(approach).all():
         raise GeometryError(
             f"no contact at {int(np.sum(~np.isfinite(approach)))} and no settled one at {n_unsettled} of {len(roll)} "
             f"phases under {force:.4g} N; reduce the modification or raise the torque"
         )
-    return LoadedContact(roll=roll, position=position, approach=approach, stiffness=stiffness, line_load=line_load)
+    return LoadedContact(
+        roll=roll, position=phases.position, approach=approach, stiffness=stiffness, line_load=line_load
+    )
 
 
 def _gaps(mesh: SlicedMesh, position: Array) -> Array:

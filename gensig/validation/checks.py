@@ -14,6 +14,7 @@ from gensig.validation.helical_checks import SLICED, read_sliced_case
 from gensig.validation.mesh_checks import MESH
 from gensig.validation.rows import SOURCES, Result, Row, judge, read_rows
 from gensig.validation.standard_checks import STANDARD
+from gensig.validation.wear_checks import WEAR, read_wear_point
 
 QUANTITIES: dict[str, Check] = {**GEOMETRY, **BODY, **MESH, **FAULT, **STANDARD, **DYNAMICS}
 
@@ -27,6 +28,8 @@ def evaluate(row: Row) -> Result:
     """
     if row.quantity in SLICED:
         return judge(row, SLICED[row.quantity](read_sliced_case(row.overrides), row.at))
+    if row.quantity in WEAR:
+        return judge(row, WEAR[row.quantity](read_wear_point(row.overrides), row.at))
     if row.quantity not in QUANTITIES:
         raise ConfigError(f"{row.origin}.csv, {row.id}: no quantity '{row.quantity}'; see gensig.validation.checks")
     return judge(row, QUANTITIES[row.quantity](read_case(row.overrides), row.at))

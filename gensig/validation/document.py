@@ -14,6 +14,8 @@ SOURCE_TITLES = {
     "helical_reference": "Reference numbers for both helical pairs",
     "helical_error_paper": "What the paper on transmission error and flank modification prints",
     "helical_heat_paper": "What the paper on helical stiffness with temperature prints: cold gears",
+    "wear_reference": "Reference numbers for the wear life",
+    "wear_paper": "What the wear-life paper prints and claims",
 }
 SOURCE_TEXTS = {
     "spur_reference": "Computed independently of this project (rack geometry, potential-energy method, 2-D finite "
@@ -40,6 +42,14 @@ SOURCE_TEXTS = {
     "which the printed contact ratio comes out.",
     "helical_heat_paper": "Gears 40/162, 24.351 kN m; bores of half the pitch radius, an even split of the profile "
     "shift and the rack's rounding are assumed, the paper prints none of them. Hot gears are not computed yet.",
+    "wear_reference": "Computed independently of this project from table 1 of the wear-life paper, whose equations "
+    "(1) to (10) are lost: sliding, pressure, and wear of a mesh by the contact band (Flodin) and by the paper's fixed "
+    "intervals. A is where the wheel's tip meets the pinion's root, C the pitch point, E the pinion's tip. One pair, "
+    "new flanks; `spur`, `full_addendum` and `helical` are what gensig takes by default, with flanks that wear and "
+    "share the load by the loaded mesh.",
+    "wear_paper": "Pan, Zhao, Li & Wang (2012), gears 38/55, 200 N m, 4 pi rad/s, in the paper's setting: one pair, "
+    "new flanks, force over the reference radius. The threshold S and the number of intervals N_i are not printed; "
+    "hours are taken for the lives, whose unit the paper leaves out.",
 }
 TITLES = {
     "geometry": "Teeth and root transition curve",
@@ -106,6 +116,23 @@ TITLES = {
     "printed_error": "Transmission error and line load",
     "printed_schemes": "Tables 3 to 5",
     "cold": "Cold stiffness",
+    "wear_geometry": "Geometry",
+    "wear_sliding": "Sliding",
+    "wear_pressure": "Contact pressure",
+    "wear_per_mesh": "Wear of a mesh",
+    "wear_rate": "Wear of an hour",
+    "wear_exponent": "Exponents of the torque",
+    "wear_step": "Convergence",
+    "wear_life": "Lives that the paper's fits allow",
+    "wear_fits": "Local exponents of the printed fits",
+    "wear_drive": "Contact ratio",
+    "wear_sliding_paper": "Sliding",
+    "wear_pressure_paper": "Contact pressure",
+    "wear_depth_paper": "Wear depth",
+    "wear_step_paper": "The step of the paper's rule",
+    "wear_radius_paper": "Curvature radius after wear",
+    "wear_life_paper": "Lives as printed",
+    "wear_fits_paper": "The printed fits as fits of our law",
 }
 INTRO = """# Validation
 

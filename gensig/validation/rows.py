@@ -18,7 +18,15 @@ from importlib import resources
 
 from gensig.errors import ConfigError
 
-SOURCES = ("spur_reference", "spur_paper", "helical_reference", "helical_error_paper", "helical_heat_paper")
+SOURCES = (
+    "spur_reference",
+    "spur_paper",
+    "helical_reference",
+    "helical_error_paper",
+    "helical_heat_paper",
+    "wear_reference",
+    "wear_paper",
+)
 REPRODUCED, DIFFERS = "reproduced", "differs"
 HOLDS, FAILS = "claim holds", "claim does not hold"
 NOT_PRINTED = "not printed"
@@ -45,6 +53,12 @@ UNITS = {
     "Hz": 1.0,
     "r/min": 0.10471975511965977,
     "m/s2": 1.0,
+    "mm/s": 1e-3,
+    "nm": 1e-9,
+    "ms": 1e-3,
+    "h": 1.0,
+    "um/h": 1e-6,
+    "1/Pa": 1.0,
 }
 
 
