@@ -20,7 +20,9 @@ from gensig.draws import draw_faults, draw_values, fault_sizes, fault_specs
 from gensig.errors import ConfigError
 from gensig.faults.base import faulty_teeth
 from gensig.faults.registry import fault_parts, read_faults
+from gensig.life.life_options import runs_to_failure
 from gensig.life.options import read_wear_options
+from gensig.lives import snapshots
 from gensig.mesh.pair_table import check_teeth
 from gensig.records import signal_shapes
 from gensig.rows import MISSING, Stream, read_seed, record_system, replace_key, stream, whole_number
@@ -69,11 +71,14 @@ def make_plan(config: Mapping[str, Any]) -> Plan:
     ------
     ConfigError    for counts, keys or distributions that cannot be used
     """
+    _check_plan(config)
+    if "wear" in config:  # configurations of earlier data sets have none
+        read_wear_options(config["wear"])
+    if runs_to_failure(config):
+        return _plan_of_lives(config)
     seed, names = read_seed(config), list(config["plan"]["classes"])
     counts = read_counts(config)
     read_system(config).check()
-    if "wear" in config:  # configurations of earlier data sets have none
-        read_wear_options(config["wear"])
     vary, points = config["plan"]["vary"], counts.condition_points
     conditions = draw_values(config, vary, points, stream(seed, Stream.CONDITION), "plan")
     faults = {
@@ -111,6 +116,43 @@ def make_plan(config: Mapping[str, Any]) -> Plan:
     return _as_plan(config, rows)
 
 
+def _plan_of_lives(config: Mapping[str, Any]) -> Plan:
+    """One row a snapshot, life by life; every unit has gears of its own, as they fail only once."""
+    seed, names = read_seed(config), list(config["plan"]["classes"])
+    machine = read_system(config)
+    machine.check()
+    machine.pair.require_continuous_drive()
+    n_gearboxes = read_gearboxes(config, whole_number("plan.n_units", config["plan"]["n_units"], at_least=1))
+    machines: dict[tuple[tuple[str, float], ...], PairMachine] = {}
+    rows: list[dict[str, Any]] = []
+    for look in snapshots(config):
+        drawn = tuple(look.values.items())
+        if drawn not in machines:
+            machines[drawn] = record_system(config, look.values)
+        start = stream(seed, Stream.START, len(rows))
+        rows.append(
+            {
+                "label": look.label,
+                "label_name": names[look.label],
+                "unit_id": f"unit-{look.unit:04d}",
+                "gearbox_id": f"gearbox-{look.unit % n_gearboxes:04d}",
+                "specimen_id": f"specimen-{look.unit:04d}",
+                "condition_id": f"condition-{look.condition:06d}",
+                "repeat": 0,
+                **_row(config, machines[drawn], look.fault, look.values, start, is_checked=look.is_last),
+                **look.columns,
+            }
+        )
+    return _as_plan(config, rows)
+
+
+def read_gearboxes(config: Mapping[str, Any], n_units: int) -> int:
+    """Number of gearboxes, at most one a unit; about the square root of the units where it is not given."""
+    given = config["plan"]["n_gearboxes"]
+    asked = round(math.sqrt(n_units)) if given is None else given
+    return min(n_units, whole_number("plan.n_gearboxes", asked, at_least=1))
+
+
 def read_counts(config: Mapping[str, Any]) -> Counts:
     """Check and work out every count of the plan; a grid's from its levels.
 
@@ -119,19 +161,10 @@ def read_counts(config: Mapping[str, Any]) -> Counts:
     ConfigError    for counts that cannot be used or do not agree
     """
     plan = config["plan"]
-    if odd := sorted(set(plan).symmetric_difference(KEYS)):
-        raise ConfigError(
-            f"plan: {'unknown' if odd[0] in plan else 'missing'} key '{odd[0]}'; it has {', '.join(KEYS)}"
-        )
     n_classes = len(plan["classes"])
     n_units = whole_number("plan.n_units", plan["n_units"], at_least=1)
-    asked = round(math.sqrt(n_units)) if plan["n_gearboxes"] is None else plan["n_gearboxes"]
-    n_gearboxes = min(n_units, whole_number("plan.n_gearboxes", asked, at_least=1))
+    n_gearboxes = read_gearboxes(config, n_units)
     n_repeats = whole_number("plan.n_repeats", plan["n_repeats"], at_least=1)
-    if not isinstance(plan["sham"], bool):
-        raise ConfigError(f"plan.sham = {plan['sham']!r} must be true or false")
-    for key in plan["vary"]:
-        replace_key(copy.deepcopy(dict(config)), key, 0.0)
     per_unit, n_faults = plan["conditions_per_unit"], 1
     if plan["design"] == GRID:
         if per_unit is not None:
@@ -157,6 +190,19 @@ def read_counts(config: Mapping[str, Any]) -> Counts:
         condition_points=points // n_faults,
         fault_points=points % n_faults,
     )
+
+
+def _check_plan(config: Mapping[str, Any]) -> None:
+    """Refuse keys that plans of any kind do not have."""
+    plan = config["plan"]
+    if odd := sorted(set(plan).symmetric_difference(KEYS)):
+        raise ConfigError(
+            f"plan: {'unknown' if odd[0] in plan else 'missing'} key '{odd[0]}'; it has {', '.join(KEYS)}"
+        )
+    if not isinstance(plan["sham"], bool):
+        raise ConfigError(f"plan.sham = {plan['sham']!r} must be true or false")
+    for key in plan["vary"]:
+        replace_key(copy.deepcopy(dict(config)), key, 0.0)
 
 
 def _grid_size(config: Mapping[str, Any]) -> tuple[int, int]:
@@ -213,10 +259,13 @@ def _row(
     fault: dict[str, Any],
     values: dict[str, float],
     start: np.random.Generator,
+    *,
+    is_checked: bool = True,
 ) -> dict[str, Any]:
-    """Columns of one record that follow from its drawn values."""
+    """Columns of one record that follow from its drawn values; the teeth of one with larger faults need no check."""
     applied = read_faults(fault)
-    check_teeth(system.pair, system.material, system.mesh, faulty_teeth(system.pair, applied))
+    if is_checked:
+        check_teeth(system.pair, system.material, system.mesh, faulty_teeth(system.pair, applied))
     parts = fault_parts(fault)
     return {
         "faults_json": json.dumps(parts, separators=(",", ":")),

@@ -175,7 +175,7 @@ def _slope(depth: Array, values: Array) -> Array:
 
 
 def _part_of_face(sizes: Array, face: float, options: CrackGrowthOptions, compliance: Any) -> tuple[Array, Array]:
-    """Width that goes with each depth, (node,) m, and greatest energy release rate over the depth at 1 N, (node,) N/m."""
+    """Width that goes with each depth, (node,) m, and the greatest energy release rate at 1 N, (node,) N/m."""
     from scipy.interpolate import RectBivariateSpline
 
     depths = sizes[::WIDTH_STEP]

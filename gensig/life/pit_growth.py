@@ -78,7 +78,7 @@ class PitGrowth(GrowthLaw):
     area: float
 
     def rate(self, size: Array, torque: float) -> Array:
-        """Damage a turn of the pinion, (size,): Miner's sum (ISO 6336-6), so that a turn counts the same at any size."""
+        """Damage a turn of the pinion, (size,): Miner's sum (ISO 6336-6)."""
         stress = self.stress_at_one * math.sqrt(torque)
         lasting = self.options.cycles * (self.options.strength / stress) ** self.options.exponent
         return np.full(np.shape(size), self.meshes / lasting)
@@ -109,9 +109,8 @@ def contact_stress(pair: GearPair, material: Material, torque: float) -> float:
 
     Hertz's largest pressure of the two flanks at the pitch point, the whole load on one pair (ISO 6336-2, sigma_H0).
     """
-    curvature = 1.0 / float(pair.pinion_curvature(pair.pitch_point)) + 1.0 / float(
-        pair.wheel_curvature(pair.pitch_point)
-    )
+    radii = (pair.pinion_curvature(pair.pitch_point), pair.wheel_curvature(pair.pitch_point))
+    curvature = sum(1.0 / float(radius) for radius in radii)
     reduced = material.youngs_modulus / (1.0 - material.poisson_ratio**2)
     load = torque / pair.pinion.base_radius / pair.face_width
     return math.sqrt(load * reduced * curvature / (2.0 * math.pi))

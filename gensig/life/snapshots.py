@@ -25,14 +25,12 @@ def snapshot_times(course: Course, spacing: str, count: int, every: float | None
     """
     life = float(course.running[-1])
     if every is not None:
-        return np.arange(min(count, int(life / every * (1.0 + 1e-12)) + 1)) * every
+        return every * np.arange(min(count, int(life / every * (1.0 + 1e-12)) + 1), dtype=np.float64)
     if spacing == "logarithmic":
         left = np.geomspace(1.0, LAST_SHARE, count - 1)
         return life * (1.0 - np.concatenate([left, [0.0]]))
     first, last = float(course.size[0]), float(course.size[-1])
     if spacing == "linear" or last <= first:
         return np.linspace(0.0, life, count)
-    rising = np.concatenate([[True], np.diff(course.size) > 0.0])
-    rising[-1] = True
-    found = np.interp(np.linspace(first, last, count), course.size[rising], course.running[rising])
+    found = np.interp(np.linspace(first, last, count), course.size, course.running)
     return np.concatenate([[0.0], found[1:-1], [life]])
