@@ -205,7 +205,9 @@ def _setpoints(config: Mapping[str, Any], options: LifeOptions, n_units: int) ->
     vary = config["plan"]["vary"]
     blocks = options.blocks
     if blocks is not None and (drawn := sorted({SPEED, TORQUE} & set(vary))):
-        raise ConfigError(f"life.blocks gives {drawn[0]} itself, but the plan varies it; leave it out of plan.vary")
+        raise ConfigError(
+            f"life.blocks gives {drawn[0]} itself, but the plan varies it; pin it, or take plan.vary={{}}"
+        )
     given = None if blocks is None else given_history(blocks, options.horizon)
     n_setpoints = options.n_setpoints if given is None else len(given.speed)
     points = np.arange(n_units * n_setpoints)
