@@ -1,5 +1,6 @@
 """Data sets of whole lives: planned from laws, split by lives, the same whatever their shards."""
 
+import copy
 import json
 
 import numpy as np
@@ -78,13 +79,13 @@ def test_the_same_seed_gives_the_same_lives_and_another_seed_others(plan):
 
 
 def test_number_of_unit_and_gearbox_do_not_tell_the_class():
-    plan = planned("plan.n_units=240", "life.snapshot_count=3", "plan.classes=[healthy,crack,distributed_pitting]")
+    plan = planned("plan.n_units=160", "plan.n_gearboxes=2", "life.snapshot_count=3", "plan.classes=[healthy,crack]")
     first = np.array([rows[0] for rows in lives(plan).values()])
     labels = plan.columns["label"][first]
     boxes = np.unique(plan.columns["gearbox_id"][first], return_inverse=True)[1]
-    table = np.array([[np.sum((labels == a) & (boxes == b)) for a in range(3)] for b in range(3)])
-    chi_square = ((table - 240 / 9) ** 2 / (240 / 9)).sum()
-    assert chi_square < 18.5  # 4 degrees of freedom, p = 0.001; dealt in turn it would be 480
+    table = np.array([[np.sum((labels == a) & (boxes == b)) for a in range(2)] for b in range(2)])
+    chi_square = ((table - 40) ** 2 / 40).sum()
+    assert chi_square < 10.8  # 1 degree of freedom, p = 0.001; dealt in turn it would be 160
 
 
 def test_splits_keep_a_life_whole_on_one_side():
@@ -120,7 +121,7 @@ def test_a_healthy_unit_lives_to_the_horizon():
 
 def test_a_drift_moves_the_machine_of_every_class_alike():
     drift = "life.drift={mesh.friction_coefficient: {change: 1.0, time_h: 5, scatter: 0.0}}"
-    plan = planned("plan.classes=[healthy,crack]", "life=crack_growth", f"+{drift}")
+    plan = planned("plan.classes=[healthy,crack]", "life=crack_growth", drift)
     friction, time = plan.columns["params/mesh.friction_coefficient"], plan.columns["life_time_h"]
     assert_allclose(friction[time == 0.0], 0.05)
     assert (friction[time > 300.0] > 0.0999).all()
@@ -137,41 +138,63 @@ def test_a_given_history_is_everybodys():
     assert_allclose(plan.columns["speed_set_rpm"][time >= 5.0], 1500.0)
 
 
+@pytest.fixture(scope="module")
+def lived():
+    return read_request(LIVES).config
+
+
 @pytest.mark.parametrize(
-    ("overrides", "said"),
+    ("key", "value", "said"),
     [
-        (["plan.n_records=8"], r"plan\.n_records = 8"),
-        (["plan.n_repeats=2"], r"plan\.n_repeats=1"),
-        (["plan.design=grid"], "no grid"),
-        (["plan.classes=[crack,missing_tooth]"], "nothing makes missing_tooth grow"),
-        (["life=crack_growth"], "nothing makes distributed_pitting grow"),
-        (["life.horizon_h=0"], r"life\.horizon_h = 0"),
-        (["life.snapshot_count=2"], "3 snapshots"),
-        (["life.snapshot_spacing=often"], "allowed: linear, logarithmic, adaptive"),
-        (["life.snapshot_every_h=1", "life.snapshot_spacing=adaptive"], "goes with"),
-        (["life.block_low_h=9"], "in order"),
-        (["life.gap_chance=1"], r"life\.gap_chance"),
-        (["life.n_setpoints=0"], r"life\.n_setpoints"),
-        (["life.crack.end_share=0.9"], "known up to 0.8"),
-        (["life.crack.start_share=0.6"], "spreads from"),
-        (["life.crack.coefficient=0"], r"life\.crack\.coefficient"),
-        (["life.crack.threshold_mpa_sqrt_m=-1"], "must not be negative"),
-        (["life.crack.width_share=2"], "width_share"),
-        (["life.distributed_pitting.end_share=0.5"], "0.35 or less"),
-        (["life.wear.rate_scatter=-1"], "rate_scatter"),
-        (["life.blocks=[[0, 1, 1800, 90]]"], "pin it, or take plan.vary"),
-        (["+life.drift={mesh.friction: {change: 1, time_h: 5, scatter: 0}}"], "is no key"),
-        (["+life.drift={operating.torque_nm: {change: 1, time_h: 5, scatter: 0}}"], "drawn for each set-point"),
-        (["+life.drift={mesh.friction_coefficient: {change: -2, time_h: 5, scatter: 0}}"], "change = -2"),
-        (["plan.vary={life.horizon_h: {distribution: uniform, low: 1, high: 2}}"], "one value for a whole data set"),
-        (["life=common", "life.crack=3"], "group of keys"),
-        (["+life.colour=red"], "unknown key 'colour'"),
+        ("plan.n_records", 8, r"plan\.n_records = 8"),
+        ("plan.conditions_per_unit", 8, r"plan\.conditions_per_unit = 8"),
+        ("plan.n_repeats", 2, r"plan\.n_repeats=1"),
+        ("plan.design", "grid", "no grid"),
+        ("plan.n_units", 0, r"plan\.n_units"),
+        ("life.crack", None, "nothing makes crack grow"),
+        ("life.kind", "long", r"life\.kind = 'long'"),
+        ("life.horizon_h", 0, r"life\.horizon_h = 0"),
+        ("life.snapshot_count", 2, "3 snapshots"),
+        ("life.snapshot_spacing", "often", "allowed: linear, logarithmic, adaptive"),
+        ("life.snapshot_every_h", -1.0, "must be positive"),
+        ("life.block_low_h", 9, "in order"),
+        ("life.block_low_h", 1e-4, "more than 200,000"),
+        ("life.gap_chance", 1, r"life\.gap_chance"),
+        ("life.gap_chance", "often", r"life\.gap_chance = 'often' is not a number"),
+        ("life.n_setpoints", 0, r"life\.n_setpoints"),
+        ("life.crack.end_share", 0.9, "known up to 0.8"),
+        ("life.crack.start_share", 0.6, "spreads from"),
+        ("life.crack.coefficient", 0.0, r"life\.crack\.coefficient"),
+        ("life.crack.threshold_mpa_sqrt_m", -1.0, "must not be negative"),
+        ("life.crack.width_share", 2.0, "width_share"),
+        ("life.distributed_pitting.end_share", 0.5, "0.35 or less"),
+        ("life.distributed_pitting.strength_mpa", 0.0, "strength"),
+        ("life.wear.rate_scatter", -1.0, "rate_scatter"),
+        ("life.blocks", [[0, 1, 1800, 90]], r"pin it, or take plan\.vary"),
+        ("life.drift", {"mesh.friction": {"change": 1, "time_h": 5, "scatter": 0}}, "is no key"),
+        ("life.drift", {"operating.torque_nm": {"change": 1, "time_h": 5, "scatter": 0}}, "drawn for each set-point"),
+        ("life.drift", {"mesh.damping_ratio": {"change": -2, "time_h": 5, "scatter": 0}}, "change = -2"),
+        ("life.drift", 3, r"life\.drift = 3"),
+        ("plan.vary", {"life.horizon_h": {"distribution": "uniform", "low": 1, "high": 2}}, "a whole data set"),
+        ("life.crack", 3, "group of keys"),
+        ("life.colour", "red", "unknown key 'colour'"),
     ],
 )
-def test_what_makes_no_lives_is_refused_in_one_line(overrides, said):
+def test_what_makes_no_lives_is_refused_in_one_line(lived, key, value, said):
+    config = copy.deepcopy(lived)
+    *parents, leaf = key.split(".")
+    node = config
+    for name in parents:
+        node = node[name]
+    node[leaf] = value
     with pytest.raises(ConfigError, match=said) as caught:
-        planned(*overrides)
+        make_plan(config)
     assert "\n" not in str(caught.value)
+
+
+def test_a_class_that_no_law_makes_grow_is_refused(capsys):
+    assert main(["plan", *LIVES, "plan.classes=[crack,missing_tooth]"]) != 0
+    assert "nothing makes missing_tooth grow" in capsys.readouterr().err
 
 
 def test_snapshots_come_out_the_same_alone_and_together():
