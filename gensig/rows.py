@@ -30,6 +30,8 @@ FIXED_KEYS = (
     "gear.",
     "system.",
     "modification.",
+    "strength.",
+    "heat.",
     "wear.",
     "life.",
     "mesh.n_slices",

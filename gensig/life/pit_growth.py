@@ -123,8 +123,10 @@ def pit_growth(
 
     Raises
     ------
-    ConfigError    for an end that such pits do not reach
+    ConfigError    for helical gears, and an end that such pits do not reach
     """
+    if pair.pinion.helix_angle != 0.0:
+        raise ConfigError("life: pit growth asks for spur gears: its contact stress is that of one spur pair")
     gear = {"pinion": pair.pinion, "wheel": pair.wheel}[pits.gear]
     law = PitGrowth(
         options=options,

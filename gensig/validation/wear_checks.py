@@ -106,7 +106,7 @@ def _rate(point: WearPoint, at: str) -> float:
 
 
 def _life(point: WearPoint, at: str) -> float:
-    return hours(point.life.life, point.speed)
+    return 3600.0 * hours(point.life.life, point.speed)
 
 
 def _intervals_effect(point: WearPoint, at: str) -> float:

@@ -12,7 +12,8 @@ from gensig.life.archard import depth_per_mesh, flank_path, meshes_per_turn
 from gensig.life.options import FlankMaterial, read_wear_options
 from gensig.life.wear_case import wear_case
 from gensig.life.wear_life import wear_life, worn_flanks
-from gensig.mesh.slices import contact_pressure, loaded_contact
+from gensig.mesh.slice_pressure import contact_pressure
+from gensig.mesh.slices import loaded_contact
 from gensig.systems.registry import read_sliced_pair
 from gensig.systems.wear import read_wear_case
 
