@@ -33,6 +33,7 @@ FIXED_KEYS = (
     "strength.",
     "heat.",
     "wear.",
+    "life.",
     "mesh.n_slices",
     "mesh.coupling_modules",
     "sensing.sampling_rate_hz",
@@ -69,6 +70,8 @@ class Stream(IntEnum):
     DROPPED = 15
     TACHO = 16
     HEALTHY_TWIN = 17
+    LIFE = 18
+    LIFE_HISTORY = 19
 
 
 def stream(seed: int, cause: Stream, index: int = 0) -> np.random.Generator:
