@@ -50,6 +50,43 @@ def _stiffness(parser: argparse.ArgumentParser) -> None:
     parser.add_argument("--plot", metavar="FILE", help="write a figure (PNG, SVG or PDF)")
 
 
+def _root_stress(parser: argparse.ArgumentParser) -> None:
+    _stiffness(parser)
+    parser.add_argument(
+        "--stress", type=float, metavar="MPA", help="take the load that gives this root stress instead of the torque"
+    )
+
+
+def _modes(parser: argparse.ArgumentParser) -> None:
+    _overrides(parser)
+    parser.add_argument(
+        "--json",
+        metavar="FILE",
+        help="write all modes: natural_frequencies_hz, damping_ratio, shapes (by degree of freedom, largest 1), "
+        "kinetic_energy_share (by node), mesh_strain_energy_share",
+    )
+    parser.add_argument("--plot", metavar="FILE", help="write a figure: Campbell diagram and shapes (PNG, SVG or PDF)")
+
+
+def _forced_response(parser: argparse.ArgumentParser) -> None:
+    _overrides(parser)
+    parser.add_argument("--speed", type=float, metavar="RPM", help="of the crank (default: excitation.reference)")
+    parser.add_argument("--torque", type=float, metavar="NM", help="brake torque (default: excitation.reference)")
+    parser.add_argument("--nodes", type=int, nargs="+", metavar="N", help="to show (default: with toothed wheels)")
+    parser.add_argument(
+        "--run", type=float, nargs=3, metavar=("LOW", "HIGH", "STEP"), help="waterfall of speeds, r/min"
+    )
+    parser.add_argument(
+        "--run-torque", type=float, default=0.0, metavar="NM", help="brake torque of the run (default: 0)"
+    )
+    parser.add_argument(
+        "--json",
+        metavar="FILE",
+        help="write speed_fluctuation_rpm, angle_deg by orders, tooth forces, and the run",
+    )
+    parser.add_argument("--plot", metavar="FILE", help="write a figure (PNG, SVG or PDF)")
+
+
 def _modify_flank(parser: argparse.ArgumentParser) -> None:
     _overrides(parser)
     parser.add_argument("--out", required=True, metavar="FILE", help="option to write: DIR/modification/NAME.yaml")
@@ -63,6 +100,16 @@ def _modify_flank(parser: argparse.ArgumentParser) -> None:
     parser.add_argument("--seed", type=int, default=0, metavar="N", help="of the search (default: 0)")
     parser.add_argument("--json", metavar="FILE", help="write the front")
     parser.add_argument("--plot", metavar="FILE", help="write a figure (PNG, SVG or PDF)")
+
+
+def _wear_life(parser: argparse.ArgumentParser) -> None:
+    _overrides(parser)
+    parser.add_argument("--json", metavar="FILE", help="write life, wear, sliding and pressure along the flank")
+    parser.add_argument("--plot", metavar="FILE", help="write a figure (PNG, SVG or PDF)")
+    parser.add_argument("--map", action="store_true", help="lives over torque and speed, and laws fitted to them")
+    parser.add_argument("--torques", type=float, nargs="+", metavar="NM", help="of the map (default: 1/4 to 3/2)")
+    parser.add_argument("--speeds", type=float, nargs="+", metavar="RPM", help="of the map (default: 1/4 to twice)")
+    parser.add_argument("--out", metavar="FILE", help="write the worn flanks as an option: DIR/fault/NAME.yaml")
 
 
 def _simulate(parser: argparse.ArgumentParser) -> None:
@@ -206,6 +253,20 @@ VERBS: dict[str, Verb] = {
         "gensig.commands.modify:modify_flank",
         _modify_flank,
     ),
+    "root-stress": Verb(
+        "bending stress at the tooth's root over the mesh, and safety factors",
+        "gensig root-stress gear=engine_pump_drive --stress 349.39 --json root.json --plot root.png\n"
+        "  gensig root-stress system=helical_pair strength.mean_stress_factor=0.7",
+        "gensig.commands.strength:root_stress",
+        _root_stress,
+    ),
+    "wear-life": Verb(
+        "how long flanks last until they are worn, and what their wear looks like",
+        "gensig wear-life gear=harbin_38_55 wear.threshold_um=50 --json life.json --plot life.png\n"
+        "  gensig wear-life operating.torque_nm=40 --map --out mine/fault/worn.yaml",
+        "gensig.commands.wear:wear_life_verb",
+        _wear_life,
+    ),
     "simulate": Verb(
         "one record: signal, spectrum, figure",
         "gensig simulate fault=missing_tooth operating.speed_rpm=1500 --plot missing.png --output missing.csv\n"
@@ -215,9 +276,23 @@ VERBS: dict[str, Verb] = {
     ),
     "stiffness": Verb(
         "mesh stiffness of sound and faulty teeth",
-        "gensig stiffness fault=crack fault.crack_depth_mm=1.5 --json crack.json --plot crack.png",
+        "gensig stiffness fault=crack fault.crack_depth_mm=1.5 --json crack.json --plot crack.png\n"
+        "  gensig stiffness system=helical_pair gear=chongqing_40_162 heat=chongqing_rated --plot hot.png",
         "gensig.commands.physics:stiffness",
         _stiffness,
+    ),
+    "modes": Verb(
+        "natural frequencies, damping, shapes of a pair or of a drive line from tables",
+        "gensig modes system=engine_gear_train --json modes.json --plot modes.png\n"
+        "  gensig modes system=shaft_line system.shafting_csv=mine.csv system.gears_csv=my_gears.csv",
+        "gensig.commands.modes:modes",
+        _modes,
+    ),
+    "forced-response": Verb(
+        "steady vibration of a drive line under its engine: speed fluctuation, spectra, waterfalls, tooth forces",
+        "gensig forced-response system=engine_gear_train excitation=engine_v20 --run 650 1750 10 --plot response.png",
+        "gensig.commands.forced_response:forced_response",
+        _forced_response,
     ),
     "twin": Verb(
         "a configuration like a measured healthy machine",

@@ -107,9 +107,10 @@ def _with_whole_parts(fault: dict[str, Any], config_dir: str | Path | None) -> d
 
 
 SECTIONS = (
-    "system", "gear", "material", "modification", "fault", "operating", "sensing", "plan", "executor",
-    "mesh", "solver", "quality", "dataset",
+    "system", "gear", "material", "strength", "modification", "heat", "fault", "operating", "sensing", "plan",
+    "executor", "mesh", "wear", "solver", "quality", "dataset",
 )  # fmt: skip
+OPTIONAL_SECTIONS = ("excitation",)
 PLAIN_KEYS = ("seed", "out")
 
 
@@ -121,7 +122,7 @@ def _check_shape(config: Mapping[str, Any]) -> None:
                 f"{key} = {config.get(key)!r} must be a group of keys; choose an option or leave it alone"
             )
     for key in config:
-        if key not in SECTIONS + PLAIN_KEYS:
+        if key not in SECTIONS + OPTIONAL_SECTIONS + PLAIN_KEYS:
             raise ConfigError(f"unknown key '{key}'; the configuration has {', '.join(SECTIONS + PLAIN_KEYS)}")
 
 

@@ -34,7 +34,7 @@ from gensig.records import signal_shapes, simulate_records
 from gensig.rows import read_seed
 from gensig.systems.pair_machine import PairMachine
 from gensig.systems.registry import read_system
-from gensig.units import from_si
+from gensig.units import from_si, is_turning
 from gensig.version import __version__
 
 
@@ -262,7 +262,7 @@ def _shaft_sensors(config: Mapping[str, Any], system: PairMachine) -> dict[str, 
 def root_attributes(config: Mapping[str, Any], system: PairMachine) -> dict[str, Any]:
     """What is the same for every record of a data set."""
     pair = system.pair
-    rotation = [name.endswith("rotation") for name in system.sensing.channel_names]
+    rotation = [is_turning(name) for name in system.sensing.channel_names]
     return {
         "generator_version": __version__,
         "sampling_rate_hz": system.sensing.sampling_rate,

@@ -19,6 +19,7 @@ from gensig.dataset.schema import SCALES, SIGNALS
 from gensig.errors import ConfigError
 from gensig.faults.base import faulty_teeth
 from gensig.faults.registry import COMPOUND, fault_parts, read_faults
+from gensig.life.options import read_wear_options
 from gensig.mesh.pair_table import check_teeth
 from gensig.records import signal_shapes
 from gensig.rows import MISSING, Stream, read_seed, record_system, replace_key, stream, whole_number
@@ -71,6 +72,8 @@ def make_plan(config: Mapping[str, Any]) -> Plan:
     seed, names = read_seed(config), list(config["plan"]["classes"])
     counts = read_counts(config)
     read_system(config).check()
+    if "wear" in config:  # configurations of earlier data sets have none
+        read_wear_options(config["wear"])
     conditions = _draw(config, config["plan"]["vary"], counts.condition_points, stream(seed, Stream.CONDITION), "plan")
     faults = {
         name: _draw_faults(config, fault, counts.fault_points, stream(seed, Stream.FAULT, index))

@@ -156,7 +156,7 @@ def _finish(
         signals |= operating_signals(system.operating, sensing.sampling_rate, angle)
     signals |= row_shaft_signals(config, system, row, result if isinstance(result, CleanRecord) else None)
     if config["dataset"]["store_mesh_state"]:
-        signals |= mesh_signals(result.mesh if isinstance(result, CleanRecord) else None, n_samples)
+        signals |= mesh_signals(result.mesh if isinstance(result, CleanRecord) else None, n_samples, system.most_pairs)
     columns = {key: value for key, value in row.items() if key not in ("shard", "row")}
     return Record(signals=signals, values={**columns, **told})
 
@@ -204,7 +204,7 @@ def signal_shapes(config: Mapping[str, Any], system: PairMachine) -> dict[str, t
         shapes |= {"shaft_speed": (n_samples,), "torque_set": (n_samples,)}
     shapes |= {name: (n_samples,) for key, name in SWITCHES.items() if dataset[key]}
     if dataset["store_mesh_state"]:
-        shapes |= {name: values.shape for name, values in mesh_signals(None, n_samples).items()}
+        shapes |= {name: values.shape for name, values in mesh_signals(None, n_samples, system.most_pairs).items()}
     return shapes
 
 

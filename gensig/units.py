@@ -20,9 +20,17 @@ from gensig.errors import ConfigError
 # suffix: (factor to SI, what it measures); longer suffixes first, so that kg_m2 is not read as m2
 UNITS: dict[str, tuple[float, str]] = {
     "kg_m2": (1.0, "moment of inertia"),
+    "w_per_m2k": (1.0, "heat transfer coefficient"),
+    "w_per_mk": (1.0, "thermal conductivity"),
+    "j_per_kgk": (1.0, "specific heat"),
+    "per_k": (1.0, "thermal expansion"),
+    "degc": (1.0, "temperature"),  # degrees Celsius inside too: only differences and tables of steel are asked
     "n_per_m": (1.0, "stiffness"),
     "ns_per_m": (1.0, "damping"),
     "nm_per_rad": (1.0, "torsional stiffness"),
+    "knm_per_rad": (1e3, "torsional stiffness"),
+    "mnm_per_rad": (1e6, "torsional stiffness"),  # mega, as shaft lines print it
+    "nms_per_rad": (1.0, "torsional damping"),
     "mm": (1e-3, "length"),
     "um": (1e-6, "length"),
     "m": (1.0, "length"),
@@ -30,13 +38,18 @@ UNITS: dict[str, tuple[float, str]] = {
     "rad": (1.0, "angle"),
     "rpm": (2.0 * math.pi / 60.0, "speed"),
     "nm": (1.0, "torque"),
+    "n": (1.0, "force"),
     "kg": (1.0, "mass"),
     "s": (1.0, "time"),
     "hz": (1.0, "frequency"),
     "gpa": (1e9, "stress"),
     "mpa": (1e6, "stress"),
+    "hbs": (9.80665e6, "hardness"),  # Brinell with a steel ball, kgf/mm2
     "db": (1.0, "level"),
 }
+
+# how channels end whose acceleration is one of an angle
+TURNING = ("rotation", "tilt_x", "tilt_y")
 
 T = TypeVar("T")
 
@@ -60,6 +73,11 @@ def from_si(name: str, value: float) -> float:
     """SI value in the unit that the suffixed name states."""
     _, suffix = split_unit(name)
     return value if suffix is None else value / UNITS[suffix][0]
+
+
+def is_turning(channel: str) -> bool:
+    """Whether a channel's acceleration is that of an angle, in rad/s2."""
+    return channel.endswith(TURNING)
 
 
 def read(cls: type[T], values: Mapping[str, Any], where: str, **given: Any) -> T:

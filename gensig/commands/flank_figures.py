@@ -20,10 +20,10 @@ Array = NDArray[np.float64]
 def plot_transmission_error(system: SlicedPair, result: TransmissionError, path: Path) -> None:
     """Transmission error over two periods, its orders, load over the flank and load sharing."""
     figure, axes = pyplot.subplots(2, 2, figsize=(11, 7.6), layout="constrained")
-    _error(axes[0, 0], result)
+    _error(axes[0, 0], system, result)
     _orders(axes[0, 1], result)
     _load_map(figure, axes[1, 0], system, result)
-    _sharing(axes[1, 1], result)
+    _sharing(axes[1, 1], system, result)
     figure.suptitle(_title(system))
     save(figure, path)
 
@@ -53,18 +53,26 @@ def plot_front(system: SlicedPair, before: Optimum, chosen: Optimum, front: Sequ
 
 
 def plot_sliced_stiffness(
-    system: SlicedPair, result: TransmissionError, position: Array, single: Array, path: Path
+    system: SlicedPair,
+    result: TransmissionError,
+    position: Array,
+    single: Array,
+    path: Path,
+    *,
+    faulty: Array | None = None,
 ) -> None:
-    """Stiffness of one pair along its way and of the mesh over two periods."""
+    """Stiffness of one pair along its way, faulty too, and of the mesh over two periods or all that see a fault."""
     figure, axes = pyplot.subplots(1, 2, figsize=(11, 4.2), layout="constrained")
-    axes[0].plot(position / system.pair.base_pitch, single / 1e9, color=SOUND)
+    axes[0].plot(position / system.pair.base_pitch, single / 1e9, color=SOUND, label="sound")
+    if faulty is not None:
+        axes[0].plot(position / system.pair.base_pitch, faulty / 1e9, color=COLOURS[1], label="faulty")
+        axes[0].legend()
     axes[0].set(
         title="One pair, slices on the path",
         xlabel="position of the first slice, base pitches",
         ylabel="stiffness, 10$^9$ N/m",
     )
-    phase = np.arange(2 * len(result.error)) / len(result.error)
-    axes[1].plot(phase, np.tile(result.contact.stiffness, 2) / 1e9, color=SOUND)
+    axes[1].plot(*_over_periods(system, result, result.contact.stiffness / 1e9), color=SOUND)
     axes[1].set(title="Mesh", xlabel="mesh periods", ylabel="stiffness, 10$^9$ N/m")
     figure.suptitle(_title(system))
     save(figure, path)
@@ -79,9 +87,15 @@ def _title(system: SlicedPair) -> str:
     )
 
 
-def _error(axes: Any, result: TransmissionError) -> None:
-    phase = np.arange(2 * len(result.error)) / len(result.error)
-    axes.plot(phase, np.tile(result.error, 2) * 1e6, color=SOUND)
+def _over_periods(system: SlicedPair, result: TransmissionError, values: Array) -> tuple[Array, Array]:
+    """Mesh periods of roll and values: one period twice, or all that see a fault."""
+    if result.n_periods > 1:
+        return result.contact.roll / system.pair.base_pitch, values
+    return np.arange(2 * len(values)) / len(values), np.tile(values, 2)
+
+
+def _error(axes: Any, system: SlicedPair, result: TransmissionError) -> None:
+    axes.plot(*_over_periods(system, result, result.error * 1e6), color=SOUND)
     axes.set(
         title=f"Transmission error, {np.ptp(result.error) * 1e6:.3g} um from peak to peak",
         xlabel="mesh periods",
@@ -105,22 +119,29 @@ def _load_map(figure: Any, axes: Any, system: SlicedPair, result: TransmissionEr
     row = np.searchsorted(edges, contact.position / pitch) - 1
     column = np.broadcast_to(np.arange(grid.shape[1]), row.shape)
     inside = (row >= 0) & (row < len(grid))
+    if result.odd_pairs is not None:
+        inside &= ((contact.pair_index >= result.odd_pairs[0]) & (contact.pair_index <= result.odd_pairs[1]))[..., None]
     np.maximum.at(grid, (row[inside], column[inside]), contact.line_load[inside] * 1e-3)
-    half = 0.5e3 * (result.slice_place[1] - result.slice_place[0]) if len(result.slice_place) > 1 else 1.0
-    across = np.append(result.slice_place * 1e3 - half, result.slice_place[-1] * 1e3 + half)
-    image = axes.pcolormesh(across, edges, np.where(grid > 0.0, grid, np.nan), cmap="cividis", vmin=0.0)
+    image = axes.pcolormesh(
+        result.slice_edges * 1e3, edges, np.where(grid > 0.0, grid, np.nan), cmap="cividis", vmin=0.0
+    )
     for end in (0.0, system.pair.transverse_contact_ratio):
         axes.axhline(end, color=GREY, linestyle=":")
+    whose = "the flank (dotted: ends of the path of contact)" if result.odd_pairs is None else "the faulty flanks"
     axes.set(
-        title="Load over the flank (dotted: ends of the path of contact)",
+        title=f"Load over {whose}",
         xlabel="place across the face from the end that enters first, mm",
         ylabel="contact position, base pitches",
     )
     figure.colorbar(image, ax=axes, label="N/mm")
 
 
-def _sharing(axes: Any, result: TransmissionError) -> None:
-    """Share of one pair from its first touch to its last, put together from the pairs of one period."""
+def _sharing(axes: Any, system: SlicedPair, result: TransmissionError) -> None:
+    """Share of one pair from its first touch to its last, put together from the pairs of one period; or of all pairs
+    while a fault is seen."""
+    if result.odd_pairs is not None:
+        _sharing_of_all(axes, system, result)
+        return
     n_phases, n_pairs = result.load_share.shape
     place = (np.arange(n_phases) + 0.5) / n_phases + np.arange(n_pairs)[:, None]
     share = result.load_share.T
@@ -132,3 +153,21 @@ def _sharing(axes: Any, result: TransmissionError) -> None:
         xlim=(-0.5, n_pairs - 1.0),
     )  # fmt: skip
     axes.legend()
+
+
+def _sharing_of_all(axes: Any, system: SlicedPair, result: TransmissionError) -> None:
+    assert result.odd_pairs is not None
+    roll, index = result.contact.roll / system.pair.base_pitch, result.contact.pair_index
+    first, last = result.odd_pairs
+    for pair in range(index.min(), index.max() + 1):
+        share = np.where(index == pair, result.load_share, 0.0).sum(axis=1)
+        followed = (index == pair).any(axis=1) & (share > 0.0)
+        is_odd = first <= pair <= last
+        name = {first: "pair of faulty teeth", first - 1: "sound pairs"}.get(pair)
+        share = np.where(followed, share, np.nan)
+        axes.plot(roll, share, color=COLOURS[1] if is_odd else GREY, zorder=2 + is_odd, label=name)
+    axes.set(
+        title="Load sharing", xlabel="mesh periods; the faulty tooth enters at 0", ylabel="share of the load",
+        xlim=(roll[0], roll[-1]), ylim=(0.0, None),
+    )  # fmt: skip
+    axes.legend(loc="lower left")

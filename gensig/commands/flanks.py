@@ -12,6 +12,7 @@ from typing import Any
 import numpy as np
 
 from gensig.commands.console import one_line_warnings, replaced_file
+from gensig.commands.heat_report import heat_content, heat_report, print_heat
 from gensig.config import read_request
 from gensig.errors import ConfigError
 from gensig.faults.registry import read_faults
@@ -20,6 +21,7 @@ from gensig.systems.sliced_pair import SlicedPair, TransmissionError
 
 FIGURE_TYPES = (".png", ".svg", ".pdf")
 LOST_SHARE = 0.02  # of the bearing field; less is the edge of the reliefs
+LEAST_SHARE = 0.05  # of the highest stiffness of a pair; less is one slice that enters or leaves
 
 
 def transmission_error(arguments: Namespace) -> int:
@@ -28,10 +30,13 @@ def transmission_error(arguments: Namespace) -> int:
         raise ConfigError(f"--plot {arguments.plot}: the name must end in {', '.join(FIGURE_TYPES)}")
     request = read_request(arguments.overrides, config_dir=arguments.config_dir)
     with one_line_warnings("gensig"):
-        system = sound_pair(request.config)
-        result = system.transmission_error()
-        _warn_of_lost_contact(system, result)
+        system, faults = read_sliced_pair(request.config), read_faults(request.config["fault"])
+        sound = system.transmission_error()
+        result = system.transmission_error(faults) if faults else sound
+        _warn_of_lost_contact(system, sound)
     content = transmission_error_content(system, result)
+    if faults:
+        content["fault_adds_um"] = added_um(sound, result)
     if arguments.json:
         _write_json(arguments.json, content)
     if arguments.plot:
@@ -47,7 +52,21 @@ def transmission_error(arguments: Namespace) -> int:
     print(f"mesh orders 1 to 4         {orders} um")
     print(f"largest line load          {content['max_line_load_n_per_mm']:.2f} N/mm")
     print(f"largest contact pressure   {content['max_contact_pressure_mpa']:.1f} MPa")
+    if faults:
+        print(f"mesh periods               {result.n_periods}, the first faulty tooth enters at roll 0")
+        print(f"the fault adds             {_span(content['fault_adds_um'], '.4g')} um")
     return 0
+
+
+def added_um(sound: TransmissionError, faulty: TransmissionError) -> list[float]:
+    """How much more the gears approach with a fault than without, um; ``sound`` is of one mesh period."""
+    return ((faulty.error - np.tile(sound.error, faulty.n_periods)) * 1e6).tolist()
+
+
+def _span(values: list[float], form: str) -> str:
+    """Least and greatest value; what is 0 up to rounding has no sign."""
+    low, high = (0.0 if abs(value) < 1e-9 else value for value in (min(values), max(values)))
+    return f"{low:{form}} .. {high:{form}}"
 
 
 def transmission_error_content(system: SlicedPair, result: TransmissionError) -> dict[str, Any]:
@@ -61,6 +80,7 @@ def transmission_error_content(system: SlicedPair, result: TransmissionError) ->
         "mesh_force_n": system.mesh_force,
         "roll_angle_deg": np.degrees(result.contact.roll / pair.pinion.base_radius).tolist(),
         "transmission_error_um": (error * 1e6).tolist(),
+        "mesh_periods": result.n_periods,
         "mean_um": float(error.mean()) * 1e6,
         "peak_to_peak_um": float(np.ptp(error)) * 1e6,
         "harmonics_um": (result.harmonics * 1e6).tolist(),
@@ -68,6 +88,7 @@ def transmission_error_content(system: SlicedPair, result: TransmissionError) ->
         "max_line_load_n_per_mm": float(result.contact.line_load.max()) * 1e-3,
         "max_contact_pressure_mpa": float(result.pressure.max()) * 1e-6,
         "load_share": result.load_share.tolist(),
+        "pair_index": result.contact.pair_index.tolist(),
         "bearing_share_of_field": result.bearing,
         "slice_place_mm": (result.slice_place * 1e3).tolist(),
         "line_load_n_per_mm": (result.contact.line_load * 1e-3).tolist(),
@@ -78,9 +99,12 @@ def transmission_error_content(system: SlicedPair, result: TransmissionError) ->
 def sliced_stiffness(config: Mapping[str, Any], arguments: Namespace) -> int:
     """``gensig stiffness`` of a pair cut into slices: curves to JSON, a figure, or a summary."""
     with one_line_warnings("gensig"):
-        system = sound_pair(config)
-        result = system.transmission_error()
+        system, faults = read_sliced_pair(config), read_faults(config["fault"])
+        sound = system.transmission_error()
+        result = system.transmission_error(faults) if faults else sound
         position, single = system.single_pair()
+        faulty = system.faulty_pair(faults, position) if faults else None
+        hot = heat_report(config)
     stiffness = result.contact.stiffness
     content = {
         "transverse_contact_ratio": system.pair.transverse_contact_ratio,
@@ -93,28 +117,47 @@ def sliced_stiffness(config: Mapping[str, Any], arguments: Namespace) -> int:
         "mesh_stiffness_n_per_m": stiffness.tolist(),
         "mesh_stiffness_mean_n_per_m": float(stiffness.mean()),
         "mesh_stiffness_kind": "dF/d(approach) at static equilibrium, contact term as a secant",
+        "mesh_periods": result.n_periods,
     }
+    if faulty is not None:
+        content["faulty_pair_stiffness_n_per_m"] = faulty.tolist()
+        content["sound_mesh_stiffness_n_per_m"] = sound.contact.stiffness.tolist()
+    if hot is not None:
+        content["heat"] = heat_content(hot)
     if arguments.json:
         _write_json(arguments.json, content)
     if arguments.plot:
         from gensig.commands.flank_figures import plot_sliced_stiffness
+        from gensig.commands.heat_figures import plot_heat
 
         with replaced_file(arguments.plot) as path:
-            plot_sliced_stiffness(system, result, position, single, path)
+            if hot is None:
+                plot_sliced_stiffness(system, result, position, single, path, faulty=faulty)
+            else:
+                plot_heat(hot, path)
     print(f"contact ratio              {system.pair.transverse_contact_ratio:.4f} transverse, "
           f"{system.pair.overlap_ratio:.4f} overlap, {system.pair.total_contact_ratio:.4f} total")  # fmt: skip
     print(f"mesh stiffness, mean       {stiffness.mean():.4e} N/m")
     print(f"mesh stiffness, range      {stiffness.min():.4e} .. {stiffness.max():.4e} N/m")
     print(f"single pair, highest       {single.max():.4e} N/m")
+    if faulty is not None:
+        lost = 1e2 * (1.0 - stiffness / np.tile(sound.contact.stiffness, result.n_periods))
+        print(f"mesh periods               {result.n_periods}, the first faulty tooth enters at roll 0")
+        print(f"the mesh loses             {_span(lost.tolist(), '.3g')} %")
+        near = single > LEAST_SHARE * single.max()
+        loss = 1e2 * (1.0 - faulty[near] / single[near])
+        print(f"faulty pair loses          {_span(loss.tolist(), '.3g')} %")
+    if hot is not None:
+        print_heat(hot)
     return 0
 
 
 def sound_pair(config: Mapping[str, Any]) -> SlicedPair:
-    """The pair of a configuration; refuses faults, which slices do not know yet."""
+    """The pair of a configuration, for those who look at sound flanks only."""
     if read_faults(config["fault"]):
         raise ConfigError(
-            f"fault={config['fault']['kind']}: the flanks here are sound ones; take fault=healthy, and gensig "
-            f"stiffness with system=spur_pair for faults"
+            f"fault={config['fault']['kind']}: a modification is for sound flanks; take fault=healthy, and gensig "
+            f"transmission-error with that modification and the fault"
         )
     return read_sliced_pair(config)
 
@@ -122,10 +165,10 @@ def sound_pair(config: Mapping[str, Any]) -> SlicedPair:
 def _warn_of_lost_contact(system: SlicedPair, result: TransmissionError) -> None:
     """Say how much of the field of action a modification takes out of contact."""
     lost = 1.0 - result.bearing
-    if system.modification.is_any and lost > LOST_SHARE:
+    if (system.modification.is_any or system.growth is not None) and lost > LOST_SHARE:
         print(
-            f"gensig: WARNING: {lost:.0%} of the field of action carry no load: the modification or the misalignment "
-            f"is deeper than {system.torque:g} N m can close",
+            f"gensig: WARNING: {lost:.0%} of the field of action carry no load: the modification, the misalignment or "
+            f"the unequal growth of hot gears is deeper than {system.torque:g} N m can close",
             file=sys.stderr,
         )
 

@@ -5,23 +5,32 @@ from __future__ import annotations
 import numpy as np
 
 from gensig.dynamics import _layout as layout
-from gensig.dynamics._layout import BASE, CENTER, NOMINAL, at_row
+from gensig.dynamics._layout import BASE, CENTER, NOMINAL, at_row, is_helical
 from gensig.dynamics._vector import inlined, load, spread, store, where_above, width
-from gensig.mesh.pair_table import N_PAIRS
 
-# degrees of freedom of the two gears, the first of every machine
-P_X, P_Y, P_TURN, W_X, W_Y, W_TURN, N_GEARS = range(7)
+# degrees of freedom of the two gears that every machine begins with; helical gears have more behind them
+P_X, P_Y, P_TURN, W_X, W_Y, W_TURN, N_IN_PLANE = range(7)
+N_GEARS = 12
 
 
 @inlined
-def motion(numbers, q, v, work):
+def _n_gears(group):
+    return N_GEARS if is_helical(group) else N_IN_PLANE
+
+
+@inlined
+def motion(group, q, v, work):
     """Approach and its rate, from the rows of a state."""
-    n = width(work)
+    n, numbers = width(work), group.numbers
     pinion_radius, wheel_radius = at_row(numbers, layout.PINION_RADIUS), at_row(numbers, layout.WHEEL_RADIUS)
     approach = pinion_radius * load(work, q + P_TURN * n) - wheel_radius * load(work, q + W_TURN * n)
     rate = pinion_radius * load(work, v + P_TURN * n) - wheel_radius * load(work, v + W_TURN * n)
     approach = at_row(numbers, layout.REST_APPROACH) + (approach - load(work, q + P_Y * n) + load(work, q + W_Y * n))
     rate = rate - load(work, v + P_Y * n) + load(work, v + W_Y * n)
+    for d in range(N_IN_PLANE, _n_gears(group)):
+        reach = load(group.reach, d * n)
+        approach = approach + reach * load(work, q + d * n)
+        rate = rate + reach * load(work, v + d * n)
     return approach, rate
 
 
@@ -70,6 +79,9 @@ def accelerate(group, law, q, v, forces, a, work):
     store(work, a + W_X * n, 0.0 - friction)
     store(work, a + W_Y * n, 0.0 - normal)
     store(work, a + W_TURN * n, at_row(numbers, layout.WHEEL_RADIUS) * normal + moment_w)
+    n_gears = _n_gears(group)
+    for d in range(N_IN_PLANE, n_gears):
+        store(work, a + d * n, 0.0 - load(group.reach, d * n) * normal)
     for d in range(n_dof):
         i = d * n
         pull = load(work, forces + i)
@@ -78,7 +90,7 @@ def accelerate(group, law, q, v, forces, a, work):
             j = group.other_column[k] * n
             pull = pull - load(group.other_stiffness, k * n) * load(work, q + j)
             pull = pull - load(group.other_damping, k * n) * load(work, v + j)
-        if d < N_GEARS:
+        if d < n_gears:
             pull = pull + load(work, a + i)
         store(work, a + i, pull * load(group.inverse_mass, i))
 
@@ -101,7 +113,7 @@ def event(group, first, last, work):
     zero, one = spread(work, 0.0), spread(work, 1.0)
     found = one
     for k in range(first, last):
-        before, after = load(work, (layout.MARGIN + k) * n), load(work, (layout.MARGIN + N_PAIRS + k) * n)
+        before, after = load(work, (layout.MARGIN + k) * n), load(work, (layout.MARGIN + layout.MOST_PAIRS + k) * n)
         share = before / (before - after)
         share = where_above(zero, before * after, share, one)
         found = where_above(found, share, share, found)

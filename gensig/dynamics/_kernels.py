@@ -12,9 +12,9 @@ import numpy as np
 
 from gensig.dynamics import _layout as layout
 from gensig.dynamics._equations import P_TURN, accelerate, event, motion, recenter, set_out
-from gensig.dynamics._layout import AHEAD, BASE, NOMINAL, PART, ROLL, at_row
+from gensig.dynamics._layout import AHEAD, BASE, NOMINAL, PART, ROLL, at_row, is_helical
 from gensig.dynamics._mesh_kernels import mesh_law
-from gensig.dynamics._tables import between, cover, gather
+from gensig.dynamics._tables import beside_between, between, cover, gather
 from gensig.dynamics._vector import (
     any_above,
     compiled,
@@ -27,10 +27,10 @@ from gensig.dynamics._vector import (
     where_above,
     width,
 )
-from gensig.mesh.pair_table import N_PAIRS
 
 RECENTER = 256  # steps after which the drift of the rotations is taken out of them, so that small numbers stay small
 BLOCK = 64  # output samples between two passes of the low-pass: what it reads is still in the cache
+ROUNDS = 20  # in which chords and the deflection they share find each other
 TOGETHER = 4  # samples of the low-pass that are summed side by side; divides BLOCK
 
 
@@ -96,11 +96,11 @@ def integrate(
                 angle[angle_row * n + lane] = wide[NOMINAL * n + lane] + work[now + P_TURN * n + lane]
             if len(seen) > 0:
                 seen_row = angle_row
-                for k in range(N_PAIRS):
+                for k in range(layout.MOST_PAIRS):
                     store(work, (layout.PAIR_FORCE + k) * n, zero)
             angle_row += 1
         speed, gain = load(work, drive), load(work, drive + n)
-        approach, rate = motion(numbers, now, now + size, work)
+        approach, rate = motion(group, now, now + size, work)
         store(work, layout.WITHIN * n, approach + margin)
         turning = radius * (speed + load(work, now + size + P_TURN * n))
         store(work, (AHEAD + end) * n, step * turning)
@@ -108,6 +108,11 @@ def integrate(
             for lane in range(n):
                 if fresh[lane] > 0.0:
                     wide[(ROLL + begin) * n + lane] = wide[BASE * n + lane]
+                    work[layout.LAST_TOTAL * n + lane] = numbers[layout.MEAN_FORCE * n + lane]
+        if is_helical(group):
+            bent = at_row(numbers, layout.SHARED) * load(work, layout.LAST_TOTAL * n)
+            store(work, layout.LOCAL * n, approach + 0.5 * step * rate - bent)
+        if place == first_step:
             gather(group, begin, True, work, wide, near)
         for lane in range(n):
             wide[(ROLL + end) * n + lane] = wide[BASE * n + lane] + work[(AHEAD + end) * n + lane]
@@ -132,16 +137,18 @@ def integrate(
             elif part == 2:
                 source, target, slot_0, h, offset = parted, parted, PART, (1.0 - share) * step, share * step
             between(slot_0, slot_1, layout.MIDDLE, first, last, work)
+            if is_helical(group):
+                beside_between(slot_0, slot_1, layout.MIDDLE, first, last, work)
             half = 0.5 * h
             at, ahead = source, trial_a
             loaded = zero
             for stage in range(4):
                 since = offset + (zero if stage == 0 else h if stage == 3 else half)
                 slot = slot_0 if stage == 0 else slot_1 if stage == 3 else layout.MIDDLE
-                approach, rate = motion(numbers, at, at + size, work)
+                approach, rate = motion(group, at, at + size, work)
                 turned = radius * ((speed + 0.5 * gain * since) * since + (load(work, at + P_TURN * n) - q_0))
                 roll_rate = radius * (speed + gain * since + load(work, at + size + P_TURN * n))
-                rows = layout.MARGIN if stage == 0 else layout.MARGIN + N_PAIRS if stage == 3 else -1
+                rows = layout.MARGIN if stage == 0 else layout.MARGIN + layout.MOST_PAIRS if stage == 3 else -1
                 law = mesh_law(group, first, last, slot, rows, turned, approach, rate, roll_rate, work, wide)
                 accelerate(group, law, at, at + size, forces, a, work)
                 if part == 0:
@@ -154,6 +161,8 @@ def integrate(
                         differs = law[7] - loaded
                         changed = where_above(differs * differs, zero, one, changed)
                         store(work, layout.MOTION * n, approach)
+                        if stage == 3 and is_helical(group):
+                            store(work, layout.LAST_TOTAL * n, load(work, layout.TOTAL * n))
                 if stage == 3:
                     break
                 reach = h if stage == 2 else half
@@ -213,6 +222,9 @@ def integrate(
     if begin == 2:
         for i in range(0, layout.SLOT_ROWS * n, n):
             store(work, layout.SLOT_ROWS * n + i, load(work, 2 * layout.SLOT_ROWS * n + i))
+        for i in range(0, layout.BESIDE_ROWS * n, n):
+            kept = load(work, (layout.BESIDE + 2 * layout.BESIDE_ROWS) * n + i)
+            store(work, (layout.BESIDE + layout.BESIDE_ROWS) * n + i, kept)
         for lane in range(n):
             wide[(ROLL + 1) * n + lane] = wide[(ROLL + 2) * n + lane]
         for k in range(4):
@@ -231,7 +243,7 @@ def tell(seen, row, normal, work, near):
         at = row * layout.N_SEEN * n + lane
         seen[at + layout.SEEN_NEWEST * n] = near[layout.NEWEST * n + lane]
         seen[at + layout.SEEN_FORCE * n] = work[layout.LAW * n + lane]
-        for k in range(N_PAIRS):
+        for k in range(layout.MOST_PAIRS):
             seen[at + (layout.SEEN_PAIRS + k) * n] = work[(layout.PAIR_FORCE + k) * n + lane]
 
 
@@ -308,22 +320,30 @@ def record(
 def law_at(group, motion, work, wide, near, found):
     """Every lane's law at one instant; rows of ``motion`` are roll, approach, its rate, the roll's rate.
 
-    ``found`` takes the rows of the law. For tests: the integrator reads the tables less often.
+    ``found`` takes the rows of the law. For tests: the integrator reads the tables, and chooses chords, less often.
     """
     n = width(work)
     for lane in range(n):
+        near[layout.NEWEST * n + lane] = layout.NOBODY
         wide[BASE * n + lane] = motion[lane]
         wide[(ROLL + 1) * n + lane] = motion[lane]
         work[layout.WITHIN * n + lane] = motion[n + lane] if group.one_sided else 2.0 * layout.FAR
     store(work, (AHEAD + 1) * n, spread(work, 0.0))
-    gather(group, 1, True, work, wide, near)
     spans = layout.SPAN * n
-    law = mesh_law(
-        group, near[spans + 6], near[spans + 7], 1, layout.MARGIN, spread(work, 0.0), load(motion, n),
-        load(motion, 2 * n), load(motion, 3 * n), work, wide,
-    )  # fmt: skip
-    for row in range(layout.N_LAW):
-        store(found, row * n, law[row])
+    store(work, layout.TOTAL * n, spread(work, 0.0))
+    for _ in range(ROUNDS):
+        bent = at_row(group.numbers, layout.SHARED) * load(work, layout.TOTAL * n)
+        store(work, layout.LOCAL * n, load(motion, n) - bent)
+        if not gather(group, 1, True, work, wide, near) and is_helical(group):
+            break
+        law = mesh_law(
+            group, near[spans + 6], near[spans + 7], 1, layout.MARGIN, spread(work, 0.0), load(motion, n),
+            load(motion, 2 * n), load(motion, 3 * n), work, wide,
+        )  # fmt: skip
+        for row in range(layout.N_LAW):
+            store(found, row * n, law[row])
+        if not is_helical(group):
+            break
 
 
 def mean_rows(n_taps, factor):

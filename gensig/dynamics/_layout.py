@@ -8,9 +8,13 @@ from __future__ import annotations
 
 from typing import Any, NamedTuple
 
+from numba.core import types
+from numba.extending import intrinsic
+
 from gensig.dynamics._vector import FOUR, inlined, load, width
 from gensig.mesh.pair_table import N_PAIRS
 
+MOST_PAIRS = 8  # that may be followed at once; spur gears have 4
 # pairs this much further apart than the approach are followed through a step, m: none comes closer as fast
 NEAR = 2e-5
 FAR, YIELDING = 1.0, 1e30  # gap in m and compliance in m/N of a pair that is not there
@@ -19,17 +23,17 @@ FAR_NEAR = 1e-4  # approaches below are asked of the pairs between FIRST_NEAR an
 # rows of Group.numbers
 (
     PINION_RADIUS, WHEEL_RADIUS, PATH, PITCH_POINT, START_CURVATURE, TANGENT_LENGTH, SHARED, DAMPING, FRICTION,
-    PER_FRICTION_WIDTH, PER_SWITCH_WIDTH, BACKLASH, MEAN_FORCE, REST_APPROACH, N_NUMBERS,
-) = range(15)  # fmt: skip
+    PER_FRICTION_WIDTH, PER_SWITCH_WIDTH, BACKLASH, MEAN_FORCE, REST_APPROACH, HALF_LAG, MIDDLE_POINT, N_NUMBERS,
+) = range(17)  # fmt: skip
 # rows of Group.exact, float64 whatever the precision: where pairs stand must not be lost in a long roll
 (
-    EXACT_RADIUS, PITCH, PER_PITCH, NODES_PER_METER, START_ROLL, FIRST_NEAR, LAST_NEAR, N_EXACT,
-) = range(8)  # fmt: skip
+    EXACT_RADIUS, PITCH, PER_PITCH, NODES_PER_METER, START_ROLL, FIRST_NEAR, LAST_NEAR, TABLE_START, N_EXACT,
+) = range(9)  # fmt: skip
 # rows of Group.places
 (
     PINION_TEETH, WHEEL_TEETH, START_PINION, START_WHEEL, PINION_TOOTH, WHEEL_TOOTH, TABLE, STRIDE, LAST_CELL,
-    PINION_ROWS, WHEEL_ROWS, N_PLACES,
-) = range(12)  # fmt: skip
+    PINION_ROWS, WHEEL_ROWS, FIRST_PITCH, FOLLOWED, CHORD_STRIDE, COAST_TABLE, N_PLACES,
+) = range(16)  # fmt: skip
 # rows of a cell of Group.profile
 NOMINAL_ANGLE, NOMINAL_SPEED, NOMINAL_ACCELERATION, TORQUE, TORQUE_SLOPE, N_PROFILE = range(6)
 
@@ -37,28 +41,37 @@ NOMINAL_ANGLE, NOMINAL_SPEED, NOMINAL_ACCELERATION, TORQUE, TORQUE_SLOPE, N_PROF
 OWN, OWN_SLOPE, GAP, GAP_SLOPE, STIFFNESS, POSITION, N_KEPT = range(7)
 COAST, MIDDLE, PART = 0, 3, 4  # slots 1 and 2 take turns as begin and end of a step
 N_SLOTS = 5
-SLOT_ROWS = N_PAIRS * N_KEPT
+SLOT_ROWS = MOST_PAIRS * N_KEPT
 COLUMNS = FOUR  # of a table: compliance, its slope, gap, its slope
 # rows of the scratch behind the slots
 BITE = N_SLOTS * SLOT_ROWS
-MARGIN = BITE + N_PAIRS  # twice N_PAIRS: at the first and at the last stage of a step
-ERROR = MARGIN + 2 * N_PAIRS
-TILT = ERROR + N_PAIRS
-AHEAD = TILT + N_PAIRS  # roll of a slot, less that at the begin of the step
+MARGIN = BITE + MOST_PAIRS  # twice as many: at the first and at the last stage of a step
+ERROR = MARGIN + 2 * MOST_PAIRS
+TILT = ERROR + MOST_PAIRS
+AHEAD = TILT + MOST_PAIRS  # roll of a slot, less that at the begin of the step
 WITHIN = AHEAD + N_SLOTS
 FLAGS = WITHIN + 1
 MOTION = FLAGS + 1  # roll less that at the begin of the step, approach, its rate, the roll's rate
 N_LAW = 8
 LAW = MOTION + 4
 RAW = LAW + N_LAW  # table rows as they are read, lane by lane
-PAIR_FORCE = RAW + N_PAIRS * COLUMNS
-N_MESH = PAIR_FORCE + N_PAIRS
+PAIR_FORCE = RAW + MOST_PAIRS * COLUMNS
+# of chords only: the force that bends what pairs share, the same at the last step's end, the approach less that
+# deflection in the middle of the step, table rows as they are read, and the same by slot and pair
+TOTAL = PAIR_FORCE + MOST_PAIRS
+LAST_TOTAL, LOCAL, RAW_BESIDE = TOTAL + 1, TOTAL + 2, TOTAL + 3
+BESIDE = RAW_BESIDE + MOST_PAIRS * COLUMNS
+LEFT_OUT, LEFT_OUT_SLOPE, TOUCH, TOUCH_SLOPE = range(COLUMNS)
+BESIDE_ROWS = MOST_PAIRS * COLUMNS
+N_MESH = BESIDE + N_SLOTS * BESIDE_ROWS
 # what is told of the mesh at an output sample: the newest pair, the normal force, and that of every pair
-SEEN_NEWEST, SEEN_FORCE, SEEN_PAIRS, N_SEEN = 0, 1, 2, 2 + N_PAIRS
+SEEN_NEWEST, SEEN_FORCE, SEEN_PAIRS, N_SEEN = 0, 1, 2, 2 + MOST_PAIRS
 # rows of the float64 scratch
 BASE, CENTER, NOMINAL, ROLL, N_WIDE = 0, 1, 2, 3, 3 + N_SLOTS
 # rows of the whole numbers of the scratch
-NEWEST, AT_PINION, AT_WHEEL, SPAN, N_COUNTS = 0, 1, 1 + N_PAIRS, 1 + 2 * N_PAIRS, 1 + 2 * N_PAIRS + N_SLOTS
+NEWEST, AT_PINION, AT_WHEEL, CHORD = 0, 1, 1 + MOST_PAIRS, 1 + 2 * MOST_PAIRS
+SPAN = CHORD + MOST_PAIRS
+N_COUNTS = SPAN + N_SLOTS
 NOBODY = -(2**62)
 
 
@@ -67,8 +80,11 @@ class Group(NamedTuple):
 
     ``numbers``, ``exact`` and ``places`` hold rows as named above. ``table`` holds, lane after lane, the pairs of
     distinct teeth (pinion's times wheel's, node, [c, c', g, g']), or where those are many the distinct teeth of the
-    pinion and then those of the wheel, whose ``WHEEL_ROWS`` is then not 0. ``bend`` (lane, 4) is half the distance of
-    nodes where a column is followed by its slope, else 0: values bend between nodes as their slopes say.
+    pinion and then those of the wheel, whose ``WHEEL_ROWS`` is then not 0. Helical pairs have ``n_chords`` of them, one
+    behind the other, ``depth`` (lane, chord) m says from which bite on each holds, and ``beside`` has the places of the
+    table and holds [energy in J that the chord's spring leaves out, its slope, gap of the first touch, its slope].
+    ``n_pairs`` are followed at once. ``bend`` (lane, 4) is half the distance of nodes where a column is followed by its
+    slope, else 0: values bend between nodes as their slopes say.
     ``tooth_row`` is the row of every tooth (-1 for a missing one), ``tooth_error`` its gap in m at the pitch point,
     ``tooth_tilt`` how fast that grows along the path in m/m.
 
@@ -77,20 +93,26 @@ class Group(NamedTuple):
     stays small. K and C stand as diagonals and as rows of what else there is (``other_first`` (dof + 1,),
     ``other_column``). ``set_force`` is f and the mean mesh force, ``force`` the same less what holds the rest; the mean
     mesh force is taken off the mesh force again: large forces and torques balance before they are rounded. ``held`` is
-    K times, and ``carried`` M times, how far each degree of freedom turns with the pinion (``rotation``). ``profile``
-    (cell, 5, lane) tells the nominal motion and the torque, cell ``profile_first`` first.
+    K times, and ``carried`` M times, how far each degree of freedom turns with the pinion (``rotation``). ``reach``
+    (dof, lane) is the gradient of the approach. ``profile`` (cell, 5, lane) tells the nominal motion and the torque,
+    cell ``profile_first`` first.
     """
 
     numbers: Any
     exact: Any
     places: Any
+    n_pairs: int
+    n_chords: int
     table: Any
+    depth: Any
+    beside: Any
     bend: Any
     tooth_row: Any
     tooth_error: Any
     tooth_tilt: Any
     one_sided: bool
     consistent: bool
+    reach: Any
     inverse_mass: Any
     stiffness: Any
     damping: Any
@@ -107,6 +129,30 @@ class Group(NamedTuple):
     profile: Any
     profile_first: int
     cells_per_second: float
+
+
+class HelicalGroup(Group):
+    """Helical gears: a type of its own, so that spur gears are compiled without what these alone need."""
+
+
+_intrinsic: Any = intrinsic
+
+
+@_intrinsic
+def is_helical(typing_context: Any, group: Any) -> Any:
+    """Whether a group is one of helical gears; known when the code is compiled."""
+    answer = issubclass(group.instance_class, HelicalGroup)
+
+    def build(context: Any, builder: Any, sig: Any, args: Any) -> Any:
+        return context.get_constant(types.boolean, answer)
+
+    return types.boolean(group), build
+
+
+@inlined
+def followed(group):
+    """Pairs that are followed at once."""
+    return group.n_pairs if is_helical(group) else N_PAIRS
 
 
 @inlined

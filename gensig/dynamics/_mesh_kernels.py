@@ -11,14 +11,24 @@ from gensig.dynamics._layout import (
     AHEAD,
     BACKLASH,
     BASE,
+    BESIDE,
+    BESIDE_ROWS,
     BITE,
+    COAST_TABLE,
     COLUMNS,
     DAMPING,
+    FIRST_PITCH,
+    FOLLOWED,
     FRICTION,
     GAP,
     GAP_SLOPE,
+    HALF_LAG,
     LAST_CELL,
     LAW,
+    LEFT_OUT,
+    LEFT_OUT_SLOPE,
+    MIDDLE_POINT,
+    MOST_PAIRS,
     MOTION,
     N_KEPT,
     N_LAW,
@@ -41,15 +51,18 @@ from gensig.dynamics._layout import (
     START_WHEEL,
     STIFFNESS,
     STRIDE,
-    TABLE,
+    TABLE_START,
     TANGENT_LENGTH,
+    TOTAL,
+    TOUCH_SLOPE,
     WHEEL_ROWS,
     WHEEL_TEETH,
     WHEEL_TOOTH,
     at_row,
+    is_helical,
 )  # fmt: skip
 from gensig.dynamics._vector import any_above, compiled, inlined, load, spread, store, where_above, width
-from gensig.mesh.pair_table import FIRST_PITCH, N_PAIRS
+from gensig.mesh.pair_table import N_PAIRS
 
 
 @inlined
@@ -75,7 +88,7 @@ def _rubbed(numbers, position, load_of_pair):
 
 
 @inlined
-def _total_load(numbers, first, last, slot, work):
+def _total_load(numbers, rounds, first, last, slot, work):
     """Load of all pairs, and the sum of their stiffnesses; those that the shared deflection lifts off get a bite of 0.
 
     Each that leaves raises the total, so the loop ends after at most as many rounds as there are pairs.
@@ -83,7 +96,7 @@ def _total_load(numbers, first, last, slot, work):
     n = width(work)
     zero, shared = spread(work, 0.0), at_row(numbers, SHARED)
     total, stiffness = zero, zero
-    for _ in range(N_PAIRS):
+    for _ in range(rounds):
         stiffness, force = zero, zero
         for k in range(first, last):
             bite = load(work, (BITE + k) * n)
@@ -103,17 +116,23 @@ def _total_load(numbers, first, last, slot, work):
 
 
 @inlined
-def one_sided_law(numbers, consistent, first, last, slot, margin, ahead, approach, approach_rate, roll_rate, work):
+def one_sided_law(
+    numbers, consistent, helical, first, last, slot, margin, ahead, approach, approach_rate, roll_rate, work
+):  # fmt: skip
     """One-sided contact of the gathered pairs, ``ahead`` m of roll after the instant they were gathered at.
 
     Normal force, friction force, friction moments about pinion and wheel, force on the roll coordinate (energy
     balance), stored energy, power lost in mesh damping, number of loaded pairs; a vector each. Rows ``margin`` take
     how deep every pair bites into the body that the others deflect, negative where it does not, and ``PAIR_FORCE`` its
-    normal force; none if negative.
+    normal force; none if negative. Helical teeth are damped by the gap of their first touch, for those of
+    chords jump from one to the next, and the energy that the springs of chords leave out is stored too.
     """
     n = width(work)
     zero, one = spread(work, 0.0), spread(work, 1.0)
     shared, damping = at_row(numbers, SHARED), at_row(numbers, DAMPING)
+    middle = ahead
+    if helical:
+        middle = ahead - at_row(numbers, HALF_LAG)
     # beyond half the backlash the teeth touch on their back flanks, if at all
     driven = approach + 0.5 * at_row(numbers, BACKLASH)
     for k in range(first, last):
@@ -123,7 +142,8 @@ def one_sided_law(numbers, consistent, first, last, slot, margin, ahead, approac
             store(work, (margin + k) * n, bite)
         bite = where_above(bite, zero, bite, zero)
         store(work, (BITE + k) * n, where_above(driven, zero, bite, zero))
-    total, stiffness = _total_load(numbers, first, last, slot, work)
+    rounds = MOST_PAIRS if helical else N_PAIRS
+    total, stiffness = _total_load(numbers, rounds, first, last, slot, work)
     normal, friction, moment_p, moment_w, along, lost, loaded = zero, zero, zero, zero, zero, zero, zero
     stored = 0.0 - 0.5 * shared * total * total
     for k in range(first, last):
@@ -137,7 +157,10 @@ def one_sided_law(numbers, consistent, first, last, slot, margin, ahead, approac
         slope = load(work, (pair + GAP_SLOPE) * n)
         elastic = (bite - shared * total) * load(work, (pair + STIFFNESS) * n)
         elastic = where_above(bite, zero, elastic, zero)
-        rate = approach_rate - slope * roll_rate
+        felt = slope
+        if helical:
+            felt = load(work, (BESIDE + slot * BESIDE_ROWS + k * COLUMNS + TOUCH_SLOPE) * n)
+        rate = approach_rate - felt * roll_rate
         force = elastic * (1.0 + damping * rate)
         force = where_above(force, zero, force, zero)
         if margin >= 0:
@@ -147,9 +170,23 @@ def one_sided_law(numbers, consistent, first, last, slot, margin, ahead, approac
         stored = stored + elastic * (bite - 0.5 * load(work, (pair + OWN) * n) * elastic)
         lost = lost + (force - elastic) * rate
         along = along + force * slope + 0.5 * elastic * elastic * load(work, (pair + OWN_SLOPE) * n)
-        position = load(work, (pair + POSITION) * n) + ahead
+        position = load(work, (pair + POSITION) * n) + middle
         sliding, moment, reaction = _rubbed(numbers, position, force)
         friction, moment_p, moment_w = friction + sliding, moment_p + moment, moment_w + reaction
+    if helical:
+        store(work, TOTAL * n, total)
+        for k in range(first, last):
+            pair, row = (slot * SLOT_ROWS + k * N_KEPT) * n, (BESIDE + slot * BESIDE_ROWS + k * COLUMNS) * n
+            bite, slope = load(work, (BITE + k) * n), load(work, row + LEFT_OUT_SLOPE * n)
+            left_out = load(work, row + LEFT_OUT * n) + ahead * slope
+            elastic = (bite - shared * total) * load(work, pair + STIFFNESS * n)
+            felt = load(work, row + TOUCH_SLOPE * n)
+            rate = approach_rate - felt * roll_rate
+            force = elastic * (1.0 + damping * rate)
+            damped = where_above(force, zero, force, zero) - elastic
+            turned = damped * (felt - load(work, pair + GAP_SLOPE * n)) - slope
+            stored = stored + where_above(bite, zero, left_out, zero)
+            along = along + where_above(bite, zero, turned, zero)
     if not consistent:
         along = zero
     return normal, friction, moment_p, moment_w, along, stored, lost, loaded
@@ -163,7 +200,8 @@ def papers_law(numbers, first, last, slot, margin, ahead, approach, approach_rat
     """
     n = width(work)
     zero, one = spread(work, 0.0), spread(work, 1.0)
-    shared, damping, path = at_row(numbers, SHARED), at_row(numbers, DAMPING), at_row(numbers, PATH)
+    shared, damping, half_lag = at_row(numbers, SHARED), at_row(numbers, DAMPING), at_row(numbers, HALF_LAG)
+    path = at_row(numbers, PATH) + 2.0 * half_lag
     stiffness, loaded = zero, zero
     for k in range(first, last):
         pair = slot * SLOT_ROWS + k * N_KEPT
@@ -184,7 +222,7 @@ def papers_law(numbers, first, last, slot, margin, ahead, approach, approach_rat
     per_stiffness = where_above(stiffness, zero, 1.0 / where_above(stiffness, zero, stiffness, one), zero)
     friction, moment_p, moment_w = zero, zero, zero
     for k in range(first, last):
-        position = load(work, (slot * SLOT_ROWS + k * N_KEPT + POSITION) * n) + ahead
+        position = load(work, (slot * SLOT_ROWS + k * N_KEPT + POSITION) * n) + (ahead - half_lag)
         part = normal * load(work, (BITE + k) * n) * per_stiffness
         if margin >= 0:
             store(work, (PAIR_FORCE + k) * n, part)
@@ -203,20 +241,21 @@ def coast_law(group, lane, roll, approach, rate, roll_rate, work):
     n = width(work)
     numbers, exact, places, table = group.numbers, group.exact, group.places, group.table
     pitch, shared = exact[PITCH * n + lane], numbers[SHARED * n + lane]
-    mirrored = 2.0 * numbers[PITCH_POINT * n + lane] + 0.5 * pitch - roll
+    mirrored = 2.0 * numbers[MIDDLE_POINT * n + lane] + 0.5 * pitch - roll
     within = -approach - numbers[BACKLASH * n + lane]
-    newest = int(np.floor(mirrored / pitch)) + 1
-    start, stride = places[TABLE * n + lane], places[STRIDE * n + lane]
+    newest = int(np.floor(mirrored / pitch)) - places[FIRST_PITCH * n + lane]
+    start, stride = places[COAST_TABLE * n + lane], places[STRIDE * n + lane]
+    n_pairs = places[FOLLOWED * n + lane] if is_helical(group) else N_PAIRS
     wheel = places[WHEEL_ROWS * n + lane] * stride
     bites = BITE * n + lane
-    for k in range(N_PAIRS):
+    for k in range(n_pairs):
         tooth_p = (places[START_PINION * n + lane] - newest + k) % places[PINION_TEETH * n + lane]
         tooth_w = (places[START_WHEEL * n + lane] - newest + k) % places[WHEEL_TEETH * n + lane]
         there = (
             group.tooth_row[places[PINION_TOOTH * n + lane] + tooth_p] >= 0
             and group.tooth_row[places[WHEEL_TOOTH * n + lane] + tooth_w] >= 0
         )
-        x = (mirrored - (newest - k) * pitch - FIRST_PITCH * pitch) * exact[NODES_PER_METER * n + lane]
+        x = (mirrored - (newest - k) * pitch - exact[TABLE_START * n + lane]) * exact[NODES_PER_METER * n + lane]
         cell = min(max(int(x), 0), places[LAST_CELL * n + lane])
         p = start + cell * COLUMNS
         here = k * N_KEPT * n + lane
@@ -233,21 +272,21 @@ def coast_law(group, lane, roll, approach, rate, roll_rate, work):
         bite = within - work[here + GAP * n]
         work[bites + k * n] = bite if there and bite > 0.0 else 0.0
     total = 0.0
-    for _ in range(N_PAIRS):
+    for _ in range(n_pairs):
         stiffness, force, lifted = 0.0, 0.0, False
-        for k in range(N_PAIRS):
+        for k in range(n_pairs):
             if work[bites + k * n] > 0.0:
                 stiffness += 1.0 / work[(k * N_KEPT + OWN) * n + lane]
                 force += work[bites + k * n] / work[(k * N_KEPT + OWN) * n + lane]
         total = force / (1.0 + shared * stiffness)
-        for k in range(N_PAIRS):
+        for k in range(n_pairs):
             if 0.0 < work[bites + k * n] <= shared * total:
                 work[bites + k * n] = 0.0
                 lifted = True
         if not lifted:
             break
     normal, along, stored, lost, loaded = 0.0, 0.0, -0.5 * shared * total * total, 0.0, 0.0
-    for k in range(N_PAIRS):
+    for k in range(n_pairs):
         bite, here = work[bites + k * n], k * N_KEPT * n + lane
         if bite > 0.0:
             own, slope = work[here + OWN * n], work[here + GAP_SLOPE * n]
@@ -272,7 +311,18 @@ def mesh_law(group, first, last, slot, margin, turned, approach, rate, roll_rate
     ahead = turned - load(work, (AHEAD + slot) * n)
     if group.one_sided:
         law = one_sided_law(
-            numbers, group.consistent, first, last, slot, margin, ahead, approach, rate, roll_rate, work
+            numbers,
+            group.consistent,
+            is_helical(group),
+            first,
+            last,
+            slot,
+            margin,
+            ahead,
+            approach,
+            rate,
+            roll_rate,
+            work,
         )
         play = 0.0 - at_row(numbers, BACKLASH)
         if any_above(play, approach):

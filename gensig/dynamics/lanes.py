@@ -9,6 +9,8 @@ import numpy as np
 from numpy.typing import NDArray
 
 from gensig.dynamics._layout import (
+    COLUMNS,
+    FOLLOWED,
     N_EXACT,
     N_NUMBERS,
     N_PLACES,
@@ -21,10 +23,14 @@ from gensig.dynamics._layout import (
     TORQUE,
     TORQUE_SLOPE,
     Group,
+    HelicalGroup,
 )
 from gensig.dynamics._vector import n_lanes
+from gensig.dynamics.helical import pitches
 from gensig.dynamics.pair import PairDynamics
 from gensig.mesh.pair_table import GearTable, PairTable
+from gensig.mesh.sliced_statics import left_out_energy
+from gensig.mesh.sliced_table import SlicedTable
 
 Array = NDArray[np.float64]
 
@@ -50,15 +56,17 @@ def pack(
     span : s    from when to when the course of speed and torque is needed, where they change
     """
     lanes = fill_lanes(dynamics, precision)
-    tables, rows, steps = zip(*[_table_rows(one.table) for one in lanes], strict=True)
-    sizes = [table.size for table in tables]
+    tables, rows, steps = zip(*[_rows(one.table) for one in lanes], strict=True)
+    sizes, depth = [table[..., :COLUMNS].size for table in tables], _depths(lanes)
     teeth = [len(row) for row in rows]
     numbers, exact = np.empty((N_NUMBERS, len(lanes)), dtype=precision), np.empty((N_EXACT, len(lanes)))
     places = np.empty((N_PLACES, len(lanes)), dtype=np.int64)
     rests = [one.rest() for one in lanes]
     for lane, one in enumerate(lanes):
         numbers[:, lane], exact[:, lane] = one.numbers(step, rests[lane]), one.exact_numbers()
-        first_tooth, n_nodes = sum(teeth[:lane]), tables[lane].shape[1]
+        first_tooth, (_, n_chords, n_nodes, _) = sum(teeth[:lane]), tables[lane].shape
+        first_table, per_chord = sum(sizes[:lane]), n_nodes * COLUMNS
+        first_pitch, last_pitch = pitches(one.table)
         n_pinion = one.table.pair.pinion.n_teeth
         places[:, lane] = (
             n_pinion,
@@ -67,10 +75,14 @@ def pack(
             one.start_tooth_wheel,
             first_tooth,
             first_tooth + n_pinion,
-            sum(sizes[:lane]),
-            n_nodes * tables[lane].shape[2],
+            first_table,
+            n_chords * per_chord,
             n_nodes - 2,
             *steps[lane],
+            first_pitch,
+            last_pitch - first_pitch,
+            per_chord,
+            first_table + per_chord * (one.table.set_chord if isinstance(one.table, SlicedTable) else 0),
         )
     systems = [one.system() for one in lanes]
     stiffness = np.stack([system.stiffness for system in systems])
@@ -90,17 +102,23 @@ def pack(
         [system.force - one.mesh_force * one.approach_direction() for system, one in zip(systems, lanes, strict=True)]
     )
     options = lanes[0].table.options
-    return Group(
+    kind = HelicalGroup if lanes[0].is_helical else Group
+    return kind(
         numbers=numbers.ravel(),
         exact=exact.ravel(),
         places=places.ravel(),
-        table=np.concatenate([table.ravel() for table in tables]).astype(precision),
+        n_pairs=int(places[FOLLOWED].max()),
+        n_chords=len(depth[0]),
+        table=np.concatenate([table[..., :COLUMNS].ravel() for table in tables]).astype(precision),
+        depth=depth.astype(precision).ravel(),
+        beside=np.concatenate([table[..., COLUMNS:].ravel() for table in tables]).astype(precision),
         bend=np.outer(0.5 / exact[NODES_PER_METER], [1.0, 0.0, 1.0, 0.0]).astype(precision).ravel(),
         tooth_row=np.concatenate(rows),
         tooth_error=np.concatenate([error for one in lanes for error in (one.pinion_error, one.wheel_error)]),
         tooth_tilt=np.concatenate([tilt for one in lanes for tilt in (one.pinion_tilt, one.wheel_tilt)]),
         one_sided=options.law == "one_sided",
         consistent=options.roll_torque == "consistent",
+        reach=side_by_side(np.stack([one.approach_direction() for one in lanes])),
         inverse_mass=side_by_side(1.0 / mass),
         stiffness=side_by_side(stiffness[:, diagonal, diagonal]),
         damping=side_by_side(damping[:, diagonal, diagonal]),
@@ -144,6 +162,34 @@ def _nominal(lanes: Sequence[PairDynamics], span: tuple[float, float]) -> tuple[
         profile[:, NOMINAL_ACCELERATION, lane] = gain
         profile[:, TORQUE, lane], profile[:, TORQUE_SLOPE, lane] = nominal.torque_factor[:-1], slope
     return profile.ravel(), first, CELLS_PER_SECOND
+
+
+def _depths(lanes: Sequence[PairDynamics]) -> Array:
+    """Bites from which on chords hold, (lane, chord) m, infinite for those that a lane has not."""
+    own = [one.table.depth if isinstance(one.table, SlicedTable) else np.zeros(1) for one in lanes]
+    depth = np.full((len(lanes), max(len(values) for values in own)), np.inf)
+    for row, values in zip(depth, own, strict=True):
+        row[: len(values)] = values
+    return depth
+
+
+def _rows(table: PairTable | SlicedTable) -> tuple[Array, NDArray[np.int64], tuple[int, int]]:
+    """As ``_table_rows``, rows (row, chord, node, column); behind the columns of helical teeth what stands
+    beside them."""
+    if isinstance(table, PairTable):
+        rows, row, steps = _table_rows(table)
+        return rows[:, None], row, steps
+    (pinion, pinion_row), (wheel, wheel_row) = (
+        np.unique(kind, return_inverse=True) for kind in (table.pinion_kind, table.wheel_kind)
+    )
+    touch = [np.broadcast_to(value[:, :, :1], value.shape) for value in (table.gap, table.gap_slope)]
+    values = [table.compliance, table.compliance_slope, table.gap, table.gap_slope, *left_out_energy(table), *touch]
+    pairs = np.stack([value[np.ix_(pinion, wheel)].reshape(-1, *value.shape[2:]) for value in values], axis=-1)
+    if pinion[0] != 0 or wheel[0] != 0:  # back flanks are those of sound teeth
+        pairs = np.concatenate([np.stack([value[0, 0] for value in values], axis=-1)[None], pairs])
+        wheel_row = wheel_row + 1
+    sides = ((table.pinion_kind, table.pinion_present, pinion_row), (table.wheel_kind, table.wheel_present, wheel_row))
+    return pairs, np.concatenate([np.where(present[kind], row, -1) for kind, present, row in sides]), (len(wheel), 0)
 
 
 def _columns(side: GearTable) -> Array:

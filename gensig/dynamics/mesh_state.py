@@ -9,8 +9,8 @@ import numpy as np
 from numpy.typing import NDArray
 
 from gensig.dynamics._layout import N_SEEN, SEEN_FORCE, SEEN_NEWEST, SEEN_PAIRS
+from gensig.dynamics.helical import half_lag, pitches
 from gensig.dynamics.pair import PairDynamics
-from gensig.mesh.pair_table import N_PAIRS
 
 Array = NDArray[np.float64]
 
@@ -54,22 +54,25 @@ def mesh_state(
     """
     pair = dynamics.table.pair
     assert len(seen) == N_SEEN
-    index = seen[SEEN_NEWEST].astype(np.int64) - np.arange(N_PAIRS)[:, None]
+    first_pitch, last_pitch = pitches(dynamics.table)
+    n_pairs = last_pitch - first_pitch
+    index = seen[SEEN_NEWEST].astype(np.int64) - np.arange(n_pairs)[:, None]
     roll = dynamics.start_roll + pair.pinion.base_radius * angle
     position = roll - index * pair.base_pitch
-    force, forces = seen[SEEN_FORCE], seen[SEEN_PAIRS:]
+    force, forces = seen[SEEN_FORCE], seen[SEEN_PAIRS : SEEN_PAIRS + n_pairs]
     total = forces.sum(axis=0)
     share = np.divide(forces, total, out=np.zeros_like(forces), where=total > 0.0)
     teeth = {
         "pinion": (index + dynamics.start_tooth_pinion) % pair.pinion.n_teeth,
         "wheel": (index + dynamics.start_tooth_wheel) % pair.wheel.n_teeth,
     }
-    near = (forces > 0.0) | ((position >= 0.0) & (position <= pair.path_of_contact))
+    last_place = pair.path_of_contact + 2.0 * half_lag(dynamics.table)
+    near = (forces > 0.0) | ((position >= 0.0) & (position <= last_place))
     odd = np.zeros(near.shape, dtype=bool)
     for gear, tooth in teeth.items():
         odd |= np.isin(tooth, [number for name, number in faulty if name == gear])
     # a pair keeps its place while others come and go: by its number, not by its age
-    order = np.argsort(index % N_PAIRS, axis=0)
+    order = np.argsort(index % n_pairs, axis=0)
 
     def placed(rows: NDArray[np.generic]) -> NDArray[np.generic]:
         return np.take_along_axis(rows, order, axis=0)

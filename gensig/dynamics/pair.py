@@ -5,15 +5,20 @@ from __future__ import annotations
 import math
 from dataclasses import dataclass, replace
 from functools import cached_property
+from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
 
 from gensig.dynamics._layout import FAR_NEAR
+from gensig.dynamics.helical import AXIAL_DOFS, axial_reach, half_lag, pitches
+from gensig.dynamics.mesh_statics import least_gaps, loss_arm, mean_mesh_stiffness
 from gensig.dynamics.system import LumpedSystem, eigenvalues
 from gensig.errors import ConfigError
-from gensig.mesh.load_distribution import PairStates, pair_states, static_mesh
-from gensig.mesh.pair_table import GearTable, PairTable
+from gensig.mesh.load_distribution import PairStates, StaticMesh, pair_states, static_mesh
+from gensig.mesh.pair_table import PairTable
+from gensig.mesh.sliced_statics import chord_equilibrium, chord_states
+from gensig.mesh.sliced_table import SlicedTable
 from gensig.operating import Nominal, Operating
 from gensig.units import split_unit, unit
 
@@ -21,44 +26,57 @@ Array = NDArray[np.float64]
 
 PAIR_DOFS = ("pinion_x", "pinion_y", "pinion_rotation", "wheel_x", "wheel_y", "wheel_rotation")
 # all that a machine may have; ``PairDynamics.dofs`` says which
-DOFS = (*PAIR_DOFS, "motor_rotation", "load_rotation")
+DOFS = (*PAIR_DOFS, *AXIAL_DOFS, "motor_rotation", "load_rotation")
 APPROACH_SIGN = (0.0, -1.0, 1.0, 0.0, 1.0, -1.0)
 # a prime: no tooth is looked at where the last one was, so that few places a tooth show all of its path
 FRICTION_PLACES = 509
 PINION_X, PINION_Y, PINION_ROTATION, WHEEL_X, WHEEL_Y, WHEEL_ROTATION = range(6)  # places in PAIR_DOFS
+PINION_Z, WHEEL_Z = 6, 9  # of helical gears, each with its tilts behind it
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Support:
-    """Bearings and shaft under one gear: x across the line of action, y along it."""
+    """Bearings and shaft under one gear: x across the line of action, y along it, and for helical gears z along the
+    axis and tilts about x and y."""
 
     stiffness_x: float = unit("n_per_m")
     stiffness_y: float = unit("n_per_m")
     damping_x: float = unit("ns_per_m")
     damping_y: float = unit("ns_per_m")
+    stiffness_z: float = unit("n_per_m", default=0.0)
+    damping_z: float = unit("ns_per_m", default=0.0)
+    stiffness_tilt: float = unit("nm_per_rad", default=0.0)
+    damping_tilt: float = unit("nms_per_rad", default=0.0)
 
     def __post_init__(self) -> None:
-        for key in ("stiffness_x_n_per_m", "stiffness_y_n_per_m", "damping_x_ns_per_m", "damping_y_ns_per_m"):
-            value = getattr(self, split_unit(key)[0])
-            if value < 0.0:
-                raise ConfigError(f"support.{key} = {value:g} must not be negative")
+        for name, suffixes in (("stiffness", ("n_per_m", "nm_per_rad")), ("damping", ("ns_per_m", "nms_per_rad"))):
+            keys = [f"{name}_{axis}_{suffixes[axis == 'tilt']}" for axis in ("x", "y", "z", "tilt")]
+            for key in keys:
+                value = getattr(self, split_unit(key)[0])
+                if value < 0.0:
+                    raise ConfigError(f"support.{key} = {value:g} must not be negative")
 
-    def damped(self, mass: float, ratio_x: float, ratio_y: float) -> Support:
-        """The support with c = 2 zeta sqrt(k m) for a gear of ``mass`` in kg on it alone."""
+    def damped(self, body: Body, ratio_x: float, ratio_y: float) -> Support:
+        """The support with c = 2 zeta sqrt(k m) for a gear on it alone; along the axis and against tilting with the
+        mean of the two ratios."""
+        mean = 0.5 * (ratio_x + ratio_y)
         return replace(
             self,
-            damping_x=2.0 * ratio_x * math.sqrt(self.stiffness_x * mass),
-            damping_y=2.0 * ratio_y * math.sqrt(self.stiffness_y * mass),
+            damping_x=2.0 * ratio_x * math.sqrt(self.stiffness_x * body.mass),
+            damping_y=2.0 * ratio_y * math.sqrt(self.stiffness_y * body.mass),
+            damping_z=2.0 * mean * math.sqrt(self.stiffness_z * body.mass),
+            damping_tilt=2.0 * mean * math.sqrt(self.stiffness_tilt * body.tilt_inertia),
         )
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Body:
-    """What a gear weighs and how it is held."""
+    """What a gear weighs and how it is held; ``tilt_inertia`` about a diameter in kg m2 is asked of helical gears."""
 
     mass: float
     inertia: float
     support: Support
+    tilt_inertia: float = 0.0
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -95,7 +113,7 @@ class PairDynamics:
     ``wheel_tilt`` (tooth,) m/m by as much more for every metre that the contact is further along the path.
     """
 
-    table: PairTable
+    table: PairTable | SlicedTable
     pinion: Body
     wheel: Body
     operating: Operating
@@ -109,11 +127,34 @@ class PairDynamics:
     motor: Rotor | None = None
     load: Rotor | None = None
 
+    def __post_init__(self) -> None:
+        pitches(self.table)
+        if not self.is_helical:
+            return
+        for name, body in (("pinion", self.pinion), ("wheel", self.wheel)):
+            support = body.support
+            if not (body.tilt_inertia > 0.0 and support.stiffness_z > 0.0 and support.stiffness_tilt > 0.0):
+                raise ConfigError(
+                    f"gear.{name}: a helical pair needs support.stiffness_z_n_per_m = {support.stiffness_z:g}, "
+                    f"stiffness_tilt_nm_per_rad = {support.stiffness_tilt:g} and the inertia of tilting "
+                    f"{body.tilt_inertia:g} kg m2 to be positive"
+                )
+
+    @property
+    def is_helical(self) -> bool:
+        """Whether the gears move along their axes and tilt."""
+        return isinstance(self.table, SlicedTable)
+
+    @property
+    def gear_dofs(self) -> tuple[str, ...]:
+        """The first degrees of freedom: those that the mesh may push."""
+        return (*PAIR_DOFS, *AXIAL_DOFS) if self.is_helical else PAIR_DOFS
+
     @property
     def dofs(self) -> tuple[str, ...]:
         """Names of the degrees of freedom, in the order of every (dof,) array."""
         rotors = (("motor_rotation", self.motor), ("load_rotation", self.load))
-        return (*PAIR_DOFS, *[name for name, rotor in rotors if rotor is not None])
+        return (*self.gear_dofs, *[name for name, rotor in rotors if rotor is not None])
 
     @property
     def _ends(self) -> tuple[int, int]:
@@ -183,6 +224,11 @@ class PairDynamics:
         for x, support in ((PINION_X, p.support), (WHEEL_X, w.support)):
             stiffness[[x, x + 1], [x, x + 1]] = support.stiffness_x, support.stiffness_y
             damping[[x, x + 1], [x, x + 1]] = support.damping_x, support.damping_y
+        for z, body in ((PINION_Z, p), (WHEEL_Z, w)) if self.is_helical else ():
+            mass[z : z + 3] = body.mass, body.tilt_inertia, body.tilt_inertia
+            held, axes = body.support, np.arange(z, z + 3)
+            stiffness[axes, axes] = held.stiffness_z, held.stiffness_tilt, held.stiffness_tilt
+            damping[axes, axes] = held.damping_z, held.damping_tilt, held.damping_tilt
         driver, driven = self._ends
         for rotor, place, gear in ((self.motor, driver, PINION_ROTATION), (self.load, driven, WHEEL_ROTATION)):
             if rotor is not None:
@@ -207,12 +253,14 @@ class PairDynamics:
         direction = np.zeros(len(self.dofs))
         radii = np.array([1.0, 1.0, self.table.pair.pinion.base_radius, 1.0, 1.0, self.table.pair.wheel.base_radius])
         direction[: len(PAIR_DOFS)] = np.array(APPROACH_SIGN) * radii
+        if self.is_helical:
+            direction[len(PAIR_DOFS) : len(self.gear_dofs)] = axial_reach(self.table.pair)
         return direction
 
     @cached_property
     def mean_mesh_stiffness(self) -> float:
         """Mean tangent stiffness of sound teeth over one base pitch under the set torque, N/m."""
-        return _mean_mesh_stiffness(self.table, self.mesh_force)
+        return mean_mesh_stiffness(self.table, self.mesh_force)
 
     @property
     def mesh_damping(self) -> float:
@@ -227,7 +275,7 @@ class PairDynamics:
     def numbers(self, step: float, rest: Array) -> tuple[float, ...]:
         """The mesh as numbers, in the order of the rows of ``_layout.Group.numbers``."""
         table, options, pair = self.table, self.table.options, self.table.pair
-        viscous = self.mesh_damping
+        viscous, lag = self.mesh_damping, half_lag(table)
         return (
             pair.pinion.base_radius,
             pair.wheel.base_radius,
@@ -238,11 +286,13 @@ class PairDynamics:
             table.shared_compliance,
             viscous / self.mesh_force if options.law == "one_sided" else viscous,
             options.friction_coefficient,
-            2.0 / (options.friction_transition * pair.base_pitch),
+            2.0 / (options.friction_transition * pair.base_pitch + 2.0 * lag),
             2.0 / (pair.pinion.base_radius * self.operating.speed * step),
             pair.backlash,
             self.mesh_force,
             float(self.approach_direction() @ rest),
+            lag,
+            pair.pitch_point + lag,
         )
 
     def exact_numbers(self) -> tuple[float, ...]:
@@ -256,18 +306,17 @@ class PairDynamics:
             options.points_per_pitch / pair.base_pitch,
             self.start_roll,
             *near,
+            pitches(self.table)[0] * pair.base_pitch,
         )
 
     def _near_positions(self) -> tuple[float, float]:
         """Positions s outside of which no pair comes within ``FAR_NEAR`` of touching, m."""
         table = self.table
-        beyond = table.position - table.pair.pitch_point
+        beyond = table.position - table.pair.pitch_point - half_lag(table)
+        teeth = ((self.pinion_error, self.pinion_tilt), (self.wheel_error, self.wheel_tilt))
         nearest = [
-            side.gap[side.present].min(axis=0) + error.min() + np.minimum(tilt.min() * beyond, tilt.max() * beyond)
-            for side, error, tilt in (
-                (table.pinion, self.pinion_error, self.pinion_tilt),
-                (table.wheel, self.wheel_error, self.wheel_tilt),
-            )
+            flank + error.min() + np.minimum(tilt.min() * beyond, tilt.max() * beyond)
+            for flank, (error, tilt) in zip(least_gaps(table), teeth, strict=True)
         ]
         near = np.flatnonzero(nearest[0] + nearest[1] < FAR_NEAR)
         if len(near) == 0:  # every pair may be as near as any other
@@ -279,11 +328,10 @@ class PairDynamics:
         """Mean friction torque reduced to the pinion, from the static loads over one turn of the wheel, N m."""
         pair = self.table.pair
         places = (np.arange(FRICTION_PLACES) + 0.5) / FRICTION_PLACES
-        states = self._states(pair.base_pitch * pair.wheel.n_teeth * places)
-        loads = static_mesh(self.table, states, self.mesh_force).load
-        arm = pair.start_curvature_radius + np.clip(states.position, 0.0, pair.path_of_contact)
-        loss_arm = np.sign(states.position - pair.pitch_point) * (arm - (pair.tangent_length - arm) / pair.ratio)
-        return self.table.options.friction_coefficient * float(np.mean((loads * loss_arm).sum(axis=1)))
+        position, static = self._statics(pair.base_pitch * pair.wheel.n_teeth * places, self.mesh_force)
+        return self.table.options.friction_coefficient * float(
+            np.mean((static.load * loss_arm(self.table, position)).sum(axis=1))
+        )
 
     def rest(self) -> Array:
         """Deflections of supports and couplings about which the machine moves; the pinion has not turned, (dof,)."""
@@ -310,50 +358,41 @@ class PairDynamics:
         advance = pair.pinion.base_radius * start[PINION_ROTATION]
         elapsed = float(self.operating.time_at_set_speed(np.array([time]))[0])
         roll = self.start_roll + pair.pinion.base_radius * self.operating.speed * elapsed + advance
-        approach = float(static_mesh(self.table, self._states(np.array([roll])), force).approach[0])
-        for dof, direction in ((PINION_Y, 1.0), (WHEEL_Y, -1.0)):
+        approach = float(self._statics(np.array([roll]), force)[1].approach[0])
+        axial, reach = range(len(PAIR_DOFS), len(self.gear_dofs)), self.approach_direction()
+        for dof in (PINION_Y, WHEEL_Y, *axial):
             if system.stiffness[dof, dof] > 0.0:
-                start[dof] = direction * force / system.stiffness[dof, dof]
+                start[dof] = -reach[dof] * force / system.stiffness[dof, dof]
         closed = approach if math.isfinite(approach) else 0.0
-        start[WHEEL_ROTATION] = (start[WHEEL_Y] - start[PINION_Y] - closed + advance) / pair.wheel.base_radius
+        pushed = start[WHEEL_Y] - start[PINION_Y]
+        for dof in axial:
+            pushed += reach[dof] * start[dof]
+        start[WHEEL_ROTATION] = (pushed - closed + advance) / pair.wheel.base_radius
         if self.load is not None:
             torque = factor * system.force[driven] - wheel_acceleration * self.load.inertia
             start[driven] = start[WHEEL_ROTATION] + torque / self.load.coupling_stiffness
         return start
 
+    def _statics(self, roll: Array, force: float) -> tuple[Array, StaticMesh]:
+        """Positions s of the pairs at some rolls, (phase, pair) m, and their equilibrium under a force in N."""
+        if isinstance(self.table, SlicedTable):
+            chords = chord_states(self.table, roll, **self._teeth)
+            return chords.position, chord_equilibrium(self.table, chords, force)
+        states = self._states(roll)
+        return states.position, static_mesh(self.table, states, force)
+
     def _states(self, roll: Array) -> PairStates:
-        return pair_states(
-            self.table,
-            roll,
-            start_tooth_pinion=self.start_tooth_pinion,
-            start_tooth_wheel=self.start_tooth_wheel,
-            pinion_error=self.pinion_error,
-            wheel_error=self.wheel_error,
-            pinion_tilt=self.pinion_tilt,
-            wheel_tilt=self.wheel_tilt,
-        )
+        assert isinstance(self.table, PairTable)
+        return pair_states(self.table, roll, **self._teeth)
+
+    @property
+    def _teeth(self) -> dict[str, Any]:
+        """Which teeth meet, and their errors, as the statics ask for them."""
+        names = ("start_tooth_pinion", "start_tooth_wheel", "pinion_error", "wheel_error", "pinion_tilt", "wheel_tilt")
+        return {name: getattr(self, name) for name in names}
 
 
 def _couple(matrix: Array, one: int, other: int, value: float) -> None:
     """Put a spring or a damper between two degrees of freedom."""
     matrix[[one, other], [one, other]] += value
     matrix[[one, other], [other, one]] -= value
-
-
-def _mean_mesh_stiffness(table: PairTable, force: float) -> float:
-    """Over the teeth that most are, which are the sound ones; where all differ, the median over the teeth."""
-    mesh, n_pitches = table, table.pair.pinion.n_teeth
-    pinion, wheel = _commonest(table.pinion), _commonest(table.wheel)
-    if pinion is not None and wheel is not None:
-        mesh, n_pitches = replace(table, pinion=pinion, wheel=wheel), 1
-    roll = table.pair.base_pitch * (np.arange(n_pitches * 32) + 0.5) / 32
-    stiffness = static_mesh(mesh, pair_states(mesh, roll), force).stiffness
-    return float(np.median(stiffness.reshape(-1, 32), axis=0).mean())
-
-
-def _commonest(side: GearTable) -> GearTable | None:
-    """A gear whose teeth are all what most of them are; None where there is no such kind."""
-    counts = np.bincount(side.kind)
-    if counts.max() <= len(side.kind) // 2:
-        return None
-    return replace(side, kind=np.full_like(side.kind, counts.argmax()))

@@ -23,12 +23,14 @@ Array = NDArray[np.float64]
 class GearPair:
     """A pinion that drives a wheel at the centre distance at which they mesh without play, in the transverse section.
 
-    ``backlash`` is the play along the line of action that is left to the coast flank, m.
+    ``backlash`` is the play along the line of action that is left to the coast flank, m. ``center_distance_change`` is
+    how much farther apart the shafts are than that distance, m; negative where they are closer, which costs backlash.
     """
 
     pinion: Gear
     wheel: Gear
     backlash: float
+    center_distance_change: float = 0.0
 
     def __post_init__(self) -> None:
         same = ("normal_module", "pressure_angle")
@@ -76,6 +78,15 @@ class GearPair:
     @property
     def working_pressure_angle(self) -> float:
         """Transverse pressure angle at the working centre distance."""
+        alpha = self._angle_without_play
+        if self.center_distance_change == 0.0:  # to the bit
+            return alpha
+        base = self.pinion.base_radius + self.wheel.base_radius
+        return math.acos(min(1.0, base / (base / math.cos(alpha) + self.center_distance_change)))
+
+    @property
+    def _angle_without_play(self) -> float:
+        """Transverse pressure angle at the centre distance that the profile shifts give."""
         shift = self.pinion.profile_shift + self.wheel.profile_shift
         teeth = self.pinion.n_teeth + self.wheel.n_teeth
         alpha = self.pinion.transverse_pressure_angle

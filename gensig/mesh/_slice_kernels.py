@@ -15,18 +15,20 @@ _compiled: Any = functools.partial(njit, nogil=True, cache=True, error_model="nu
 
 ROUNDS = 100  # at most, of the bearing slices and the logarithm's load
 SETTLED = 1e-12  # relative change of the approach that ends the rounds
+SETTLED_FORCE = 1e-4  # and of a force that goes into a table
 LEAST_INTENSITY = 1e-3  # of the even load per width: the logarithm has no limit where a slice lets go
 
 
 @_compiled
 def solve_slices(
-    structure, factor, constant, log_weight, gap, width, coupling, shared, force, even, approach, stiffness, line_load
-):
+    structure, factor, constant, log_weight, gap, width, breadth, length_squared, shared, force, even, approach,
+    stiffness, line_load,
+):  # fmt: skip
     """Loads of all slices of all pairs at one force, phase by phase.
 
     Slice j of pair i stands back by gap[i, j] and is as soft as structure[i, j] + contact. The structure's deflection w
-    along the face obeys k w - (k coupling w')' = p for the load per width p, k = 1 / structure, with free ends; without
-    coupling every slice bends by itself. Source of the differential form: Pasternak (1954), a foundation with shear.
+    along the face obeys k w - (k length^2 w')' = p for the load per width p, k = 1 / structure, with free ends; without
+    length every slice bends by itself. Source of the differential form: Pasternak (1954), a foundation with shear.
 
     Parameters
     ----------
@@ -34,7 +36,8 @@ def solve_slices(
     factor, constant (phase, pair, slice), log_weight : contact compliance factor (constant - log_weight ln p), m2/N
     gap : (phase, pair, slice) m              inf where there is no flank
     width : (phase, pair, slice) m            of each slice, less where the field of action cuts it
-    coupling : squared length over which slices couple, over the squared width of a slice
+    breadth : (slice,) m                      of each slice, whole
+    length_squared : m2                       of the length over which slices couple
     shared : m/N                              body compliance that all pairs share
     force, even : N, N/m                      total force, and the load per width that scales the logarithm
     approach, stiffness : (phase,) m, N/m     written; inf and 0 where nothing can touch
@@ -47,11 +50,13 @@ def solve_slices(
     n_phases, n_pairs, n_slices = gap.shape
     contact, bearing = np.empty((n_pairs, n_slices)), np.zeros((n_pairs, n_slices), np.bool_)
     lift, rest = np.empty((n_pairs, n_slices)), np.empty((n_pairs, n_slices))
-    diagonal, upper = np.empty(n_slices), np.empty(n_slices)
+    own, between = np.empty((n_pairs, n_slices)), np.empty((n_pairs, n_slices))
+    per_pivot = np.empty(n_slices)
     n_unsettled = 0
     for k in range(n_phases):
         first = np.inf
         for i in range(n_pairs):
+            _stiffen(structure[k, i], breadth, length_squared, own[i], between[i])
             for j in range(n_slices):
                 contact[i, j] = factor * (constant[k, i, j] - log_weight * np.log(even))
                 bearing[i, j] = width[k, i, j] > 0.0 and gap[k, i, j] < np.inf
@@ -68,9 +73,8 @@ def solve_slices(
                 if not bearing[i].any():
                     continue
                 _deflections(
-                    structure[k, i], contact[i], gap[k, i], first, bearing[i], coupling, diagonal, upper,
-                    lift[i], rest[i],
-                )  # fmt: skip
+                    own[i], between[i], breadth, contact[i], gap[k, i], first, bearing[i], per_pivot, lift[i], rest[i]
+                )
                 for j in range(n_slices):
                     if bearing[i, j]:
                         total += width[k, i, j] * (1.0 - lift[i, j]) / contact[i, j]
@@ -107,29 +111,107 @@ def solve_slices(
 
 
 @_compiled
-def _deflections(structure, contact, gap, first, bearing, coupling, diagonal, upper, lift, rest):
+def bite_forces(
+    structure, factor, constant, log_weight, gap, width, breadth, length_squared, even, depth, reach, first, force
+):
+    """Force of one pair of teeth at prescribed depths of bite, position by position.
+
+    Parameters
+    ----------
+    structure, gap : (node, slice)            see `solve_slices`
+    factor, constant (node, slice), log_weight, breadth, length_squared, even : see `solve_slices`
+    width : (node, slice) m
+    depth : (knot,) m                         beyond the first gap of each position, increasing and positive
+    reach : m                                 positions whose first gap lies beyond are left out
+    first : (node,) m                         first gap, written
+    force : (node, knot) N                    written; 0 where left out
+
+    Returns
+    -------
+    number of positions and depths whose bearing slices were still changing after `ROUNDS`
+    """
+    n_nodes, n_slices = gap.shape
+    contact, bearing = np.empty(n_slices), np.zeros(n_slices, np.bool_)
+    lift, rest = np.empty(n_slices), np.empty(n_slices)
+    own, between, per_pivot = np.empty(n_slices), np.empty(n_slices), np.empty(n_slices)
+    light = np.log(LEAST_INTENSITY * even)
+    n_unsettled = 0
+    for k in range(n_nodes):
+        first[k] = np.inf
+        for j in range(n_slices):
+            if width[k, j] > 0.0:
+                first[k] = min(first[k], gap[k, j])
+        force[k] = 0.0
+        if not first[k] <= reach:
+            continue
+        bearing[:] = False
+        _stiffen(structure[k], breadth, length_squared, own, between)
+        for knot in range(depth.shape[0]):
+            for j in range(n_slices):
+                if not bearing[j]:
+                    contact[j] = factor * (constant[k, j] - log_weight * light)
+                    bearing[j] = width[k, j] > 0.0 and gap[k, j] - first[k] < depth[knot]
+            last, settled = 0.0, False
+            for _ in range(ROUNDS):
+                _deflections(own, between, breadth, contact, gap[k], first[k], bearing, per_pivot, lift, rest)
+                total, changed = 0.0, False
+                for j in range(n_slices):
+                    if width[k, j] <= 0.0 or gap[k, j] == np.inf:
+                        continue
+                    bite = depth[knot] - (gap[k, j] - first[k]) - (lift[j] * depth[knot] - rest[j])
+                    touches = bite > 0.0
+                    changed = changed or touches != bearing[j]
+                    bearing[j] = touches
+                    if touches:
+                        load = bite / contact[j]
+                        total += width[k, j] * load
+                        if log_weight != 0.0:
+                            heavy = np.log(max(load, LEAST_INTENSITY * even))
+                            contact[j] = factor * (constant[k, j] - log_weight * heavy)
+                settled = not changed and abs(total - last) <= SETTLED_FORCE * total
+                last = total
+                if settled:
+                    break
+            n_unsettled += not settled
+            force[k, knot] = last
+    return n_unsettled
+
+
+@_compiled
+def _stiffen(structure, breadth, length_squared, own, between):
+    """Stiffness of every slice's structure, and of what ties it to the next one, (slice,) N/m each, written."""
+    n_slices = structure.shape[0]
+    for j in range(n_slices):
+        own[j] = breadth[j] / structure[j]
+        between[j] = 0.0
+        if j < n_slices - 1:
+            between[j] = 4.0 * length_squared / ((structure[j] + structure[j + 1]) * (breadth[j] + breadth[j + 1]))
+
+
+@_compiled
+def _deflections(own, between, breadth, contact, gap, first, bearing, per_pivot, lift, rest):
     """Deflection of one pair's structure, lift x (approach above the first gap) - rest, (slice,) each, written.
 
     Where a slice bears, its load per width is (approach - gap - w) / contact: one tridiagonal system, solved for the
     part that goes with the approach and the one that does not (Thomas, whose pivots are positive here).
     """
-    n_slices = structure.shape[0]
+    n_slices = own.shape[0]
+    before = 0.0
     for j in range(n_slices):
-        own = 1.0 / structure[j]
-        before = 0.0 if j == 0 else coupling * 2.0 / (structure[j] + structure[j - 1])
-        after = 0.0 if j == n_slices - 1 else coupling * 2.0 / (structure[j] + structure[j + 1])
-        pressed = 1.0 / contact[j] if bearing[j] else 0.0
-        pivot = own + before + after + pressed
+        pressed = breadth[j] / contact[j] if bearing[j] else 0.0
+        pivot = own[j] + before + between[j] + pressed
         lift[j] = pressed
         rest[j] = pressed * (gap[j] - first) if bearing[j] else 0.0
         if j > 0:
-            ratio = -before / diagonal[j - 1]
-            pivot -= ratio * upper[j - 1]
-            lift[j] -= ratio * lift[j - 1]
-            rest[j] -= ratio * rest[j - 1]
-        diagonal[j], upper[j] = pivot, -after
+            ratio = before * per_pivot[j - 1]
+            pivot -= ratio * before
+            lift[j] += ratio * lift[j - 1]
+            rest[j] += ratio * rest[j - 1]
+        per_pivot[j] = 1.0 / pivot
+        before = between[j]
     for j in range(n_slices - 1, -1, -1):
-        follow_lift = 0.0 if j == n_slices - 1 else lift[j + 1]
-        follow_rest = 0.0 if j == n_slices - 1 else rest[j + 1]
-        lift[j] = (lift[j] - upper[j] * follow_lift) / diagonal[j]
-        rest[j] = (rest[j] - upper[j] * follow_rest) / diagonal[j]
+        if j < n_slices - 1:
+            lift[j] += between[j] * lift[j + 1]
+            rest[j] += between[j] * rest[j + 1]
+        lift[j] *= per_pivot[j]
+        rest[j] *= per_pivot[j]

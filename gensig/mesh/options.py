@@ -102,12 +102,14 @@ class SliceOptions:
     slice_coupling : ``coupled`` lets a slice's load bend its neighbours, ``independent`` makes each a gear of its own
     coupling_modules : length over which slices couple, in normal modules
     slices_in_phase : True leaves out the helix of the contact lines but not that of the geometry (for comparison only)
+    independent_faulty_slices : True takes a fault over part of the face with independent slices all the same
     """
 
     n_slices: int
     slice_coupling: str
     coupling_modules: float
     slices_in_phase: bool
+    independent_faulty_slices: bool
 
     def __post_init__(self) -> None:
         if self.slice_coupling not in SLICE_COUPLINGS:

@@ -289,13 +289,7 @@ def _gear_table(
     options: MeshOptions,
 ) -> GearTable:
     """Rows of the distinct teeth: teeth that are one object share a row, equal structures are computed once."""
-    distinct = [healthy_tooth(side.gear)]
-    kind = np.zeros(side.gear.n_teeth, dtype=np.int64)
-    for number, tooth in odd.items():
-        row = next((row for row, known in enumerate(distinct) if known is tooth), len(distinct))
-        if row == len(distinct):
-            distinct.append(tooth)
-        kind[number] = row
+    distinct, kind = distinct_teeth(side.gear, odd)
     corner, sound_row = sound
     structures = {_structure_key(distinct[0]): sound_row}
     compliance: Array = np.empty((len(distinct), len(position)))
@@ -319,6 +313,18 @@ def _gear_table(
         present=np.array([tooth.present for tooth in distinct]),
         kind=kind,
     )
+
+
+def distinct_teeth(gear: Gear, odd: Mapping[int, Tooth]) -> tuple[list[Tooth], NDArray[np.int64]]:
+    """The sound tooth and those that differ, by object, and which of them each tooth of the gear is, (tooth,)."""
+    distinct = [healthy_tooth(gear)]
+    kind = np.zeros(gear.n_teeth, dtype=np.int64)
+    for number, tooth in odd.items():
+        row = next((row for row, known in enumerate(distinct) if known is tooth), len(distinct))
+        if row == len(distinct):
+            distinct.append(tooth)
+        kind[number] = row
+    return distinct, kind
 
 
 def _structure_key(tooth: Tooth) -> tuple[int, ...]:

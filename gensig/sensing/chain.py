@@ -18,7 +18,7 @@ from gensig.sensing.noise import Background, Noise, Place, Spectrum, ThroughPath
 from gensig.sensing.tachometer import Tachometer
 from gensig.sensing.tones import Nuisance
 from gensig.sensing.transfer_path import ModalPath
-from gensig.units import unit
+from gensig.units import TURNING, is_turning, unit
 
 Array = NDArray[np.float64]
 
@@ -133,11 +133,12 @@ class Sensing:
         if not self.sensors or len(set(self.sensors)) != len(self.sensors):
             raise ConfigError(f"sensing.sensors = {list(self.sensors)} must name at least one sensor, each once")
         for name in self.sensors:
-            if not SENSOR_NAME.fullmatch(name) or name.endswith("rotation"):
+            if not SENSOR_NAME.fullmatch(name) or is_turning(name):
                 raise ConfigError(
-                    f"sensing.sensors: {name!r}; give letters, digits and _, at most 32, not ending in 'rotation'"
+                    f"sensing.sensors: {name!r}; give letters, digits and _, at most 32, not ending in "
+                    f"{', '.join(map(repr, TURNING))}"
                 )
-        if turning := [name for name in self.channels if name.endswith("rotation")]:
+        if turning := [name for name in self.channels if is_turning(name)]:
             raise ConfigError(f"sensing.channels: {turning[0]} is no bearing; a transfer path takes bearing channels")
         highest = usable_band(self.sampling_rate)[1]
         if isinstance(self.path, ModalPath) and self.path.natural_frequency[1] > highest:

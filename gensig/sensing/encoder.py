@@ -81,15 +81,17 @@ class Disc:
 
 
 def draw_disc(rng: np.random.Generator, encoder: Encoder) -> Disc:
+    """The disc of an encoder, see `draw_lines`."""
+    return draw_lines(rng, encoder.lines_per_turn, encoder.eccentricity_error, encoder.line_error)
+
+
+def draw_lines(rng: np.random.Generator, n_lines: int, eccentricity_error: float, line_error: float) -> Disc:
     """A disc with its errors: index and eccentricity in any direction, the latter of any size up to the largest.
 
     A disc whose center is off the shaft's by e is misread by e / R sin(angle + direction) at a reading radius R.
     """
     index, direction = rng.uniform(0.0, 2.0 * math.pi, 2)
-    amplitude = encoder.eccentricity_error * float(rng.random())
-    nominal = encoder.spacing * np.arange(encoder.lines_per_turn)
-    own = np.clip(rng.standard_normal(encoder.lines_per_turn), -WIDEST, WIDEST)
-    return Disc(
-        index=float(index),
-        places=nominal + amplitude * np.sin(nominal + direction) + encoder.line_error * own,
-    )
+    amplitude = eccentricity_error * float(rng.random())
+    nominal = 2.0 * math.pi / n_lines * np.arange(n_lines)
+    own = np.clip(rng.standard_normal(n_lines), -WIDEST, WIDEST)
+    return Disc(index=float(index), places=nominal + amplitude * np.sin(nominal + direction) + line_error * own)

@@ -29,7 +29,8 @@ from gensig.faults.base import Fault, faulty_teeth
 from gensig.geometry.contact import GearPair
 from gensig.material import Material
 from gensig.mesh.options import MeshOptions
-from gensig.mesh.pair_table import PairTable
+from gensig.mesh.pair_table import N_PAIRS, PairTable
+from gensig.mesh.sliced_table import SlicedTable
 from gensig.operating import Operating
 from gensig.sensing.agreement import agreement
 from gensig.sensing.chain import Sensing
@@ -89,10 +90,19 @@ class PairMachine(ABC):
     load: Rotor | None = None
 
     @abstractmethod
-    def mesh_table(self, faults: Sequence[Fault] = ()) -> PairTable:
+    def mesh_table(self, faults: Sequence[Fault] = ()) -> PairTable | SlicedTable:
         """Compliance and gap tables with the given faults."""
 
-    def _specimen_table(self, faults: Sequence[Fault], specimen: Specimen) -> PairTable:
+    @property
+    def most_pairs(self) -> int:
+        """Pairs of teeth that may be followed at once."""
+        return N_PAIRS
+
+    def require_drive(self) -> None:
+        """Raise GeometryError unless at least one pair is always in contact."""
+        self.pair.require_continuous_drive()
+
+    def _specimen_table(self, faults: Sequence[Fault], specimen: Specimen) -> PairTable | SlicedTable:
         """The faults on the flanks of a set of gears, at its backlash; which asks for no tables of its own."""
         table = self.mesh_table((*specimen.forms, *faults))
         return replace(table, pair=replace(self.pair, backlash=self.pair.backlash * specimen.backlash_factor))
@@ -104,7 +114,7 @@ class PairMachine(ABC):
 
     def check(self) -> None:
         """Raise for what would stop every record: interrupted drive, fits out of range, channels, step length."""
-        self.pair.require_continuous_drive()
+        self.require_drive()
         self.mesh_table()
         self.quality.check_covered(self.pair.pinion, self.pair.wheel)
         sensing, operating = self.sensing, self.operating
@@ -176,7 +186,7 @@ class Run:
         system = self.system
         operating = system.operating
         sensing = (system.sensing.sampling_rate, system.sensing.channels, operating.duration)
-        machine = (system.motor is None, system.load is None, operating.is_steady, self.tell_mesh)
+        machine = (type(system), system.motor is None, system.load is None, operating.is_steady, self.tell_mesh)
         return (*sensing, *machine, system.solver, system.mesh.law, system.mesh.roll_torque)
 
     def finer(self) -> Run:
@@ -187,7 +197,7 @@ class Run:
     def dynamics(self) -> PairDynamics:
         """The equations of motion."""
         system, pair = self.system, self.system.pair
-        pair.require_continuous_drive()
+        system.require_drive()
         return system._dynamics(
             self.faults,
             self.start or Start(tooth_pinion=0, tooth_wheel=0, phase=0.0),

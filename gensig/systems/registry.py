@@ -11,15 +11,18 @@ from gensig.errors import ConfigError
 from gensig.geometry.contact import GearPair
 from gensig.geometry.gear import Gear
 from gensig.material import Material
+from gensig.mesh.heat import Heat
 from gensig.mesh.modification import FlankModification, PairModification
 from gensig.mesh.options import read_mesh_options, read_slice_options
 from gensig.sensing.manufacturing import Quality
 from gensig.sensing.reading import read_sensing
+from gensig.systems.helical_pair import HelicalPair
+from gensig.systems.hot_pair import Duty, as_configured
 from gensig.systems.operation import read_operating
 from gensig.systems.pair_machine import PairMachine
 from gensig.systems.sliced_pair import SlicedPair
 from gensig.systems.spur_pair import SpurPair
-from gensig.systems.supports import AS_GIVEN, on_bearings, put_on_bearings, read_holding
+from gensig.systems.supports import AS_GIVEN, held_axially, on_bearings, put_on_bearings, read_holding
 from gensig.units import read, to_si
 
 SIDES = ("pinion", "wheel")
@@ -32,6 +35,7 @@ COMMON_GEAR_KEYS = (
 )
 BODY_KEYS = ("mass_kg", "inertia_kg_m2", "support", "bearing", "shaft")
 SLICED = "helical_pair"
+LINE = "shaft_line"
 SYSTEM_KEYS = ("kind", "supports", "motor", "load")
 
 
@@ -41,20 +45,38 @@ def read_spur_pair(config: Mapping[str, Any]) -> SpurPair:
     if _number("gear.helix_angle_deg", gear["helix_angle_deg"]) != 0.0:
         raise ConfigError(
             f"gear.helix_angle_deg = {gear['helix_angle_deg']:g}: system=spur_pair takes spur gears, 0; helical ones "
-            f"have system=helical_pair, with gensig stiffness and gensig transmission-error"
+            f"have system=helical_pair"
         )
     if read_modification(config).is_any:
         raise ConfigError(
             "modification: system=spur_pair has its reliefs as faults (fault=tip_relief, fault=misalignment); a "
             "modification is taken by gensig transmission-error, and by gensig stiffness with system=helical_pair"
         )
+    if read_heat(config).is_any:
+        raise ConfigError(
+            "heat: system=spur_pair has gears as they are drawn; system=helical_pair takes heat, and spur gears too"
+        )
+    return SpurPair(pair=read_pair(config), **_read_machine(config, read_pair(config)))
+
+
+def read_helical_pair(config: Mapping[str, Any]) -> HelicalPair:
+    """Build a helical pair, or a spur pair in slices, from the boundary keys of a configuration."""
+    flanks = read_sliced_pair(config)
+    machine = _read_machine(config, flanks.pair)
+    bodies = {
+        name: held_axially(machine[name], getattr(flanks.pair, name), section(config, "gear", name)) for name in SIDES
+    }
+    return HelicalPair(pair=flanks.pair, flanks=flanks, **{**machine, **bodies})
+
+
+def _read_machine(config: Mapping[str, Any], pair: GearPair) -> dict[str, Any]:
+    """What a pair's machine has whatever its teeth, by the fields of ``PairMachine``."""
     material = read_material(config)
     sides = {name: section(config, "gear", name) for name in SIDES}
     machine = section(config, "system")
     for key in machine:
         if key not in SYSTEM_KEYS:
             raise ConfigError(f"system: unknown key '{key}'; known: {', '.join(SYSTEM_KEYS)}")
-    pair = read_pair(config)
     gears = {"pinion": pair.pinion, "wheel": pair.wheel}
     operating, quality = (
         read_operating(section(config, "operating")),
@@ -65,23 +87,36 @@ def read_spur_pair(config: Mapping[str, Any]) -> SpurPair:
     if on_bearings(machine.get("supports", AS_GIVEN), quality):
         force = operating.torque / gears["pinion"].base_radius
         bodies = {name: put_on_bearings(bodies[name], gears[name], held[name], material, force) for name in SIDES}
-    return SpurPair(
-        pair=pair,
-        material=material,
-        mesh=read_mesh_options(section(config, "mesh")),
-        pinion=bodies["pinion"],
-        wheel=bodies["wheel"],
-        operating=operating,
-        sensing=read_sensing(section(config, "sensing")),
-        quality=quality,
-        solver=read(Solver, section(config, "solver"), "solver"),
-        motor=_read_rotor("system.motor", machine.get("motor")),
-        load=_read_rotor("system.load", machine.get("load")),
-    )
+    return {
+        "material": material,
+        "mesh": read_mesh_options(section(config, "mesh")),
+        "pinion": bodies["pinion"],
+        "wheel": bodies["wheel"],
+        "operating": operating,
+        "sensing": read_sensing(section(config, "sensing")),
+        "quality": quality,
+        "solver": read(Solver, section(config, "solver"), "solver"),
+        "motor": _read_rotor("system.motor", machine.get("motor")),
+        "load": _read_rotor("system.load", machine.get("load")),
+    }
 
 
 def read_sliced_pair(config: Mapping[str, Any]) -> SlicedPair:
-    """Build a spur or helical pair cut into slices from the boundary keys of a configuration, whatever its system."""
+    """Build a spur or helical pair cut into slices from the boundary keys of a configuration, whatever its system; as
+    hot as its ``heat`` makes it."""
+    _refuse_line(config)
+    heat = read_heat(config)
+    return as_configured(read_duty(config)) if heat.is_any else read_cold_pair(config)
+
+
+def read_duty(config: Mapping[str, Any]) -> Duty:
+    """The cold pair of a configuration with what heats and cools it."""
+    speed = _number("operating.speed_rpm", section(config, "operating")["speed_rpm"])
+    return Duty(system=read_cold_pair(config), heat=read_heat(config), speed=speed)
+
+
+def read_cold_pair(config: Mapping[str, Any]) -> SlicedPair:
+    """The same pair as it is drawn."""
     mesh = section(config, "mesh")
     return SlicedPair(
         pair=read_pair(config),
@@ -97,8 +132,8 @@ def read_pair(config: Mapping[str, Any]) -> GearPair:
     """The two gears of a configuration; a wheel has the opposite hand unless it says otherwise."""
     gear = section(config, "gear")
     helix = _number("gear.helix_angle_deg", gear["helix_angle_deg"])
-    gears = {name: _read_gear(name, gear, hand * helix) for name, hand in zip(SIDES, (1.0, -1.0), strict=True)}
-    return GearPair(**gears, backlash=_number("gear.backlash_um", gear["backlash_um"]))
+    pinion, wheel = (_read_gear(name, gear, hand * helix) for name, hand in zip(SIDES, (1.0, -1.0), strict=True))
+    return GearPair(pinion=pinion, wheel=wheel, backlash=_number("gear.backlash_um", gear["backlash_um"]))
 
 
 def read_material(config: Mapping[str, Any]) -> Material:
@@ -107,6 +142,11 @@ def read_material(config: Mapping[str, Any]) -> Material:
     if material.poisson_ratio >= 0.5:
         raise ConfigError(f"material.poisson_ratio = {material.poisson_ratio:g} must be below 0.5")
     return material
+
+
+def read_heat(config: Mapping[str, Any]) -> Heat:
+    """Which effects of heat a configuration has, and what they take."""
+    return read(Heat, section(config, "heat"), "heat")
 
 
 def read_modification(config: Mapping[str, Any]) -> PairModification:
@@ -122,7 +162,10 @@ def read_modification(config: Mapping[str, Any]) -> PairModification:
     return read(PairModification, own, "modification", **sides)
 
 
-SYSTEMS: dict[str, Callable[[Mapping[str, Any]], PairMachine]] = {"spur_pair": read_spur_pair}
+SYSTEMS: dict[str, Callable[[Mapping[str, Any]], PairMachine]] = {
+    "spur_pair": read_spur_pair,
+    SLICED: read_helical_pair,
+}
 
 
 def read_system(config: Mapping[str, Any]) -> PairMachine:
@@ -133,14 +176,25 @@ def read_system(config: Mapping[str, Any]) -> PairMachine:
     ConfigError, GeometryError    for keys or values that make no machine
     """
     kind = section(config, "system").get("kind")
-    if kind == SLICED:
+    _refuse_line(config)
+    if config.get("excitation") is not None:
         raise ConfigError(
-            f"system={kind} has statics so far: take gensig stiffness or gensig transmission-error; records "
-            f"are made by system={', '.join(SYSTEMS)}"
+            f"excitation turns a drive line (system=engine_gear_train, gensig forced-response); system={kind} turns "
+            "as operating says, leave excitation out"
         )
     if kind not in SYSTEMS:
-        raise ConfigError(f"system.kind = {kind!r}; allowed: {', '.join((*SYSTEMS, SLICED))}")
+        raise ConfigError(f"system.kind = {kind!r}; allowed: {', '.join((*SYSTEMS, LINE))}")
     return SYSTEMS[kind](config)
+
+
+def _refuse_line(config: Mapping[str, Any]) -> None:
+    """Raise for a drive line where a single pair is wanted."""
+    machine = section(config, "system")
+    if machine.get("kind") == LINE:
+        raise ConfigError(
+            f"system={machine.get('name')} is a drive line from tables: so far it has its modes, gensig modes; this is "
+            f"done with system={', '.join(SYSTEMS)}"
+        )
 
 
 def section(config: Mapping[str, Any], *path: str) -> Mapping[str, Any]:
@@ -172,7 +226,8 @@ def _read_body(gear: Gear, values: Mapping[str, Any], material: Material) -> Bod
         if not value > 0.0:
             raise ConfigError(f"gear.{gear.name}.{key} = {value:g} must be positive, or null to derive it")
     try:
-        support = read(Support, section(values, "support"), "support")
+        given_support = {key: value for key, value in section(values, "support").items() if value is not None}
+        support = read(Support, given_support, "support")
     except ConfigError as error:
         raise ConfigError(f"gear.{gear.name}.{error}") from None
     return Body(mass=mass, inertia=inertia, support=support)

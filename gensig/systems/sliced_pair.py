@@ -2,40 +2,51 @@
 
 from __future__ import annotations
 
+import math
+from collections.abc import Sequence
 from dataclasses import dataclass
+from functools import lru_cache
 
 import numpy as np
 from numpy.typing import NDArray
 
+from gensig.faults.base import Fault, faulty_teeth
 from gensig.geometry.contact import GearPair
 from gensig.material import Material
 from gensig.mesh.modification import PairModification
 from gensig.mesh.options import MeshOptions, SliceOptions
 from gensig.mesh.pair_table import node_positions
+from gensig.mesh.slice_pressure import contact_pressure
+from gensig.mesh.sliced_table import SlicedTable, sliced_table
 from gensig.mesh.slices import (
     LoadedContact,
+    Meeting,
     SlicedMesh,
-    contact_pressure,
     loaded_contact,
     single_pair_stiffness,
     slice_places,
     sliced_mesh,
 )
+from gensig.mesh.thermal_growth import PairGrowth
 
 Array = NDArray[np.float64]
 
-N_PHASES = 64
+N_PHASES = 64  # per mesh period
 N_HARMONICS = 10
+SOUND_PERIODS = 2  # told on either side of a fault
 
 
 @dataclass(frozen=True, slots=True, kw_only=True, eq=False)
 class TransmissionError:
-    """Static transmission error under load and what goes with it, over one mesh period.
+    """Static transmission error under load and what goes with it, over one mesh period, or as many as see a fault.
 
     Parameters
     ----------
-    contact : LoadedContact          64 phases, equally spaced
-    slice_place : (slice,) m         from the end that enters first
+    contact : LoadedContact          64 phases a period, equally spaced; the first faulty teeth enter at roll 0
+    n_periods : mesh periods
+    odd_pairs : numbers of the first and the last pair with a tooth unlike the others; None without any
+    slice_edges : (slice + 1,) m     from the end that enters first
+    slice_place : (slice,) m         middles
     error : (phase,) m               approach along the transverse line of action
     harmonics : (order,) m           amplitudes of mesh orders 1, 2, ...
     pressure : (phase, pair, slice) Pa
@@ -44,6 +55,9 @@ class TransmissionError:
     """
 
     contact: LoadedContact
+    n_periods: int
+    odd_pairs: tuple[int, int] | None
+    slice_edges: Array
     slice_place: Array
     error: Array
     harmonics: Array
@@ -54,7 +68,10 @@ class TransmissionError:
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class SlicedPair:
-    """A gear pair with sound teeth, its flank modification, and the pinion's torque in N m."""
+    """A gear pair with sound teeth, its flank modification, and the pinion's torque in N m.
+
+    ``growth`` is what heat does to flanks beyond growing the pair as a whole, see ``gensig.systems.hot_pair``.
+    """
 
     pair: GearPair
     material: Material
@@ -62,47 +79,109 @@ class SlicedPair:
     slices: SliceOptions
     modification: PairModification
     torque: float
+    growth: PairGrowth | None = None
 
     @property
     def mesh_force(self) -> float:
         """Total force along the transverse line of action, N."""
         return self.torque / self.pair.pinion.base_radius
 
-    def sliced_mesh(self) -> SlicedMesh:
-        """The pair cut into slices, modified flanks included."""
-        deviation = None
+    def sliced_mesh(self, faults: Sequence[Fault] = ()) -> SlicedMesh:
+        """The pair cut into slices, modified flanks and faulty teeth included."""
+        teeth = faulty_teeth(self.pair, faults)
+        return sliced_mesh(self.pair, self.material, self.mesh, self.slices, deviation=self.deviation(), teeth=teeth)
+
+    def deviation(self) -> Array | None:
+        """How far all flanks stand back at the table's positions, (slice, node) m; None for perfect ones."""
+        if not self.modification.is_any and self.growth is None:
+            return None
+        position, place = node_positions(self.pair, self.mesh), slice_places(self.pair, self.slices)
+        back = np.zeros((len(place), len(position)))
         if self.modification.is_any:
-            position, place = node_positions(self.pair, self.mesh), slice_places(self.pair, self.slices)
-            deviation = self.modification.deviation(self.pair, position, place)
-        return sliced_mesh(self.pair, self.material, self.mesh, self.slices, deviation=deviation)
+            back = back + self.modification.deviation(self.pair, position, place)
+        return back if self.growth is None else back + self.growth.deviation(self.pair, position)
 
-    def phases(self, n_phases: int = N_PHASES) -> Array:
-        """Rolls of equally spaced phases of one mesh period, (phase,) m."""
-        return self.pair.base_pitch * (np.arange(n_phases) + 0.5) / n_phases
+    def mesh_table(self, faults: Sequence[Fault] = ()) -> SlicedTable:
+        """What the dynamics asks of the mesh with the given faults."""
+        return _mesh_table(self, tuple(faults))
 
-    def transmission_error(self, *, n_phases: int = N_PHASES) -> TransmissionError:
-        """Loaded contact over one mesh period.
+    def phases(self, n_phases: int = N_PHASES, *, first_period: int = 0, n_periods: int = 1) -> Array:
+        """Rolls of equally spaced phases of mesh periods, (phase,) m; ``n_phases`` to each."""
+        return self.pair.base_pitch * (first_period + (np.arange(n_periods * n_phases) + 0.5) / n_phases)
+
+    def transmission_error(self, faults: Sequence[Fault] = (), *, n_phases: int = N_PHASES) -> TransmissionError:
+        """Loaded contact over one mesh period, or over all in which a fault is seen and two sound ones on either side.
+
+        The first faulty tooth of either gear meets that of the other, or a sound one.
 
         Raises
         ------
         ConfigError, GeometryError    for a torque that does not drive, or flanks that nothing brings into contact
         """
-        mesh = self.sliced_mesh()
-        contact = loaded_contact(mesh, self.phases(n_phases), self.mesh_force)
-        load = contact.line_load.sum(axis=2)
+        mesh = self.sliced_mesh(faults)
+        first_period, n_periods, meeting, odd_pairs = _seen(mesh)
+        roll = self.phases(n_phases, first_period=first_period, n_periods=n_periods)
+        contact = loaded_contact(mesh, roll, self.mesh_force, meeting)
+        load = (contact.line_load * mesh.slice_width).sum(axis=2)
         on_path = (contact.position >= 0.0) & (contact.position <= self.pair.path_of_contact)
+        spectrum = 2.0 * np.abs(np.fft.rfft(contact.approach)) / len(roll)
         return TransmissionError(
             contact=contact,
+            n_periods=n_periods,
+            odd_pairs=odd_pairs,
+            slice_edges=mesh.edges,
             slice_place=mesh.slice_place,
             error=contact.approach,
-            harmonics=2.0 * np.abs(np.fft.rfft(contact.approach))[1 : N_HARMONICS + 1] / n_phases,
+            harmonics=spectrum[n_periods :: n_periods][:N_HARMONICS],
             pressure=contact_pressure(mesh, contact, self.material),
             load_share=load / load.sum(axis=1, keepdims=True),
-            bearing=float((on_path & (contact.line_load > 0.0)).sum() / on_path.sum()),
-        )
+            bearing=float((mesh.slice_width * (on_path & (contact.line_load > 0.0))).sum()
+                          / (mesh.slice_width * on_path).sum()),
+        )  # fmt: skip
 
     def single_pair(self, n_positions: int = 401) -> tuple[Array, Array]:
         """Stiffness of one pair from its first touch to its last: positions s of the first slice in m, and N/m."""
         mesh = self.sliced_mesh()
         position = np.linspace(0.0, self.pair.path_of_contact + float(mesh.lag.max()), n_positions)
         return position, single_pair_stiffness(mesh, position, self.mesh_force)
+
+    def faulty_pair(self, faults: Sequence[Fault], position: Array) -> Array:
+        """The same at given positions for the first faulty teeth, slices that the set torque closes, (phase,) N/m."""
+        mesh, sound = self.sliced_mesh(faults), self.sliced_mesh()
+        within = float(loaded_contact(sound, self.phases(), self.mesh_force).approach.mean())
+        pinion, wheel = (
+            int(side.kind[side.kind > 0][0]) if side.kind.any() else 0 for side in (mesh.pinion, mesh.wheel)
+        )
+        closed = within - mesh.shared_compliance * self.mesh_force
+        return single_pair_stiffness(mesh, position, self.mesh_force, (pinion, wheel), closed)
+
+
+def _seen(mesh: SlicedMesh) -> tuple[int, int, Meeting, tuple[int, int] | None]:
+    """First mesh period and number of those that show what is unlike in the teeth, what meets, and the odd pairs."""
+    start, span, turn = [0, 0], -1, 0
+    for gear, side in enumerate((mesh.pinion, mesh.wheel)):
+        count = np.bincount(side.kind)
+        odd = np.flatnonzero(side.kind != count.argmax())
+        if len(odd):
+            start[gear], span = int(odd[0]), max(span, int(odd[-1] - odd[0]))
+            turn = max(turn, len(side.kind))
+    meeting = Meeting(start_tooth_pinion=start[0], start_tooth_wheel=start[1])
+    if span < 0:
+        return 0, 1, meeting, None
+    n_periods = math.ceil(mesh.pair.total_contact_ratio) + span + 2 * SOUND_PERIODS
+    if n_periods >= turn:
+        return 0, turn, meeting, (0, span)
+    return -SOUND_PERIODS, n_periods, meeting, (0, span)
+
+
+@lru_cache(maxsize=32)
+def _mesh_table(system: SlicedPair, faults: tuple[Fault, ...]) -> SlicedTable:
+    return sliced_table(
+        system.pair,
+        system.material,
+        system.mesh,
+        system.slices,
+        faulty_teeth(system.pair, faults),
+        force=system.mesh_force,
+        deviation=system.deviation(),
+    )

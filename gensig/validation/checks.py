@@ -3,19 +3,34 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Sequence
+from typing import Any
 
 from gensig.errors import ConfigError
 from gensig.validation.body_checks import BODY
 from gensig.validation.case import read_case
 from gensig.validation.dynamics_checks import DYNAMICS
+from gensig.validation.engine_response_checks import FORCED, read_forced_case
 from gensig.validation.fault_checks import FAULT
-from gensig.validation.geometry_checks import GEOMETRY, Check
+from gensig.validation.geometry_checks import GEOMETRY
+from gensig.validation.heat_checks import HOT, read_hot_case
 from gensig.validation.helical_checks import SLICED, read_sliced_case
+from gensig.validation.line_checks import LINES, read_line_case
 from gensig.validation.mesh_checks import MESH
 from gensig.validation.rows import SOURCES, Result, Row, judge, read_rows
 from gensig.validation.standard_checks import STANDARD
+from gensig.validation.strength_checks import STRENGTH, read_strength_case
+from gensig.validation.wear_checks import WEAR, read_wear_point
 
-QUANTITIES: dict[str, Check] = {**GEOMETRY, **BODY, **MESH, **FAULT, **STANDARD, **DYNAMICS}
+# quantities by the kind of case that they are of, and what reads it
+KINDS: tuple[tuple[dict[str, Any], Callable[[tuple[str, ...]], Any]], ...] = (
+    ({**GEOMETRY, **BODY, **MESH, **FAULT, **STANDARD, **DYNAMICS}, read_case),
+    (SLICED, read_sliced_case),
+    (STRENGTH, read_strength_case),
+    (HOT, read_hot_case),
+    (LINES, read_line_case),
+    (FORCED, read_forced_case),
+    (WEAR, read_wear_point),
+)
 
 
 def evaluate(row: Row) -> Result:
@@ -25,11 +40,10 @@ def evaluate(row: Row) -> Result:
     ------
     ConfigError    for a quantity there is not, or overrides that make no machine
     """
-    if row.quantity in SLICED:
-        return judge(row, SLICED[row.quantity](read_sliced_case(row.overrides), row.at))
-    if row.quantity not in QUANTITIES:
-        raise ConfigError(f"{row.origin}.csv, {row.id}: no quantity '{row.quantity}'; see gensig.validation.checks")
-    return judge(row, QUANTITIES[row.quantity](read_case(row.overrides), row.at))
+    for quantities, read in KINDS:
+        if row.quantity in quantities:
+            return judge(row, quantities[row.quantity](read(row.overrides), row.at))
+    raise ConfigError(f"{row.origin}.csv, {row.id}: no quantity '{row.quantity}'; see gensig.validation.checks")
 
 
 def run_validation(

@@ -13,7 +13,13 @@ SOURCE_TITLES = {
     "spur_paper": "What the spur paper prints and claims",
     "helical_reference": "Reference numbers for both helical pairs",
     "helical_error_paper": "What the paper on transmission error and flank modification prints",
-    "helical_heat_paper": "What the paper on helical stiffness with temperature prints: cold gears",
+    "helical_heat_paper": "What the paper on helical stiffness with temperature prints",
+    "engine_root_stress": "Root stress and safety factor of the diesel's injection pump drive",
+    "engine_reference": "Reference numbers for the diesel's shaft line",
+    "engine_paper": "What the paper on the diesel's timing gears prints",
+    "wear_reference": "Reference numbers for the wear life",
+    "wear_paper": "What the wear-life paper prints and claims",
+    "engine_response": "What the same paper prints of the running engine",
 }
 SOURCE_TEXTS = {
     "spur_reference": "Computed independently of this project (rack geometry, potential-energy method, 2-D finite "
@@ -39,7 +45,31 @@ SOURCE_TEXTS = {
     "of the contact lines, `misaligned` have 5.2 um over the face. No line was tuned; the addendum is the one with "
     "which the printed contact ratio comes out.",
     "helical_heat_paper": "Gears 40/162, 24.351 kN m; bores of half the pitch radius, an even split of the profile "
-    "shift and the rack's rounding are assumed, the paper prints none of them. Hot gears are not computed yet.",
+    "shift and the rack's rounding are assumed, the paper prints none of them. Hot gears are those of "
+    "heat=chongqing_rated, whose inputs are assumed as well; `true`, `contact_ratio`, `apparent` and `softened` are "
+    "the effects of heat one by one (docs/theory/heat.md), `ours` gensig's own mesh.",
+    "engine_root_stress": "Sun, Shi, Chen, Li & Liu, spur gears 54/54 of module 3, and numbers computed from it "
+    "independently of this project (`reference`, `variants`). The paper prints root stresses and safety factors, but "
+    "neither a force nor any form factor: the force that gives its stress is what can be compared. All load factors "
+    "are 1; rack ISO 53-A is assumed.",
+    "engine_reference": "Computed independently of this project from the same tables. `true_ratios` is the line as "
+    "printed with the gears' ratios, `ratios_ignored` takes every mesh for a shaft of its printed torsional stiffness, "
+    "`crank_only` leaves the gear train out, `half_ring` counts half of the damper's outer part, as for a viscous "
+    "damper.",
+    "engine_paper": "Sun, Shi, Chen, Li & Liu (2024), 67 inertias and 66 stiffnesses as printed in table A1, gears as "
+    "in table B1. Variants as above. No inertia or stiffness is fitted: many pairs of changed numbers meet all four "
+    "frequencies within 0.01 %, so that a close fit would be no evidence.",
+    "wear_reference": "Computed independently of this project from table 1 of the wear-life paper, whose equations "
+    "(1) to (10) are lost: sliding, pressure, and wear of a mesh by the contact band (Flodin) and by the paper's fixed "
+    "intervals. A is where the wheel's tip meets the pinion's root, C the pitch point, E the pinion's tip. One pair, "
+    "new flanks; `spur`, `full_addendum` and `helical` are what gensig takes by default, with flanks that wear and "
+    "share the load by the loaded mesh.",
+    "wear_paper": "Pan, Zhao, Li & Wang (2012), gears 38/55, 200 N m, 4 pi rad/s, in the paper's setting: one pair, "
+    "new flanks, force over the reference radius. The threshold S and the number of intervals N_i are not printed; "
+    "hours are taken for the lives, whose unit the paper leaves out.",
+    "engine_response": "1688 r/min, 12.68 kN m, linear: meshes never part. The paper prints no size, pressure, cam, "
+    "pump or firing order; all are assumed (`excitation=engine_v20`, docs/theory/engine_excitation.md), none is tuned. "
+    "Two firing orders: `least_couples` of the crank, the default, and `in_sequence`.",
 }
 TITLES = {
     "geometry": "Teeth and root transition curve",
@@ -106,6 +136,47 @@ TITLES = {
     "printed_error": "Transmission error and line load",
     "printed_schemes": "Tables 3 to 5",
     "cold": "Cold stiffness",
+    "pump_drive": "What the paper prints",
+    "reference": "Form and stress correction factors, forces",
+    "variants": "The same stress under other racks",
+    "mesh": "Through the mesh",
+    "bulk_field": "Bulk temperature above the oil",
+    "hot": "Hot stiffness",
+    "hot_change": "Hot over cold, effect by effect",
+    "finite_elements": "Beside the paper's finite elements",
+    "sweeps": "Sweeps of friction, torque and speed",
+    "sweeps_rise": "Does stiffness rise with friction, torque and speed?",
+    "torque_matters_most": "Does torque matter most?",
+    "heat_flow": "Friction heat, and how warm the cooled surfaces get",
+    "flash": "Flash temperature",
+    "hotter_than_housing": "Gears hotter than their housing",
+    "line_modes": "Natural frequencies of the whole line",
+    "computed_modes": "Natural frequencies, as the paper computed them",
+    "measured_modes": "Natural frequencies, as the paper measured them",
+    "wear_geometry": "Geometry",
+    "wear_sliding": "Sliding",
+    "wear_pressure": "Contact pressure",
+    "wear_per_mesh": "Wear of a mesh",
+    "wear_rate": "Wear of an hour",
+    "wear_exponent": "Exponents of the torque",
+    "wear_step": "Convergence",
+    "wear_life": "Lives that the paper's fits allow",
+    "wear_fits": "Local exponents of the printed fits",
+    "wear_drive": "Contact ratio",
+    "wear_sliding_paper": "Sliding",
+    "wear_pressure_paper": "Contact pressure",
+    "wear_depth_paper": "Wear depth",
+    "wear_step_paper": "The step of the paper's rule",
+    "wear_radius_paper": "Curvature radius after wear",
+    "wear_life_paper": "Lives as printed",
+    "wear_fits_paper": "The printed fits as fits of our law",
+    "fluctuation_computed": "Speed fluctuation, as the paper computed it",
+    "fluctuation_measured": "Speed fluctuation, as the paper measured it",
+    "engine_alone": "Speed fluctuation by the cylinders alone",
+    "ratios": "Pump end against flywheel",
+    "spectrum": "Orders of the largest lines",
+    "tooth_force": "Forces of the pump drive's teeth",
+    "cycle": "The assumed cycle",
 }
 INTRO = """# Validation
 

@@ -1,6 +1,6 @@
 """Printed figures as data: one CSV per source, one row per figure or claim.
 
-The columns: ``id``; ``quantity`` and ``at``, what is computed and where (``gensig.validation.checks.QUANTITIES``);
+The columns: ``id``; ``quantity`` and ``at``, what is computed and where (``gensig.validation.checks.KINDS``);
 ``overrides``, the configuration it belongs to; ``printed``, ``unit`` and ``tolerance``; ``kind``; ``expected``, a
 verdict other than the good one that is known and explained; ``source`` (section, equation or table); ``reason``.
 
@@ -18,7 +18,19 @@ from importlib import resources
 
 from gensig.errors import ConfigError
 
-SOURCES = ("spur_reference", "spur_paper", "helical_reference", "helical_error_paper", "helical_heat_paper")
+SOURCES = (
+    "spur_reference",
+    "spur_paper",
+    "helical_reference",
+    "helical_error_paper",
+    "helical_heat_paper",
+    "engine_root_stress",
+    "engine_reference",
+    "engine_paper",
+    "engine_response",
+    "wear_reference",
+    "wear_paper",
+)
 REPRODUCED, DIFFERS = "reproduced", "differs"
 HOLDS, FAILS = "claim holds", "claim does not hold"
 NOT_PRINTED = "not printed"
@@ -36,6 +48,10 @@ UNITS = {
     "1e-12 m/N": 1e-12,
     "N/mm": 1e3,
     "N": 1.0,
+    "N m": 1.0,
+    "h": 3600.0,
+    "K": 1.0,
+    "kW": 1e3,
     "MPa": 1e6,
     "1e9 N/m": 1e9,
     "N/(mm um)": 1e9,  # per face width
@@ -45,6 +61,11 @@ UNITS = {
     "Hz": 1.0,
     "r/min": 0.10471975511965977,
     "m/s2": 1.0,
+    "mm/s": 1e-3,
+    "nm": 1e-9,
+    "ms": 1e-3,
+    "um/h": 1e-6,
+    "1/Pa": 1.0,
 }
 
 
@@ -127,7 +148,7 @@ def judge(row: Row, value: float) -> Result:
     else:
         printed = float(row.printed)
         allowed = max((row.tolerance or 0.0) * abs(printed), half_last_digit(row.printed))
-        deviation = (computed - printed) / abs(printed)
+        deviation = (computed - printed) / abs(printed) if printed else None
         verdict = REPRODUCED if abs(computed - printed) <= allowed * (1.0 + 1e-9) else DIFFERS
     return Result(row=row, computed=computed, deviation=deviation, verdict=verdict)
 

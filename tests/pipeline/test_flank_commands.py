@@ -46,6 +46,24 @@ def test_stiffness_of_a_helical_pair(tmp_path, capsys):
     assert figure.stat().st_size > 1000
 
 
+def test_a_fault_is_told_over_the_periods_that_see_it(tmp_path, capsys):
+    words = ["system=helical_pair", "mesh.n_slices=12", "fault=crack", "fault.crack_depth_mm=1"]
+    out, figure = tmp_path / "te.json", tmp_path / "te.png"
+    assert main(["transmission-error", *words, "--json", str(out), "--plot", str(figure)]) == 0
+    content = json.loads(out.read_text())
+    assert content["mesh_periods"] == 8
+    assert len(content["transmission_error_um"]) == len(content["fault_adds_um"]) == 8 * 64
+    assert max(content["fault_adds_um"]) > 0.5
+    assert "the fault adds             0 .. 0." in capsys.readouterr().out
+    assert figure.read_bytes().startswith(b"\x89PNG")
+    assert main(["stiffness", *words, "--json", str(out), "--plot", str(figure)]) == 0
+    content = json.loads(out.read_text())
+    single, faulty = content["single_pair_stiffness_n_per_m"], content["faulty_pair_stiffness_n_per_m"]
+    assert max(faulty) < 0.95 * max(single)
+    assert min(content["mesh_stiffness_n_per_m"]) < 0.97 * min(content["sound_mesh_stiffness_n_per_m"])
+    assert "the mesh loses" in capsys.readouterr().out
+
+
 def test_a_modification_too_deep_to_close_is_said(capsys):
     deep = ["modification.pinion.tip_relief_um=100", "modification.pinion.tip_relief_height_mm=1"]
     assert main(["transmission-error", *HELICAL, *deep]) == 0
@@ -76,7 +94,11 @@ def test_what_modify_flank_writes_other_commands_take(tmp_path, capsys, monkeypa
 @pytest.mark.parametrize(
     ("words", "message"),
     [
-        (["transmission-error", *HELICAL, "fault=crack"], "the flanks here are sound ones"),
+        (["modify-flank", *HELICAL, "fault=crack", "--out", "best.yaml"], "a modification is for sound flanks"),
+        (
+            ["transmission-error", *HELICAL, "fault=crack", "fault.crack_depth_mm=1", "fault.crack_width_mm=5"],
+            "mesh.slice_coupling = 'independent' with a fault over part of the face",
+        ),
         (["transmission-error", *HELICAL, "--plot", "te.txt"], "the name must end in .png"),
         (["transmission-error", *HELICAL, "operating.torque_nm=0"], "torque"),
         (["transmission-error", *HELICAL, "mesh.n_slices=0"], "mesh.n_slices = 0 must lie in 1..1000"),

@@ -52,6 +52,10 @@ def test_wheel_runs_from_another_folder(python: Path, tmp_path: Path) -> None:
         [gensig, "stiffness", "fault=crack"], cwd=tmp_path, capture_output=True, text=True, check=True
     )
     assert "1.71178" in done.stdout
+    tables = subprocess.run(
+        [gensig, "modes", "system=engine_gear_train"], cwd=tmp_path, capture_output=True, text=True, check=True
+    )
+    assert "215.97" in tables.stdout
     words = ["generate", "--quiet", "plan.n_records=1", "operating.duration_s=0.02", "out=data"]
     subprocess.run([gensig, *words], cwd=tmp_path, check=True, capture_output=True)
     assert subprocess.run([gensig, "verify", "data"], cwd=tmp_path, check=False, capture_output=True).returncode == 0

@@ -231,3 +231,44 @@ def contact_radii(gear: Gear, n_contacts: int, *, root_margin: float = 0.05, tip
     tip = math.sqrt(gear.tip_radius**2 - gear.base_radius**2)
     start = gear.junction_curvature_radius
     return np.linspace(start + root_margin * (tip - start), tip - tip_margin, n_contacts)
+
+
+def root_stress_factor(
+    gear: Gear,
+    curvature_radius: Array,
+    plane: Plane,
+    *,
+    resolution: Resolution | None = None,
+    modelled_teeth: int = MODELLED_TEETH,
+) -> tuple[Array, Array]:
+    """Largest tension along the loaded side's root curve, over F / (W m) for a force F along the line of action.
+
+    Parameters
+    ----------
+    curvature_radius : (contact,) m    of the involute at the contact
+
+    Returns
+    -------
+    (contact,)        stress along the free edge: E (plane strain: E / (1 - nu^2)) times its stretch
+    (contact,) rad    slope of the edge to the tooth centreline where it is largest; ISO 6336-3 takes 30 degrees
+    """
+    mesh = gear_mesh(gear, {0: curvature_radius}, resolution=resolution, modelled_teeth=modelled_teeth)
+    solution = _solve(mesh, _on_bore(gear, mesh), gear, curvature_radius, plane)
+    edges = mesh.facets[:, mesh.boundary_facets()]
+    middle = mesh.p[:, edges].mean(axis=1)
+    junction = math.hypot(gear.base_radius, gear.junction_curvature_radius) / gear.normal_module
+    bore = 0.5 * (gear.bore_radius + gear.root_radius) / gear.normal_module
+    radius, angle = np.hypot(*middle), np.arctan2(middle[1], middle[0])
+    on_root = (radius > bore) & (radius < junction) & (angle > 0.0) & (angle < math.pi / gear.n_teeth)
+    first, second = edges[:, on_root]
+    along = mesh.p[:, second] - mesh.p[:, first]
+    along *= np.sign(along[0])  # outward
+    length = np.hypot(*along)
+    sign = np.sign(mesh.p[0, second] - mesh.p[0, first])
+    dofs = solution.basis.nodal_dofs
+    moved = (solution.displacement[dofs[:, second]] - solution.displacement[dofs[:, first]]) * sign[None, :, None]
+    stretch = np.einsum("ce,cel->el", along, moved) / length[:, None] ** 2
+    nu = plane.material.poisson_ratio
+    stress = stretch / (1.0 if plane.elasticity == "plane_stress" else 1.0 - nu**2)
+    at = stress.argmax(axis=0)
+    return stress.max(axis=0), np.arctan2(-along[1, at], along[0, at])

@@ -1,7 +1,8 @@
-"""Write the reference tables again: ``python -m tests.reference.regenerate [healthy|tooth|crack|bores|three_d ...]``.
+"""Write the reference tables again: ``python -m tests.reference.regenerate [healthy|tooth|crack|...]``.
 
-Without names, all of them. Compliances are dimensionless, compliance * E * W; a plane compliance in this form is the
-same for every module, modulus and face width, and depends on Poisson's ratio (0.3 here) and the plane state.
+Without names, all of them; see ``TABLES``. Compliances are dimensionless, compliance * E * W; a plane compliance in
+this form is the same for every module, modulus and face width, and depends on Poisson's ratio (0.3 here) and the plane
+state.
 """
 
 from __future__ import annotations
@@ -30,10 +31,11 @@ from tests.reference.finite_elements import (
     contact_radii,
     crack_increment,
     cross_compliance,
+    root_stress_factor,
     structural_compliance,
     tooth_compliance,
 )
-from tests.reference.gear_mesh import Crack
+from tests.reference.gear_mesh import Crack, Resolution
 from tests.reference.three_d import three_d
 
 Array = NDArray[np.float64]
@@ -82,7 +84,11 @@ GEARS: dict[str, Gear] = {
     "z25_sharp": _gear(25, cutter_tip_radius_coefficient=0.2),
     "z30_long": _gear(30, addendum_coefficient=1.15),
 }
+ONLY_STRESSED = {"z54": _gear(54)}
 CRACKED = ("z23_bore9", "z40", "z84", "z17_x03", "z30_alpha25", "z25_sharp")
+STRESSED = ("z17_x03", "z23", "z25_sharp", "z30_alpha25", "z30_long", "z40", "z54", "z84")
+TIP_DISTANCES = (0.02, 0.15, 0.3, 0.45, 0.6, 0.75, 0.9, 1.05)  # base pitches from the tip
+FINE_ROOT = Resolution(flank=0.05, root=0.015, inside=1.0)
 ALL_ANGLES = ("z23_bore9", "z40", "z84")
 
 
@@ -94,7 +100,7 @@ STRAIN = _plane("plane_strain")
 
 
 def _gear_columns(case: str) -> Row:
-    gear = GEARS[case]
+    gear = GEARS.get(case) or ONLY_STRESSED[case]
     return {
         "case": case,
         "n_teeth": gear.n_teeth,
@@ -196,6 +202,22 @@ def bores() -> Iterator[Row]:
                 yield from _contact_rows(head, radii, labels, compliance=cross)
 
 
+def root_stress() -> Iterator[Row]:
+    """Largest tension along the root curve, over the force along the line of action / (W m)."""
+    for case in STRESSED:
+        gear = GEARS.get(case) or ONLY_STRESSED[case]
+        tip = math.sqrt(gear.tip_radius**2 - gear.base_radius**2)
+        radii = tip - np.array(TIP_DISTANCES) * gear.base_pitch
+        inside = radii > gear.junction_curvature_radius + TIP_MARGIN
+        factor, slope = root_stress_factor(gear, radii[inside], _plane("plane_stress"), resolution=FINE_ROOT)
+        for distance, value, angle in zip(np.array(TIP_DISTANCES)[inside], factor, np.degrees(slope), strict=True):
+            yield _gear_columns(case) | {
+                "tip_distance_over_base_pitch": float(distance),
+                "stress_factor": float(value),
+                "tangent_deg": float(angle),
+            }
+
+
 def _position(kind: str, point: str, position: float) -> Row:
     return {"kind": kind, "point": point, "position_over_module": position / BASE.normal_module}
 
@@ -232,6 +254,7 @@ TABLES: dict[str, Callable[[], dict[str, Iterable[Row]]]] = {
     "tooth": lambda: {"tooth": tooth()},
     "crack": lambda: {"crack": crack()},
     "bores": lambda: {"bores": bores()},
+    "root_stress": lambda: {"root_stress": root_stress()},
     "three_d": three_d_tables,
 }
 

@@ -11,7 +11,7 @@ from scipy.integrate import solve_ivp
 from scipy.optimize import brentq
 
 from gensig.courses import Profile
-from gensig.dynamics import pair
+from gensig.dynamics import mesh_statics
 from gensig.dynamics.pair import DOFS, PAIR_DOFS, Rotor
 from gensig.dynamics.system import eigenvalues
 from gensig.errors import ConfigError
@@ -318,7 +318,7 @@ class TestMeshNumbers:
             return static_mesh(*arguments)
 
         fresh = replace(dynamics_of(smooth), table=replace(smooth.mesh_table()))
-        monkeypatch.setattr(pair, "static_mesh", counted)
+        monkeypatch.setattr(mesh_statics, "static_mesh", counted)
         first = fresh.mean_mesh_stiffness
         assert fresh.mean_mesh_stiffness == first
         assert len(calls) == 1
@@ -328,14 +328,14 @@ class TestMeshNumbers:
 
     def test_the_mean_stiffness_is_that_of_the_teeth_that_most_are(self, smooth):
         table, force = smooth.mesh_table(), smooth.mesh_force
-        sound = pair._mean_mesh_stiffness(table, force)
+        sound = mesh_statics.mean_mesh_stiffness(table, force)
         soft = np.concatenate([table.pinion.compliance, 2.0 * table.pinion.compliance])
 
         def softer(n_soft):
             kind = (np.arange(23) < n_soft).astype(int)
             rows = {name: np.repeat(getattr(table.pinion, name), 2, axis=0) for name in ("gap", "gap_slope", "present")}
             rows["compliance_slope"] = np.repeat(table.pinion.compliance_slope, 2, axis=0)
-            return pair._mean_mesh_stiffness(
+            return mesh_statics.mean_mesh_stiffness(
                 replace(table, pinion=replace(table.pinion, compliance=soft, kind=kind, **rows)), force
             )
 

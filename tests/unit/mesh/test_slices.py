@@ -12,10 +12,16 @@ from gensig.compose import compose
 from gensig.errors import ConfigError, GeometryError
 from gensig.geometry.contact import GearPair
 from gensig.geometry.gear import Gear
+from gensig.geometry.tooth import healthy_tooth
+from gensig.geometry.tooth_profile import load_angle
 from gensig.material import Material
+from gensig.mesh._slice_kernels import bite_forces
+from gensig.mesh.body_coupling import cross_compliance
 from gensig.mesh.load_distribution import loaded_pair_table, pair_states, static_mesh
 from gensig.mesh.options import read_mesh_options, read_slice_options
-from gensig.mesh.slices import contact_pressure, loaded_contact, single_pair_stiffness, sliced_mesh
+from gensig.mesh.pair_table import structural_compliance
+from gensig.mesh.slice_pressure import contact_pressure
+from gensig.mesh.slices import loaded_contact, single_pair_stiffness, sliced_mesh
 from gensig.units import read, to_si
 
 STEEL = Material(youngs_modulus=210e9, poisson_ratio=0.3, density_kg_per_m3=7850.0)
@@ -98,7 +104,7 @@ def test_loads_add_up_and_never_pull(mesh_keys):
     for changes in ({}, {"contact": "linear"}, {"slice_coupling": "coupled"}):
         mesh, contact = solved(pair, 178.0, mesh_keys, **changes)
         force = 178.0 / pair.pinion.base_radius
-        np.testing.assert_allclose(contact.line_load.sum(axis=(1, 2)) * mesh.slice_width, force, rtol=1e-9)
+        np.testing.assert_allclose(contact.line_load.sum(axis=(1, 2)) * mesh.slice_width[0], force, rtol=1e-9)
         assert contact.line_load.min() >= 0.0
 
 
@@ -109,7 +115,7 @@ def test_equilibrium_is_that_of_an_independent_solver(mesh_keys, length):
     changes = {"contact": "linear", "slice_coupling": "coupled", "coupling_modules": length, "n_slices": 12}
     deviation = np.linspace(0.0, 8e-6, 12)[:, None]
     mesh, contact = solved(pair, 60.0, mesh_keys, n_phases=3, deviation=deviation, **changes)
-    force, width = 60.0 / pair.pinion.base_radius, mesh.slice_width
+    force, width = 60.0 / pair.pinion.base_radius, mesh.slice_width[0]
     coupling = (length * pair.pinion.normal_module / width) ** 2
     for k in range(3):
         position = contact.position[k]
@@ -129,6 +135,43 @@ def test_equilibrium_is_that_of_an_independent_solver(mesh_keys, length):
         reach = contact.approach[k] - mesh.shared_compliance * force - gap.ravel()
         load, _ = nnls(root * 1e6, np.linalg.solve(root.T, reach) * 1e6)
         np.testing.assert_allclose(contact.line_load[k].ravel(), load, atol=2e-6 * load.max())
+
+
+@pytest.mark.parametrize(
+    ("loaded", "finite_elements"),
+    [
+        (lambda place: (place > 5e-3) & (place < 15e-3), (1.26, 1.28)),
+        (lambda place: (place < 5e-3) | (place > 15e-3), (1.26, 1.28)),
+        (lambda place: place < 10e-3, (1.48, 1.48)),
+    ],
+    ids=["middle half", "outer halves", "one end"],
+)
+def test_coupling_length_is_that_of_finite_elements(mesh_keys, loaded, finite_elements):
+    """How much softer the spur paper's pinion (20 mm wide) is when a straight mate touches half of its face only.
+
+    Three-dimensional finite elements (tests/reference) against the default coupling over what bodies do not share.
+    """
+    pair, slices = gears("xiamen_23_84"), read_slice_options(mesh_keys)
+    options = read_mesh_options(mesh_keys)
+    curvature = np.array([float(pair.pinion_curvature(pair.pitch_point))])
+    in_plane = STEEL.in_plane(options.elasticity)
+    whole = structural_compliance(healthy_tooth(pair.pinion), curvature, in_plane, options)[0]
+    overlap = np.linspace(0.0, pair.path_of_contact - pair.base_pitch, 9)
+    angles = [
+        load_angle(pair.pinion, np.asarray(pair.pinion_curvature(at))) for at in (overlap, overlap + pair.base_pitch)
+    ]
+    shared = float(np.mean(cross_compliance(pair.pinion, in_plane, *angles, pitches=1)))
+    n = 200
+    place, width = (np.arange(n) + 0.5) / n * 20e-3, np.full((1, n), 20e-3 / n)
+    structure, first, force = np.full((1, n), (whole - shared) * 20e-3), np.empty(1), np.empty((1, 1))
+    gap = np.where(loaded(place), 0.0, 1.0)[None]
+    length = slices.coupling_modules * pair.pinion.normal_module
+    bite_forces(
+        structure, 1e-6 * structure[0, 0], np.ones((1, n)), 0.0, gap, width, width[0], length**2, 1.0, np.array([1e-6]),
+        1.0, first, force,
+    )  # fmt: skip
+    softer = (1e-6 / force[0, 0] + shared) / whole
+    assert softer == pytest.approx(np.mean(finite_elements), rel=0.03)
 
 
 def test_an_overlap_of_one_has_no_ripple(mesh_keys):

@@ -101,12 +101,11 @@ def test_points_of_the_box_are_modifications(helical):
 @pytest.mark.parametrize(
     ("words", "message"),
     [
-        (["system=helical_pair"], "system=helical_pair has statics so far"),
         (["gear.helix_angle_deg=10"], "system=spur_pair takes spur gears"),
         (["modification.pinion.crowning_um=3"], "modification: system=spur_pair has its reliefs as faults"),
     ],
 )
-def test_records_are_not_promised_where_there_are_none(words, message):
+def test_what_a_spur_pair_cannot_have_is_refused(words, message):
     with pytest.raises(ConfigError, match=message):
         read_system(read_request(words).config)
     with pytest.raises(ConfigError, match="must be positive"):

@@ -1,0 +1,164 @@
+"""The verb forced-response: what an engine's torques do to its drive line, steadily, at one speed and over a run."""
+
+from __future__ import annotations
+
+import json
+from argparse import Namespace
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+
+from gensig.commands.console import replaced_file
+from gensig.config import read_request
+from gensig.dynamics.engine_torques import EngineTorques
+from gensig.dynamics.forced import SteadyResponse, Waterfall, disturbance_response, over_cycle, run_of_speeds
+from gensig.errors import ConfigError
+from gensig.systems.engine_line import EngineLine, read_engine_line
+from gensig.units import from_si, to_si
+
+FIGURE_TYPES = (".png", ".svg", ".pdf")
+CYCLE_POINTS = 5760
+MOST_SPEEDS = 2000
+RUN_ORDERS = 80  # half orders of a run: up to order 40
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class Found:
+    """What the verb writes: the operating point, the steady vibration, the nodes looked at, and the run of speeds.
+
+    ``seen`` is half the peak to peak of the speed that each toothed wheel shows, rad/s.
+    """
+
+    torques: EngineTorques
+    response: SteadyResponse
+    seen: dict[str, float]
+    nodes: tuple[int, ...]
+    run: tuple[Waterfall, ...]
+
+
+def forced_response(arguments: Namespace) -> int:
+    """Speed fluctuation, spectra and tooth forces: JSON, a figure, or a summary."""
+    if arguments.plot is not None and Path(arguments.plot).suffix not in FIGURE_TYPES:
+        raise ConfigError(f"--plot {arguments.plot}: the name must end in {', '.join(FIGURE_TYPES)}")
+    config = read_request(arguments.overrides, config_dir=arguments.config_dir).config
+    line = read_engine_line(config)
+    found = _find(line, arguments, config["seed"])
+    content = response_content(line, found)
+    if arguments.json:
+        with replaced_file(arguments.json) as path:
+            path.write_text(json.dumps(content, indent=1) + "\n", encoding="utf-8")
+    if arguments.plot:
+        from gensig.commands.engine_figures import plot_response
+
+        with replaced_file(arguments.plot) as path:
+            plot_response(line, found, path)
+    _print(content)
+    return 0
+
+
+def response_content(line: EngineLine, found: Found) -> dict[str, Any]:
+    """The keys of ``gensig forced-response --json``."""
+    response, torques = found.response, found.torques
+    numbers = line.drive.numbers
+    places = [numbers.index(node) for node in found.nodes]
+    linear, meshes = line.linear()
+    mean, amplitudes = response.element_forces(meshes)
+    forces = mean[:, None] + over_cycle(amplitudes, CYCLE_POINTS)
+    content: dict[str, Any] = {
+        "speed_rpm": from_si("speed_rpm", response.speed),
+        "torque_nm": torques.brake_torque,
+        "indicated_torque_nm": torques.indicated_torque,
+        "peak_pressure_mpa": from_si("pressure_mpa", float(torques.pressure.max())),
+        "node_numbers": list(numbers),
+        "nodes": [node.name for node in line.drive.line.nodes],
+        "mean_speed_rpm": [line.ratios[number] * from_si("speed_rpm", response.speed) for number in numbers],
+        "speed_fluctuation_rpm": from_si("speed_rpm", 1.0) * response.fluctuation()[: len(numbers)],
+        "toothed_wheel_fluctuation_rpm": {name: from_si("speed_rpm", value) for name, value in found.seen.items()},
+        "orders": response.orders,
+        "shown_nodes": list(found.nodes),
+        "angle_deg": np.degrees(np.abs(response.angle[places])),
+        "meshes": list(line.mesh_names),
+        "mean_tooth_force_n": mean,
+        "least_tooth_force_n": forces.min(axis=1),
+        "greatest_tooth_force_n": forces.max(axis=1),
+    }
+    if torques.disturbance_torque:
+        place = numbers.index(torques.disturbance_node)
+        moved = disturbance_response(
+            linear, place, torques.disturbance_torque, 2.0 * np.pi * torques.disturbance_frequency
+        )
+        content["disturbance_frequency_hz"] = torques.disturbance_frequency
+        content["disturbance_angle_deg"] = np.degrees(np.abs(moved[places]))
+    if found.run:
+        content["run_speeds_rpm"] = from_si("speed_rpm", 1.0) * found.run[0].speeds
+        content["run_speed_fluctuation_rpm"] = [from_si("speed_rpm", 1.0) * one.fluctuation for one in found.run]
+        content["run_angle_deg"] = [np.degrees(one.angle) for one in found.run]
+    return {key: _plain(value) for key, value in content.items()}
+
+
+def _find(line: EngineLine, arguments: Namespace, seed: int) -> Found:
+    reference, ratios = line.engine.reference, line.ratios
+    speed = reference.speed if arguments.speed is None else to_si("speed_rpm", arguments.speed)
+    measured = line.engine.pressure_decides_torque
+    torque = None if measured else reference.torque if arguments.torque is None else arguments.torque
+    if measured and (arguments.torque is not None or arguments.run is not None):
+        raise ConfigError("excitation.pressure.file decides the torque; leave --torque and --run out")
+    measured_nodes = tuple(wheel.node for wheel in line.wheels.values())
+    nodes = tuple(arguments.nodes or measured_nodes or (line.engine.throw_nodes[0], line.engine.dynamometer.node))
+    for node in nodes:
+        if node not in ratios:
+            raise ConfigError(f"--nodes {node}: the shaft line has no such node; it has {min(ratios)} to {max(ratios)}")
+    torques = line.torques(speed, torque)
+    linear, _ = line.linear()
+    places = [line.drive.numbers.index(node) for node in nodes]
+    run: list[Waterfall] = []
+    if arguments.run is not None:
+        low, high, step = (to_si("speed_rpm", value) for value in arguments.run)
+        if not (0.0 < low < high and step > 0.0 and (high - low) / step < MOST_SPEEDS):
+            given = " ".join(f"{value:g}" for value in arguments.run)
+            raise ConfigError(f"--run {given}: give low, high and step in r/min, fewer than {MOST_SPEEDS} speeds")
+        speeds = np.arange(low, high + 0.5 * step, step)
+        run = run_of_speeds(
+            linear,
+            lambda one: line.on_line(line.torques(one, arguments.run_torque)),
+            speeds,
+            places,
+            n_orders=RUN_ORDERS,
+        )
+    response, rng = line.response(speed, torque), np.random.default_rng(seed)
+    seen = {name: 0.5 * float(np.ptp(line.seen_by(wheel, response, rng))) for name, wheel in line.wheels.items()}
+    return Found(torques=torques, response=response, seen=seen, nodes=nodes, run=tuple(run))
+
+
+def _print(content: dict[str, Any]) -> None:
+    print(
+        f"{content['speed_rpm']:g} r/min, {content['torque_nm']:.6g} N m at the crank, "
+        f"{content['indicated_torque_nm']:.5g} N m indicated, peak {content['peak_pressure_mpa']:.4g} MPa"
+    )
+    by_number = dict(zip(content["node_numbers"], range(len(content["nodes"])), strict=True))
+    for node in content["shown_nodes"]:
+        place = by_number[node]
+        print(
+            f"  node {node:>3} {content['nodes'][place]:<34} {content['mean_speed_rpm'][place]:8.1f} r/min "
+            f"+- {content['speed_fluctuation_rpm'][place]:.2f}"
+        )
+    for name, value in content["toothed_wheel_fluctuation_rpm"].items():
+        print(f"  toothed wheel {name} shows +- {value:.2f} r/min")
+    for name, low, mean, high in zip(
+        content["meshes"],
+        content["least_tooth_force_n"],
+        content["mean_tooth_force_n"],
+        content["greatest_tooth_force_n"],
+        strict=True,
+    ):
+        parts = " (would part)" if min(low * mean, high * mean) < 0.0 else ""
+        print(f"  mesh {name:>6} {low:9.0f} .. {high:.0f} N, mean {mean:.0f} N{parts}")
+
+
+def _plain(value: Any) -> Any:
+    """Arrays as lists."""
+    if isinstance(value, list):
+        return [_plain(one) for one in value]
+    return value.tolist() if isinstance(value, np.ndarray) else value

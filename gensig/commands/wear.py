@@ -1,0 +1,233 @@
+"""``gensig wear-life``: wear along both flanks, the life to a threshold, lives over torque and speed."""
+
+from __future__ import annotations
+
+import json
+import math
+import sys
+from argparse import Namespace
+from collections.abc import Mapping
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import yaml
+from numpy.typing import NDArray
+
+from gensig.commands.console import one_line_warnings, replaced_file
+from gensig.config import read_request
+from gensig.errors import ConfigError, SimulationError
+from gensig.life.archard import flank_radii, hunting_turns
+from gensig.life.life_laws import FittedLaw, LifeMap, fitted_laws, life_map, torque_exponent
+from gensig.life.options import SIDES
+from gensig.life.wear_case import WearCase
+from gensig.life.wear_life import WearLife, hours, wear_life
+from gensig.systems.operation import read_operating
+from gensig.systems.registry import section
+from gensig.systems.wear import read_wear_case, wear_fault
+
+Array = NDArray[np.float64]
+
+FIGURE_TYPES = (".png", ".svg", ".pdf")
+GROUP = "fault"
+MAP_TORQUES, MAP_SPEEDS = np.geomspace(0.25, 1.5, 6), np.geomspace(0.25, 2.0, 7)  # over the configured
+YIELD_SHARE = 0.6  # of the hardness: a line contact yields below its surface (Johnson, Contact Mechanics, 1985)
+
+
+def wear_life_verb(arguments: Namespace) -> int:
+    """Life and wear to JSON, a figure, an option for records, or a summary."""
+    _check_files(arguments)
+    request = read_request(arguments.overrides, config_dir=arguments.config_dir)
+    with one_line_warnings("gensig"):
+        case = read_wear_case(request.config)
+        speed = read_operating(section(request.config, "operating")).speed
+        if case.pair.transverse_contact_ratio < 1.0:
+            _warn_of_interruption(case)
+        life = wear_life(case)
+        lives, laws = _lives(case, speed, arguments)
+        content = wear_life_content(life, speed, lives, laws)
+    _warn_of_pressure(case, content)
+    if arguments.json:
+        with replaced_file(arguments.json) as path:
+            path.write_text(json.dumps(content, indent=1, allow_nan=False) + "\n", encoding="utf-8")
+    if arguments.plot:
+        from gensig.commands.wear_figure import plot_wear_life
+
+        with replaced_file(arguments.plot) as path:
+            plot_wear_life(life, speed, content, lives, path)
+    _print(content, lives, laws)
+    if arguments.out:
+        _write_option(life, speed, Path(arguments.out))
+    return 0
+
+
+def _check_files(arguments: Namespace) -> None:
+    if arguments.plot is not None and Path(arguments.plot).suffix not in FIGURE_TYPES:
+        raise ConfigError(f"--plot {arguments.plot}: the name must end in {', '.join(FIGURE_TYPES)}")
+    if arguments.out is not None:
+        target = Path(arguments.out)
+        if target.suffix != ".yaml" or not target.stem.isidentifier():
+            raise ConfigError(f"--out {arguments.out}: give a file NAME.yaml in a folder {GROUP}, NAME without spaces")
+
+
+def _lives(case: WearCase, speed: float, arguments: Namespace) -> tuple[LifeMap | None, tuple[FittedLaw, ...]]:
+    if not (arguments.map or arguments.torques or arguments.speeds):
+        return None, ()
+    torques = arguments.torques or case.torque * MAP_TORQUES
+    speeds = speed * MAP_SPEEDS if not arguments.speeds else np.array(arguments.speeds) * math.pi / 30.0
+    lives = life_map(case, list(torques), list(speeds))
+    return lives, fitted_laws(lives, case.torque, speed)
+
+
+def wear_life_content(
+    life: WearLife, speed: float, lives: LifeMap | None = None, laws: tuple[FittedLaw, ...] = ()
+) -> dict[str, Any]:
+    """The keys of ``gensig wear-life --json``; where there are several slices, the greatest of them."""
+    case = life.case
+    path, pair, options, new, worn = case.path, case.pair, case.options, case.new_flanks(), life.depth[-1]
+    load = case.line_load(new)
+    per_mesh = case.wear_per_mesh(new)
+    deepest = np.unravel_index(_judged(case, worn).argmax(), worn.shape)
+    content: dict[str, Any] = {
+        "transverse_contact_ratio": pair.transverse_contact_ratio,
+        "overlap_ratio": pair.overlap_ratio,
+        "rule": options.rule,
+        "n_intervals": options.n_intervals if options.rule == "fixed_intervals" else None,
+        "criterion": options.criterion,
+        "sharing": "one_pair" if case.loads is None else "mesh",
+        "geometry": options.geometry,
+        "torque_nm": case.torque,
+        "speed_rpm": speed * 30.0 / math.pi,
+        "mesh_force_n": case.force,
+        "life_hours": hours(life.life, speed),
+        "life_turns": life.life,
+        "threshold_um": life.threshold * 1e6,
+        "ended_by": life.ended_by,
+        "deepest": {
+            "gear": "both" if options.criterion == "sum" else SIDES[deepest[0]],
+            "position_mm": float(path.position[deepest[2]]) * 1e3,
+        },
+        "torque_exponent": _torque_exponent(case),
+        "speed_exponent": 1.0,
+        "turns_until_the_same_teeth_meet": hunting_turns(pair),
+        "n_steps": life.n_steps,
+        "position_mm": _list(path.position * 1e3),
+        "pressure_angle_deg": _list(np.degrees(path.pressure_angle[0])),
+        "wheel_pressure_angle_deg": _list(np.degrees(path.pressure_angle[1])),
+        "sliding_velocity_mm_per_s": _list(path.sliding * speed * 1e3),
+        "line_load_n_per_mm": _list(load.max(axis=0) * 1e-3),
+        "contact_pressure_mpa": _list(case.pressure(load, new).max(axis=0) * 1e-6),
+        "contact_pressure_at_end_mpa": _list(case.pressure(case.line_load(worn), worn).max(axis=0) * 1e-6),
+        "pair_wear_per_mesh_nm": _list(per_mesh.sum(axis=0).max(axis=0) * 1e9),
+    }
+    for side, name in enumerate(SIDES):
+        content[f"{name}_wear_per_mesh_nm"] = _list(per_mesh[side].max(axis=0) * 1e9)
+        content[f"{name}_depth_um"] = _list(worn[side].max(axis=0) * 1e6)
+        if case.shape[1] > 1:
+            content[f"{name}_depth_by_slice_um"] = (worn[side] * 1e6).tolist()
+        for key, values in flank_radii(path, worn.mean(axis=1), load.mean(axis=0), case.material).items():
+            content[f"{name}_curvature_radius_{key}_mm"] = _list(values[side] * 1e3)
+    content["history"] = {
+        "hours": _list(np.array([hours(turns, speed) for turns in life.turns])),
+        "pinion_depth_um": _list(life.depth[:, 0].max(axis=(1, 2)) * 1e6),
+        "wheel_depth_um": _list(life.depth[:, 1].max(axis=(1, 2)) * 1e6),
+        "transmission_error_peak_to_peak_um": _list(np.array([case.error_range(one) for one in life.depth]) * 1e6),
+    }
+    if lives is not None:
+        content["map"] = {
+            "torque_nm": _list(lives.torque),
+            "speed_rpm": _list(lives.speed * 30.0 / math.pi),
+            "life_hours": lives.hours.tolist(),
+        }
+        content["laws"] = [_law_content(law) for law in laws]
+    return content
+
+
+def _torque_exponent(case: WearCase) -> float | None:
+    try:
+        return torque_exponent(case)
+    except (ConfigError, SimulationError):  # at 5 % more torque new flanks may be at the limit already
+        return None
+
+
+def _judged(case: WearCase, depth: Array) -> Array:
+    """What is compared with the threshold, in the shape of ``depth``."""
+    return np.broadcast_to(depth.sum(axis=0), depth.shape) if case.options.criterion == "sum" else depth
+
+
+def _law_content(law: FittedLaw) -> dict[str, Any]:
+    return {
+        "form": law.form,
+        "hours": law.text,
+        "coefficients": {"a": law.a, "b": law.b, "c": law.c},
+        "torque_nm": list(law.torque),
+        "speed_rad_per_s": list(law.speed),
+        "largest_error": law.largest_error,
+    }
+
+
+def _list(values: Array) -> list[float | None]:
+    """Numbers for JSON, which knows neither infinity nor NaN."""
+    return [float(value) if np.isfinite(value) else None for value in values]
+
+
+def _warn_of_interruption(case: WearCase) -> None:
+    one = "one pair carries everything on its path" if case.loads is None else "tips' corners help along"
+    print(
+        f"gensig: WARNING: the transverse contact ratio {case.pair.transverse_contact_ratio:.4f} is below 1: the drive "
+        f"is interrupted at every tooth, and no gears run like this; the wear here is quasi-static, {one}",
+        file=sys.stderr,
+    )
+
+
+def _warn_of_pressure(case: WearCase, content: Mapping[str, Any]) -> None:
+    """Say where the flanks would yield before they are worn so far."""
+    greatest = max(content["contact_pressure_at_end_mpa"]) * 1e6
+    hardness = min(case.options.hardness_of(name) for name in SIDES)
+    if greatest > YIELD_SHARE * hardness:
+        new = max(content["contact_pressure_mpa"])
+        print(
+            f"gensig: note: the largest pressure rises from {new:.0f} MPa to {greatest * 1e-6:.0f} MPa, above "
+            f"{YIELD_SHARE:g} of the hardness: what stands proud, such as at the pitch point, would yield first",
+            file=sys.stderr,
+        )
+
+
+def _print(content: Mapping[str, Any], lives: LifeMap | None, laws: tuple[FittedLaw, ...]) -> None:
+    def ends(key: str) -> str:
+        values = content[key]
+        return f"{values[0]:.4g} .. {values[-1]:.4g}"
+
+    print(f"rule                       {content['rule']}, sharing {content['sharing']}, geometry {content['geometry']}")
+    print(f"contact ratio              {content['transverse_contact_ratio']:.4f}")
+    print(f"pressure angle, A to E     {ends('pressure_angle_deg')} deg on the pinion")
+    print(f"sliding, A to E            {ends('sliding_velocity_mm_per_s')} mm/s, 0 at the pitch point")
+    print(f"contact pressure, A to E   {ends('contact_pressure_mpa')} MPa, new flanks")
+    for name in SIDES:
+        print(f"{name:<6} wear, A to E       {ends(f'{name}_wear_per_mesh_nm')} nm a mesh, new flanks")
+    where = content["deepest"]
+    print(f"life                       {content['life_hours']:.5g} h, {content['life_turns']:.5g} turns of the pinion")
+    print(f"ended by                   {content['ended_by'].replace('_', ' ')}, {content['threshold_um']:.4g} um "
+          f"({where['gear']}, {where['position_mm']:.3f} mm from A)")  # fmt: skip
+    if content["torque_exponent"] is not None:
+        print(f"local law                  life ~ torque^-{content['torque_exponent']:.3f} speed^-1")
+    if lives is not None:
+        print(f"{'life, h':<10}" + "".join(f"{speed * 30.0 / math.pi:>11.4g}" for speed in lives.speed) + " r/min")
+        for torque, row in zip(lives.torque, lives.hours, strict=True):
+            print(f"{torque:>6.4g} N m" + "".join(f"{value:>11.4g}" for value in row))
+    for law in laws:
+        print(f"{law.form:<12} {law.text} h, off by at most {law.largest_error:.1%}; {law.torque[0]:.4g} .. "
+              f"{law.torque[1]:.4g} N m, {law.speed[0]:.4g} .. {law.speed[1]:.4g} rad/s")  # fmt: skip
+
+
+def _write_option(life: WearLife, speed: float, target: Path) -> None:
+    """The worn flanks as an option of the group ``fault``."""
+    pair = life.case.pair
+    option = yaml.safe_dump(wear_fault(life.case, life.depth[-1]), sort_keys=False, width=110)
+    with replaced_file(target) as path:
+        path.write_text(
+            f"# Flanks of {pair.pinion.n_teeth}/{pair.wheel.n_teeth} teeth after {hours(life.life, speed):.4g} h at "
+            f"{life.case.torque:g} N m (gensig wear-life).\n{option}",
+            encoding="utf-8",
+        )
+    print(f"{target}: take it with {GROUP}={target.stem} --config-dir {target.parent.parent}")

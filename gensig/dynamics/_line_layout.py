@@ -1,0 +1,137 @@
+"""Where the numbers of a geared shaft line lie in the arrays of its compiled core."""
+
+from __future__ import annotations
+
+from typing import Any, NamedTuple
+
+# numbers of a mesh
+(
+    BACKLASH, DAMPING, SHARED, START, NOMINAL_PITCHES, PITCHES_PER_RAD, MIRROR, LEAST_GAP, LEAST_COAST_GAP,
+    N_NUMBERS,
+) = range(10)  # fmt: skip
+# whole numbers of a mesh; those called AT_ say where a flat array begins
+(
+    ROLL_DOF, N_PAIRS, FIRST, NODES, AT_TABLE, AT_ROWS, AT_COAST_ROWS, TEETH_A, TEETH_B, AT_KIND_A, AT_KIND_B,
+    AT_ERROR_A, AT_ERROR_B, START_A, START_B, N_KINDS_B, N_PLACES,
+) = range(17)  # fmt: skip
+# what is gathered of a pair: stiffness, gap, and how fast both grow as the mesh rolls on
+STIFFNESS, GAP, STIFFNESS_SLOPE, GAP_SLOPE, N_GATHERED = range(5)
+DRIVE, COAST, N_FLANKS = range(3)
+# what a mesh does at an instant; LOST is a power, ALONG the force on the roll coordinate, J per pitch
+FORCE, TANGENT, RATE_TANGENT, STORED, LOST, ALONG, N_LAW = range(7)
+# what a mesh has done: contact lost and back flanks loaded in steps, extreme forces
+APART, BEHIND, LARGEST, LEAST, N_TALLY = range(5)
+# sums of a run in J, then counts
+INPUT, PASSING, DISSIPATED, THROUGHPUT, ROUNDS, N_SUMS = range(6)
+
+
+class Rows(NamedTuple):
+    """A sparse matrix row by row: row i holds ``column`` and ``value`` from ``first[i]`` to ``first[i + 1]``."""
+
+    first: Any
+    column: Any
+    value: Any
+
+
+class Padded(NamedTuple):
+    """A symmetric matrix: where sparse, its rows filled up to ``width`` numbers, ``column`` and ``value`` (width, dof),
+    else ``value`` (dof, dof) alone and no ``column``."""
+
+    column: Any
+    value: Any
+
+
+class Factor(NamedTuple):
+    """A = L D L^T under the envelope of A: row i of L ends before its diagonal and has ``reach[i]`` numbers.
+
+    ``lower`` holds the rows one after the other from ``first`` (dof,) on, ``inverse_pivot`` (dof,) is 1 / D. ``turn``
+    (dof,) is an order in which rows can be solved where neighbours do not wait for each other. ``inverse`` (dof, dof)
+    is that of A where A is so full that it costs less, else empty; ``spare`` (dof,) is its scratch.
+    """
+
+    first: Any
+    reach: Any
+    turn: Any
+    lower: Any
+    inverse_pivot: Any
+    inverse: Any
+    spare: Any
+
+
+class Meshes(NamedTuple):
+    """All meshes: ``number`` (mesh, N_NUMBERS), ``place`` (mesh, N_PLACES), and flat arrays for all of them.
+
+    ``table`` (node, 2) holds stiffness in N/m and gap in m, row after row; ``rows`` the row of every pair of kinds, -1
+    for a pair that never touches; ``kind`` and ``error`` one number a tooth.
+    """
+
+    number: Any
+    place: Any
+    table: Any
+    rows: Any
+    kind: Any
+    error: Any
+
+
+class Torques(NamedTuple):
+    """Torques on single degrees of freedom: ``dof`` (torque,), ``first`` (torque + 1,) nodes of each in ``table``.
+
+    Torque i is its table over the angle of its own degree of freedom, ``per_rad[i]`` nodes a radian from ``shift[i]``
+    nodes on, times ``factor`` (torque, knot). One node alone is a torque that only the factor changes.
+    """
+
+    dof: Any
+    first: Any
+    table: Any
+    per_rad: Any
+    shift: Any
+    factor: Any
+
+
+class Course(NamedTuple):
+    """Nominal rotation: ``time`` (knot,) s, ``speed`` rad/s, straight between, ``angle`` rad and ``gain`` rad/s2."""
+
+    time: Any
+    speed: Any
+    angle: Any
+    gain: Any
+
+
+class Line(NamedTuple):
+    """A line at one step: matrices, the factor of 4 M / h^2 + 2 C / h + K and what meshes do to it.
+
+    ``direction`` are the gradients of the approaches as rows; ``answer`` (mesh, dof) what one newton of a mesh moves,
+    ``compliance`` (mesh, mesh) what it takes from the approaches. ``rotation`` (dof,) is the nominal rotation of each
+    per that of the reference, ``carried`` M times it.
+    """
+
+    mass: Padded
+    damping: Padded
+    stiffness: Padded
+    direction: Rows
+    factor: Factor
+    answer: Any
+    compliance: Any
+    rotation: Any
+    carried: Any
+
+
+class Work(NamedTuple):
+    """Scratch of the core: (dof,), then (mesh,), then as their places say."""
+
+    ahead_q: Any
+    ahead_v: Any
+    moved: Any
+    force: Any
+    turned: Any
+    roll_rate: Any
+    free: Any
+    approach: Any
+    before: Any
+    rate: Any
+    right: Any
+    near: Any
+    matrix: Any
+    law: Any
+    pairs: Any
+    gathered: Any

@@ -1,0 +1,315 @@
+"""Steady vibration of a linear shaft line under torques that repeat with the cycle of an engine, by orders.
+
+Orders are multiples of the crank's speed; a four-stroke cycle has the half orders 0.5, 1, 1.5, ... Damping is a loss
+factor in the stiffness, viscous, or both. E. J. Nestorides, A Handbook on Torsional Vibration (1958); D. J. Ewins,
+Modal Testing (2000), section 2.4 (complex stiffness).
+"""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Callable, Iterable, Sequence
+from dataclasses import dataclass
+from functools import lru_cache
+from typing import Protocol
+
+import numpy as np
+from numpy.typing import NDArray
+
+from gensig.errors import SimulationError
+
+Array = NDArray[np.float64]
+ComplexArray = NDArray[np.complex128]
+
+TURNS_PER_CYCLE = 2
+USUAL_ORDERS = 200  # half orders: up to order 100
+UNBALANCED = 1e-6  # of the largest mean torque, that a free line may be left with
+RIGID = 1e-9  # of the largest stiffness eigenvalue: nothing holds such a motion
+ASYMMETRIC = 1e-9
+
+
+@dataclass(frozen=True, slots=True, kw_only=True, eq=False)
+class LinearLine:
+    """M q'' + C q' + (K + i H) q = f: four matrices (dof, dof), in kg m2, N m s/rad and N m/rad for rotations.
+
+    ``loss`` H is the sum of loss factor times stiffness of the elements; it is meant for harmonic motion only.
+    """
+
+    mass: Array
+    stiffness: Array
+    loss: Array
+    damping: Array
+
+    def __post_init__(self) -> None:
+        n_dof = len(self.mass)
+        for name in ("mass", "stiffness", "loss", "damping"):
+            matrix = getattr(self, name)
+            if matrix.shape != (n_dof, n_dof) or not np.all(np.isfinite(matrix)):
+                raise ValueError(f"{name} {matrix.shape} must be a finite matrix ({n_dof}, {n_dof})")
+            if np.max(np.abs(matrix - matrix.T)) > ASYMMETRIC * np.max(np.abs(matrix)):
+                raise ValueError(f"{name} must be symmetric")
+
+    def dynamic_stiffness(self, frequency: Array) -> ComplexArray:
+        """K + i H + i w C - w^2 M, (frequency, dof, dof), at angular frequencies (frequency,) rad/s."""
+        w = np.asarray(frequency, dtype=float)[:, None, None]
+        return np.asarray(self.stiffness + 1j * (self.loss + w * self.damping) - np.square(w) * self.mass)
+
+    def response(self, force: ComplexArray, frequency: Array) -> ComplexArray:
+        """Complex amplitudes, (frequency, dof), of forces (frequency, dof) at frequencies in rad/s, none of them 0.
+
+        Raises
+        ------
+        SimulationError    where an undamped line is excited at its own frequency
+        """
+        try:
+            found = np.linalg.solve(self.dynamic_stiffness(frequency), force[..., None])[..., 0]
+        except np.linalg.LinAlgError:
+            raise SimulationError("an undamped line is excited at its natural frequency; give it damping") from None
+        return np.asarray(found)
+
+
+@dataclass(frozen=True, slots=True, kw_only=True, eq=False)
+class Elements:
+    """Springs between degrees of freedom: shafts, couplings and meshes.
+
+    ``directions`` (element, dof) give an element's deflection, ``stiffness`` and ``loss`` (element,) its stiffness and
+    the imaginary part of it. A torsional element has rad and N m/rad; a mesh along its line of action m and N/m.
+    """
+
+    directions: Array
+    stiffness: Array
+    loss: Array
+
+    def stiffness_matrix(self) -> Array:
+        """Sum of stiffness times d d^T, (dof, dof)."""
+        return np.asarray((self.directions.T * self.stiffness) @ self.directions)
+
+    def loss_matrix(self) -> Array:
+        """Its imaginary part, (dof, dof)."""
+        return np.asarray((self.directions.T * self.loss) @ self.directions)
+
+
+class Matrices(Protocol):
+    """A line with its gear meshes apart, each with a direction (dof,) along its line of action."""
+
+    @property
+    def mass(self) -> Array:
+        """(dof, dof)."""
+
+    @property
+    def damping(self) -> Array:
+        """(dof, dof), viscous."""
+
+    @property
+    def stiffness(self) -> Array:
+        """(dof, dof), without the meshes."""
+
+    @property
+    def loss_stiffness(self) -> Array:
+        """(dof, dof), loss factor times stiffness."""
+
+    @property
+    def directions(self) -> Array:
+        """(mesh, dof)."""
+
+    @property
+    def mesh_stiffness(self) -> Array:
+        """(mesh,) N/m."""
+
+    @property
+    def mesh_loss_factor(self) -> Array:
+        """(mesh,)."""
+
+    @property
+    def mesh_damping(self) -> Array:
+        """(mesh,) N s/m."""
+
+
+def closed_line(matrices: Matrices) -> tuple[LinearLine, Elements]:
+    """A line whose meshes never lose contact, each a spring of its stiffness, and those meshes."""
+    meshes = Elements(
+        directions=matrices.directions,
+        stiffness=matrices.mesh_stiffness,
+        loss=matrices.mesh_loss_factor * matrices.mesh_stiffness,
+    )
+    dampers = (matrices.directions.T * matrices.mesh_damping) @ matrices.directions
+    line = LinearLine(
+        mass=matrices.mass,
+        stiffness=matrices.stiffness + meshes.stiffness_matrix(),
+        loss=matrices.loss_stiffness + meshes.loss_matrix(),
+        damping=matrices.damping + dampers,
+    )
+    return line, meshes
+
+
+@dataclass(frozen=True, slots=True, kw_only=True, eq=False)
+class SteadyResponse:
+    """Steady vibration at one speed (rad/s) of the crank.
+
+    ``orders`` (order,) are 0.5, 1, ...; ``angle`` (dof, order) rad complex amplitudes, so that the deviation from even
+    rotation is Re sum angle exp(i order a) over the crank angle a. ``twist`` (dof,) rad is what the mean torques add, 0
+    in the mean weighted with mass over the motions that nothing holds.
+    """
+
+    speed: float
+    orders: Array
+    angle: ComplexArray
+    twist: Array
+
+    @property
+    def speed_deviation(self) -> ComplexArray:
+        """Complex amplitudes of the speed, (dof, order) rad/s."""
+        return np.asarray(1j * self.speed * self.orders * self.angle)
+
+    def speed_over_cycle(self, n_points: int) -> Array:
+        """Deviation of the speed from its mean over the cycle, (dof, point) rad/s."""
+        return over_cycle(self.speed_deviation, n_points)
+
+    def fluctuation(self) -> Array:
+        """Half the peak to peak of the speed over the cycle, (dof,) rad/s: what is printed as plus or minus."""
+        return np.asarray(0.5 * np.ptp(self.speed_over_cycle(32 * len(self.orders)), axis=1))
+
+    def element_forces(self, elements: Elements) -> tuple[Array, ComplexArray]:
+        """Mean (element,) and complex amplitudes (element, order) of what the elements carry, N m or N."""
+        complex_stiffness = elements.stiffness + 1j * elements.loss
+        return (
+            np.asarray(elements.stiffness * (elements.directions @ self.twist)),
+            np.asarray(complex_stiffness[:, None] * (elements.directions @ self.angle)),
+        )
+
+
+def over_cycle(amplitudes: ComplexArray, n_points: int) -> Array:
+    """Values over the cycle, (..., point), of complex amplitudes at orders 0.5, 1, ..., (..., order).
+
+    Raises
+    ------
+    ValueError    for too few points to hold the highest order
+    """
+    n_orders = amplitudes.shape[-1]
+    if n_points <= 2 * n_orders:
+        raise ValueError(f"{n_points} points of a cycle cannot hold {n_orders} orders; more than {2 * n_orders} can")
+    spectrum = np.zeros((*amplitudes.shape[:-1], n_points // 2 + 1), dtype=complex)
+    spectrum[..., 1 : n_orders + 1] = 0.5 * n_points * amplitudes
+    return np.asarray(np.fft.irfft(spectrum, n_points, axis=-1))
+
+
+def cycle_orders(torque: Array, n_orders: int) -> tuple[Array, ComplexArray]:
+    """Mean (...,) and complex amplitudes (..., order) at orders 0.5, 1, ... of a torque over the cycle, (..., point).
+
+    Raises
+    ------
+    ValueError    for more orders than the points hold
+    """
+    n_points = torque.shape[-1]
+    if not 1 <= n_orders < n_points / 2:
+        raise ValueError(f"n_orders = {n_orders} must lie in 1..{(n_points - 1) // 2}: there are {n_points} points")
+    spectrum = np.fft.rfft(torque, axis=-1) / n_points
+    return np.asarray(spectrum[..., 0].real), np.asarray(2.0 * spectrum[..., 1 : n_orders + 1])
+
+
+def steady_response(line: LinearLine, torque: Array, speed: float, *, n_orders: int = USUAL_ORDERS) -> SteadyResponse:
+    """Steady vibration of a line under torques over the cycle.
+
+    Parameters
+    ----------
+    torque : (dof, point) N m    over two turns of the crank, from angle 0
+    speed : rad/s                of the crank
+    n_orders : half orders taken; 200 reach order 100, where injection pulses end
+
+    Raises
+    ------
+    SimulationError    where the mean torques of a free line do not balance: it would not turn steadily
+    """
+    if not speed > 0.0:
+        raise ValueError(f"the speed, {speed:g} rad/s, must be positive")
+    mean, amplitudes = cycle_orders(torque, n_orders)
+    orders = np.arange(1, n_orders + 1) / TURNS_PER_CYCLE
+    angle = line.response(amplitudes.T, orders * speed).T
+    return SteadyResponse(speed=speed, orders=orders, angle=angle, twist=_mean_twist(line, mean))
+
+
+def disturbance_response(line: LinearLine, dof: int, torque: float, frequency: float) -> ComplexArray:
+    """Complex amplitudes, (dof,) rad, of a torque (N m) of a frequency (rad/s) of its own on one degree of freedom."""
+    force = np.zeros((1, len(line.mass)), dtype=complex)
+    force[0, dof] = torque
+    return np.asarray(line.response(force, np.array([frequency]))[0])
+
+
+@dataclass(frozen=True, slots=True, kw_only=True, eq=False)
+class Waterfall:
+    """Amplitudes of one degree of freedom over a run of speeds.
+
+    ``speeds`` (speed,) rad/s; ``orders`` (order,); ``angle`` (speed, order) rad; ``fluctuation`` (speed,) rad/s.
+    """
+
+    speeds: Array
+    orders: Array
+    angle: Array
+    fluctuation: Array
+
+    def spectra(self, frequencies: Array) -> Array:
+        """Angular-displacement spectra, (speed, frequency) rad, on even frequencies in Hz: each line in its bin."""
+        step = frequencies[1] - frequencies[0]
+        out = np.zeros((len(self.speeds), len(frequencies)))
+        for row, speed, amplitudes in zip(out, self.speeds, self.angle, strict=True):
+            bins = np.rint((self.orders * speed / (2.0 * math.pi) - frequencies[0]) / step).astype(int)
+            inside = (bins >= 0) & (bins < len(frequencies))
+            np.maximum.at(row, bins[inside], amplitudes[inside])
+        return out
+
+
+def run_of_speeds(
+    line: LinearLine,
+    torques: Callable[[float], Array],
+    speeds: Iterable[float],
+    dofs: Sequence[int],
+    *,
+    n_orders: int = USUAL_ORDERS,
+) -> list[Waterfall]:
+    """Steady vibration at each of a run of speeds, one waterfall for each degree of freedom asked.
+
+    Parameters
+    ----------
+    torques : gives the torques (dof, point) at a speed
+    speeds : (speed,) rad/s
+
+    Notes
+    -----
+    Steady at every speed: a run-up that is slow against the line's decay. Up and down are then the same.
+    """
+    found = [steady_response(line, torques(speed), speed, n_orders=n_orders) for speed in speeds]
+    if not found:
+        raise ValueError("no speed is given")
+    fluctuations = [one.fluctuation() for one in found]
+    return [
+        Waterfall(
+            speeds=np.array([one.speed for one in found]),
+            orders=found[0].orders,
+            angle=np.abs(np.array([one.angle[dof] for one in found])),
+            fluctuation=np.array([one[dof] for one in fluctuations]),
+        )
+        for dof in dofs
+    ]
+
+
+@lru_cache(maxsize=4)
+def _statics(line: LinearLine) -> tuple[Array, Array]:
+    """Eigenvalues and vectors of the stiffness, kept for the next speed."""
+    values, vectors = np.linalg.eigh(line.stiffness)
+    return values, vectors
+
+
+def _mean_twist(line: LinearLine, mean: Array) -> Array:
+    """Static deflection under mean torques that balance over the motions which nothing holds."""
+    values, vectors = _statics(line)
+    held = values > RIGID * values[-1]
+    rest = vectors[:, ~held].T @ mean
+    if rest.size and np.max(np.abs(rest)) > UNBALANCED * max(float(np.max(np.abs(mean))), 1e-300):
+        raise SimulationError(
+            f"the mean torques leave {np.max(np.abs(rest)):.4g} N m on a line that nothing holds; balance them"
+        )
+    twist = vectors[:, held] @ ((vectors[:, held].T @ mean) / values[held])
+    free = vectors[:, ~held]
+    if free.size:
+        twist = twist - free @ np.linalg.solve(free.T @ line.mass @ free, free.T @ (line.mass @ twist))
+    return np.asarray(twist)

@@ -1,0 +1,55 @@
+"""What helical gears add to a pair: motion along the axis and tilts. Derived in ``docs/theory/helical_dynamics.md``."""
+
+from __future__ import annotations
+
+import math
+
+import numpy as np
+from numpy.typing import NDArray
+
+from gensig.dynamics._layout import MOST_PAIRS
+from gensig.errors import ConfigError
+from gensig.geometry.contact import GearPair
+from gensig.mesh.pair_table import FIRST_PITCH, LAST_PITCH, PairTable
+from gensig.mesh.sliced_table import SlicedTable
+
+Array = NDArray[np.float64]
+
+AXIAL_DOFS = ("pinion_z", "pinion_tilt_x", "pinion_tilt_y", "wheel_z", "wheel_tilt_x", "wheel_tilt_y")
+
+
+def axial_reach(pair: GearPair) -> Array:
+    """Gradient of the approach over ``AXIAL_DOFS``, (dof,); 1, m.
+
+    The axial share of the normal force, tan(beta_b) of the transverse one, acts at the pitch point in the middle of
+    the face. A right-handed pinion comes closer to the wheel's flank as it moves along +z.
+    """
+    slant = math.copysign(math.tan(pair.base_helix_angle), pair.pinion.helix_angle)
+    across = math.tan(pair.working_pressure_angle)
+    pinion, wheel = pair.pinion.base_radius, pair.wheel.base_radius
+    return slant * np.array([1.0, -pinion * across, -pinion, -1.0, -wheel * across, -wheel])
+
+
+def half_lag(table: PairTable | SlicedTable) -> float:
+    """How much later than the slice that enters first the middle of the face meets a phase, m along the path."""
+    if isinstance(table, PairTable):
+        return 0.0
+    return 0.5 * table.pair.face_width * math.tan(table.pair.base_helix_angle)
+
+
+def pitches(table: PairTable | SlicedTable) -> tuple[int, int]:
+    """Whole base pitches from A at which a table begins and ends; pairs followed at once are the difference.
+
+    Raises
+    ------
+    ConfigError    for more pairs than are followed
+    """
+    if isinstance(table, PairTable):
+        return FIRST_PITCH, LAST_PITCH
+    n_pairs = table.last_pitch - table.first_pitch
+    if n_pairs > MOST_PAIRS:
+        raise ConfigError(
+            f"{n_pairs} pairs of teeth would have to be followed at once, of a total contact ratio of "
+            f"{table.pair.total_contact_ratio:.3g}; at most {MOST_PAIRS} are: reduce face_width_mm or helix_angle_deg"
+        )
+    return table.first_pitch, table.last_pitch

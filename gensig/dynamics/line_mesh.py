@@ -1,0 +1,255 @@
+"""A gear mesh of a shaft line as plain arrays: pairs of teeth over the roll, on both flanks, tooth by tooth."""
+
+from __future__ import annotations
+
+import math
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+
+from gensig.errors import ConfigError, GeometryError
+from gensig.mesh.pair_table import FIRST_PITCH, N_PAIRS, PairTable
+
+Array = NDArray[np.float64]
+Index = NDArray[np.int64]
+
+
+@dataclass(frozen=True, slots=True, kw_only=True, eq=False)
+class LineMesh:
+    """One mesh of gear a with gear b, one-sided on both flanks.
+
+    The mesh has rolled u pitches: ``start_phase`` where all angles are 0, and one more for each tooth of gear a that
+    its degree of freedom ``roll_dof`` turns on. Pair i stands at u - i pitches, in tables that begin at ``first_pitch``
+    and reach over ``n_pairs`` pitches, so that as many pairs are looked at; its teeth are ``start_teeth`` + i, counted
+    as they enter. The back flanks meet along the mirrored roll ``mirror`` - u.
+
+    direction : (dof,)                 gradient of the approach along the transverse line of action, m/rad or 1
+    stiffness, gap : (row, node)       of one pair in N/m and m, straight between nodes
+    rows, coast_rows : (kind, kind)    the row of a pair of kinds of teeth of a and b on either flank, -1 for a pair
+                                       that never touches (a missing tooth)
+    kinds : (tooth,) of a and of b     the kind of every tooth
+    errors : (tooth,) of a and of b    m, open the gaps of their teeth on the drive flank
+    backlash : m                       along the line of action
+    damping : s/m                      times the rate of a pair is the share by which it raises its elastic force
+    shared_compliance : m/N            what all pairs in contact share
+    """
+
+    name: str
+    direction: Array
+    roll_dof: int
+    stiffness: Array
+    gap: Array
+    rows: Index
+    coast_rows: Index
+    kinds: tuple[Index, Index]
+    errors: tuple[Array, Array]
+    n_pairs: int
+    first_pitch: int
+    start_teeth: tuple[int, int]
+    start_phase: float
+    mirror: float
+    backlash: float
+    damping: float
+    shared_compliance: float = 0.0
+
+    def __post_init__(self) -> None:
+        told = f"mesh '{self.name}'"
+        if self.stiffness.ndim != 2 or self.stiffness.shape != self.gap.shape:
+            raise ConfigError(
+                f"{told}: stiffness {self.stiffness.shape} and gap {self.gap.shape} must be alike, (row, node)"
+            )
+        n_rows, n_nodes = self.stiffness.shape
+        if self.n_pairs < 1 or n_nodes < 2 or (n_nodes - 1) % self.n_pairs:
+            raise ConfigError(
+                f"{told}: {n_nodes} nodes over {self.n_pairs} pitches; give a whole number of cells a pitch and one "
+                f"node more"
+            )
+        for values, what in ((self.stiffness, "stiffness"), (self.gap, "gap")):
+            if not np.isfinite(values).all():
+                raise ConfigError(f"{told}: {what} is not finite; a pair that never touches is row -1")
+        if self.stiffness.min() < 0.0:
+            raise ConfigError(f"{told}: stiffness {self.stiffness.min():g} N/m must not be negative")
+        counts = tuple(int(kind.max()) + 1 for kind in self.kinds)
+        for rows, what in ((self.rows, "rows"), (self.coast_rows, "coast_rows")):
+            if rows.shape[0] < counts[0] or rows.shape[1] < counts[1] or rows.min() < -1 or rows.max() >= n_rows:
+                raise ConfigError(f"{told}: {what} {rows.shape} must name rows -1..{n_rows - 1} for {counts} kinds")
+        for kind, error, start in zip(self.kinds, self.errors, self.start_teeth, strict=True):
+            if len(kind) != len(error) or kind.min() < 0 or not np.isfinite(error).all():
+                raise ConfigError(f"{told}: {len(kind)} teeth need as many kinds, and finite errors, not {len(error)}")
+            if not 0 <= start < len(kind):
+                raise ConfigError(f"{told}: start tooth {start} must lie in 0..{len(kind) - 1}")
+        for key in ("backlash", "damping", "shared_compliance"):
+            if not 0.0 <= getattr(self, key) < math.inf:
+                raise ConfigError(f"{told}: {key} {getattr(self, key):g} must not be negative")
+
+    @property
+    def n_teeth(self) -> tuple[int, int]:
+        """Teeth of gears a and b."""
+        return len(self.kinds[0]), len(self.kinds[1])
+
+    @property
+    def mean_stiffness(self) -> float:
+        """Mean over a pitch of the sum of the pairs of sound teeth (row 0) without gap, shared compliance in series."""
+        n_cells = (self.stiffness.shape[1] - 1) // self.n_pairs
+        touching = np.where(self.gap[0] <= 0.0, self.stiffness[0], 0.0)[:-1]
+        total = touching.reshape(self.n_pairs, n_cells).sum(axis=0)
+        return float(np.mean(total / (1.0 + self.shared_compliance * total)))
+
+
+def phase_mesh(
+    name: str,
+    *,
+    direction: Array,
+    roll_dof: int,
+    n_teeth: tuple[int, int],
+    stiffness: Array,
+    gap: Array | None = None,
+    backlash: float = 0.0,
+    damping: float = 0.0,
+    start_teeth: tuple[int, int] = (0, 0),
+    start_phase: float = 0.0,
+    mirror: float = 0.0,
+) -> LineMesh:
+    """A mesh whose whole stiffness is known over its phase: one spring k(u) behind one gap e(u).
+
+    Gear a is either of the two, the irregular one where there is one.
+
+    Parameters
+    ----------
+    stiffness : (1, node) or (n_teeth of gear a, node) N/m    over one pitch, or pitch after pitch over a turn of gear
+        a, irregular teeth among them; the node that closes a pitch is the first of the next
+    gap : the same shape, m    static transmission error and pitch errors, by which the teeth stand back; default 0
+    """
+    gaps = np.zeros_like(stiffness) if gap is None else np.broadcast_to(gap, stiffness.shape)
+    if stiffness.ndim != 2 or len(stiffness) not in (1, n_teeth[0]):
+        raise ConfigError(
+            f"mesh '{name}': stiffness {stiffness.shape} must be (1, node) or ({n_teeth[0]}, node), one row a tooth"
+        )
+    n_rows = len(stiffness)
+    # the mesh has rolled u = i + s where row i is at s, and the next row begins where it ends
+    closed, closed_gap = (np.hstack([part, np.roll(part[:, :1], -1, axis=0)]) for part in (stiffness, gaps))
+    kinds = np.arange(n_teeth[0]) % n_rows, np.zeros(n_teeth[1], dtype=np.int64)
+    rows = np.arange(n_rows)[:, None]
+    # the mirrored roll reads every row backwards, one tooth further on, for it begins there where the row ends
+    backwards = (rows - 1) % n_rows + n_rows
+    return LineMesh(
+        name=name,
+        direction=direction,
+        roll_dof=roll_dof,
+        stiffness=np.vstack([closed, closed[:, ::-1]]),
+        gap=np.vstack([closed_gap, np.zeros_like(closed_gap)]),
+        rows=rows,
+        coast_rows=backwards,
+        kinds=kinds,
+        errors=(np.zeros(n_teeth[0]), np.zeros(n_teeth[1])),
+        n_pairs=1,
+        first_pitch=0,
+        start_teeth=start_teeth,
+        start_phase=start_phase,
+        mirror=mirror,
+        backlash=backlash,
+        damping=damping,
+    )
+
+
+def loaded_gap(approach: Array, stiffness: Array, force: float) -> Array:
+    """Gap e(u) of a ``phase_mesh`` that statics at one load describe, (phase,) m.
+
+    ``approach`` and tangent ``stiffness`` (phase,) in m and N/m under a ``force`` in N, as ``mesh.slices`` gives them
+    for a helical pair: e = approach - F / k, so that the mesh is where statics put it under that force.
+    """
+    return np.asarray(approach - force / stiffness)
+
+
+def pair_mesh(
+    name: str,
+    table: PairTable,
+    *,
+    direction: Array,
+    roll_dof: int,
+    damping: float,
+    errors: tuple[Array, Array] | None = None,
+    start_teeth: tuple[int, int] = (0, 0),
+    start_phase: float = 0.0,
+) -> LineMesh:
+    """A spur mesh of our own tables; gear a is the pinion. The law is that of the pair dynamics, without friction.
+
+    The back flanks are sound teeth without errors, mirrored as the pair dynamics mirrors them; a missing tooth is
+    missing there too.
+    """
+    pair, kinds = table.pair, (table.pinion.kind, table.wheel.kind)
+    n_kinds = len(table.pinion.compliance), len(table.wheel.compliance)
+    n_nodes = len(table.position)
+    own = _summed(table.pinion.compliance, table.wheel.compliance) - table.shared_compliance
+    gap = _summed(table.pinion.gap, table.wheel.gap)
+    rows = np.arange(n_kinds[0] * n_kinds[1]).reshape(n_kinds)
+    present = table.pinion.present[:, None] & table.wheel.present[None, :]
+    return LineMesh(
+        name=name,
+        direction=direction,
+        roll_dof=roll_dof,
+        stiffness=(1.0 / own).reshape(-1, n_nodes),
+        gap=gap.reshape(-1, n_nodes),
+        rows=np.where(present, rows, -1),
+        coast_rows=np.where(present, 0, -1),
+        kinds=kinds,
+        errors=errors or (np.zeros(len(kinds[0])), np.zeros(len(kinds[1]))),
+        n_pairs=N_PAIRS,
+        first_pitch=FIRST_PITCH,
+        start_teeth=start_teeth,
+        start_phase=start_phase,
+        mirror=2.0 * pair.pitch_point / pair.base_pitch + 0.5,
+        backlash=pair.backlash,
+        damping=damping,
+        shared_compliance=table.shared_compliance,
+    )
+
+
+def mesh_start(
+    n_teeth: int, *, mate_angle: float, drives: bool, tooth_angle: float = 0.0, pitch_point: float = 0.0
+) -> tuple[int, float]:
+    """Start tooth and start phase of a gear's mesh with a mate at an angle, so that its meshes agree with each other.
+
+    Parameters
+    ----------
+    mate_angle : rad    from the gear's center to the mate's, counted in the sense in which the gear turns
+    drives : whether the gear drives there (its leading flanks touch) or is driven (its trailing flanks)
+    tooth_angle : rad   where the middle of the gear's tooth 0 stands when all angles are 0
+    pitch_point : position of the pitch point in the tables of the mesh, pitches
+
+    Returns
+    -------
+    the tooth of pair 0, and the phase in pitches
+
+    Tooth 0's middle passes the mate at mate_angle, its flank a quarter pitch before (leading) or behind (trailing); the
+    tooth that enters next stands one pitch back. Standard teeth: tooth and space are equal on the pitch circle.
+    Source: the planetary meshes' phases of Parker & Lin, J. Vib. Acoust. 126 (2004), written for one gear.
+    """
+    if n_teeth < 1:
+        raise GeometryError(f"a gear of {n_teeth} teeth has no phase")
+    passed = (tooth_angle - mate_angle) * n_teeth / (2.0 * math.pi) + _quarter(drives) + pitch_point
+    pair = math.floor(passed)
+    # the phase is taken within a pitch, so what was pair ``pair`` becomes pair 0
+    return pair % n_teeth, passed - pair
+
+
+def tooth_angle(
+    n_teeth: int, *, mate_angle: float, drives: bool, start: tuple[int, float], pitch_point: float = 0.0
+) -> float:
+    """Where the middle of a gear's tooth 0 stands if one of its meshes begins as ``start`` says, rad.
+
+    What ``mesh_start`` undoes: from a mesh whose phase is known through the mate to the other meshes of the gear.
+    """
+    tooth, phase = start
+    return mate_angle + (tooth + phase - _quarter(drives) - pitch_point) * 2.0 * math.pi / n_teeth
+
+
+def _quarter(drives: bool) -> float:
+    """How far the flank that touches stands before the middle of its tooth, pitches."""
+    return 0.25 if drives else -0.25
+
+
+def _summed(one: Array, other: Array) -> Array:
+    """(kind, kind, node) of what both gears add."""
+    return one[:, None, :] + other[None, :, :]

@@ -1,0 +1,147 @@
+"""Lives over torque and speed, and laws fitted to them that know the range they were fitted on."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Sequence
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+
+from gensig.errors import ConfigError, ExtrapolationError, SimulationError
+from gensig.life.wear_case import WearCase
+from gensig.life.wear_life import hours, wear_life
+
+Array = NDArray[np.float64]
+
+FORMS = ("power", "logarithm", "exponential")
+EXPONENT_STEP = 0.05  # of the torque, on either side
+
+
+@dataclass(frozen=True, slots=True, kw_only=True, eq=False)
+class LifeMap:
+    """Lives over torques (torque,) N m and speeds (speed,) rad/s of the pinion.
+
+    ``turns`` (torque,) of the pinion do not hang on the speed: flanks slide as far in a turn, however fast.
+    """
+
+    torque: Array
+    speed: Array
+    turns: Array
+
+    @property
+    def hours(self) -> Array:
+        """(torque, speed)."""
+        return np.array([[hours(turns, speed) for speed in self.speed] for turns in self.turns])
+
+
+def life_map(case: WearCase, torques: Sequence[float], speeds: Sequence[float]) -> LifeMap:
+    """Lives of a pair under other torques in N m and at speeds in rad/s.
+
+    Raises
+    ------
+    ConfigError    for torques or speeds that are not positive, or less than two of either
+    """
+    for name, values in (("torques", torques), ("speeds", speeds)):
+        if len(set(values)) < 2 or not min(values) > 0.0:
+            raise ConfigError(f"a map needs two {name} or more, all positive; {len(set(values))} different given")
+    torque = np.unique(np.asarray(torques, dtype=np.float64))
+    turns = np.array([wear_life(case.under(float(one))).life for one in torque])
+    return LifeMap(torque=torque, speed=np.unique(np.asarray(speeds, dtype=np.float64)), turns=turns)
+
+
+def torque_exponent(case: WearCase) -> float:
+    """Local exponent n of life ~ T^-n at the case's torque."""
+    low, high = (wear_life(case.under(case.torque * (1.0 + step))).life for step in (-EXPONENT_STEP, EXPONENT_STEP))
+    return -math.log(high / low) / math.log((1.0 + EXPONENT_STEP) / (1.0 - EXPONENT_STEP))
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class FittedLaw:
+    """Hours of life as a formula, and where it was fitted; torque T in N m, speed w in rad/s, both of the pinion.
+
+    ``power``: a T^-b w^-c. ``logarithm``: a - b ln(T), at one speed. ``exponential``: a exp(-b w), at one torque. The
+    last two are the forms of the wear-life paper, eqs. (25) and (26).
+    ``largest_error`` is the greatest relative deviation from the lives that it was fitted to.
+    """
+
+    form: str
+    a: float
+    b: float
+    c: float
+    torque: tuple[float, float]
+    speed: tuple[float, float]
+    largest_error: float
+
+    def formula(self, torque: Array | float, speed: Array | float) -> Array | float:
+        """What the formula says, wherever; it may be negative, which no life is."""
+        if self.form == "power":
+            return self.a * np.asarray(torque) ** -self.b * np.asarray(speed) ** -self.c
+        if self.form == "logarithm":
+            return self.a - self.b * np.log(torque)
+        return self.a * np.exp(-self.b * np.asarray(speed))
+
+    def life(self, torque: float, speed: float, *, allow_extrapolation: bool = False) -> float:
+        """Hours of life.
+
+        Raises
+        ------
+        ExtrapolationError    beyond the fitted range, unless allowed
+        SimulationError       where the formula gives no life at all, which it may even inside its range
+        """
+        for name, value, (low, high) in (("torque", torque, self.torque), ("speed", speed, self.speed)):
+            if not low * (1.0 - 1e-9) <= value <= high * (1.0 + 1e-9) and not allow_extrapolation:
+                unit = "N m" if name == "torque" else "rad/s"
+                raise ExtrapolationError(
+                    f"the {self.form} law was fitted for a {name} of {low:g} to {high:g} {unit}, not {value:g}; take "
+                    f"gensig wear-life itself there"
+                )
+        found = float(self.formula(torque, speed))
+        if not found > 0.0:
+            raise SimulationError(
+                f"the {self.form} law gives a life of {found:.4g} hours at {torque:g} N m: it is a fit, not physics"
+            )
+        return found
+
+    @property
+    def text(self) -> str:
+        """The formula in figures."""
+        if self.form == "power":
+            return f"{self.a:.5g} T^-{self.b:.4f} w^-{self.c:.4f}"
+        if self.form == "logarithm":
+            return f"{self.a:.5g} - {self.b:.5g} ln(T)"
+        return f"{self.a:.5g} exp(-{self.b:.5g} w)"
+
+
+def fitted_laws(lives: LifeMap, torque: float, speed: float) -> tuple[FittedLaw, ...]:
+    """All three forms fitted to a map; those of one variable at the nearest torque and speed of the map."""
+    at_speed = int(np.argmin(np.abs(lives.speed - speed)))
+    at_torque = int(np.argmin(np.abs(lives.torque - torque)))
+    values = lives.hours
+    log_torque, log_speed = np.meshgrid(np.log(lives.torque), np.log(lives.speed), indexing="ij")
+    columns = np.stack([np.ones(values.size), -log_torque.ravel(), -log_speed.ravel()], axis=1)
+    constant, by_torque, by_speed = np.linalg.lstsq(columns, np.log(values).ravel(), rcond=None)[0]
+    slope, level = np.polyfit(np.log(lives.torque), values[:, at_speed], 1)
+    decay, start = np.polyfit(lives.speed, np.log(values[at_torque]), 1)
+    spans = {"torque": _span(lives.torque), "speed": _span(lives.speed)}
+    at = {"torque": (lives.torque[at_torque],) * 2, "speed": (lives.speed[at_speed],) * 2}
+    return (
+        _law("power", (math.exp(constant), by_torque, by_speed), spans, lives, values),
+        _law("logarithm", (level, -slope, 0.0), spans | {"speed": at["speed"]}, lives, values[:, at_speed, None]),
+        _law("exponential", (math.exp(start), -decay, 0.0), spans | {"torque": at["torque"]}, lives, values[at_torque]),
+    )
+
+
+def _law(
+    form: str, numbers: tuple[float, float, float], spans: dict[str, tuple[float, float]], lives: LifeMap, values: Array
+) -> FittedLaw:
+    a, b, c = (float(number) for number in numbers)
+    law = FittedLaw(form=form, a=a, b=b, c=c, largest_error=0.0, torque=spans["torque"], speed=spans["speed"])
+    found = law.formula(lives.torque[:, None], lives.speed)
+    error = np.max(np.abs(np.broadcast_to(found, np.broadcast_shapes(np.shape(found), values.shape)) / values - 1.0))
+    return FittedLaw(form=form, a=a, b=b, c=c, largest_error=float(error), torque=law.torque, speed=law.speed)
+
+
+def _span(values: Array) -> tuple[float, float]:
+    return float(values.min()), float(values.max())

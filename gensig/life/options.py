@@ -1,0 +1,103 @@
+"""How flanks wear and when their life ends: every convention by name."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from dataclasses import dataclass
+from typing import Any
+
+from gensig.errors import ConfigError
+from gensig.units import from_si, read, unit
+
+CHOICES = {
+    "rule": ("band", "fixed_intervals"),
+    "criterion": ("first", "sum"),
+    "sharing": ("mesh", "one_pair"),
+    "geometry": ("worn", "unworn"),
+    "load_radius": ("base", "reference"),
+}
+SIDES = ("pinion", "wheel")
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class FlankMaterial:
+    """What Archard's law asks of one flank; ``hardness`` in Pa, None stands for the value of both gears."""
+
+    coefficient: float | None
+    hardness: float | None = unit("hbs")
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class WearOptions:
+    """Wear law, end of life and numerics, lengths in m.
+
+    Parameters
+    ----------
+    rule : ``band``, the contact passes a flank point with its width 2a, or ``fixed_intervals``, the wear-life paper's:
+        a point wears for 1 / ``n_intervals`` of the time a pair needs for the path of contact
+    threshold : depth normal to the flank at which the life ends
+    transmission_error_limit : from peak to peak, or None; whatever of the two comes first ends the life
+    criterion : ``first``, the first flank to the threshold, or ``sum``, both flanks of a contact point together
+    coefficient, hardness : k, and H in Pa, of both gears; ``pinion`` and ``wheel`` override them
+    sharing : ``mesh`` or ``one_pair``; None is the mesh, and one pair where the contact ratio is below 1
+    geometry : ``worn``, sharing and pressure follow the flanks as they wear, or ``unworn``
+    load_radius : the arm of the force, ``base`` circle or ``reference`` circle (the wear-life paper's eq. 12)
+    step : greatest depth worn between two looks at the flanks
+    """
+
+    rule: str
+    n_intervals: int
+    threshold: float = unit("um")
+    transmission_error_limit: float | None = unit("um")
+    criterion: str
+    coefficient: float
+    hardness: float = unit("hbs")
+    pinion: FlankMaterial
+    wheel: FlankMaterial
+    sharing: str | None
+    geometry: str
+    load_radius: str
+    step: float = unit("um")
+
+    def __post_init__(self) -> None:
+        for key, allowed in CHOICES.items():
+            value = getattr(self, key)
+            if value not in allowed and not (key == "sharing" and value is None):
+                raise ConfigError(f"wear.{key} = {value!r}; allowed: {', '.join(allowed)}")
+        if not 1 <= self.n_intervals <= 1_000_000:
+            raise ConfigError(f"wear.n_intervals = {self.n_intervals} must lie in 1..1000000")
+        lengths = ("threshold_um", "transmission_error_limit_um", "step_um")
+        _require_positive("wear", self, (*lengths, "coefficient", "hardness_hbs"))
+        for name in SIDES:
+            _require_positive(f"wear.{name}", getattr(self, name), ("coefficient", "hardness_hbs"))
+        follows_mesh = self.geometry == "worn" and self.sharing != "one_pair"
+        if self.transmission_error_limit is not None and not follows_mesh:
+            raise ConfigError(
+                "wear.transmission_error_limit_um is reached by worn flanks in mesh: it needs wear.geometry=worn and "
+                "wear.sharing=mesh"
+            )
+
+    def wear_factor(self, name: str) -> float:
+        """Archard's k / H of one gear, 1/Pa."""
+        own: FlankMaterial = getattr(self, name)
+        coefficient = self.coefficient if own.coefficient is None else own.coefficient
+        return coefficient / self.hardness_of(name)
+
+    def hardness_of(self, name: str) -> float:
+        """H of one gear, Pa."""
+        own: FlankMaterial = getattr(self, name)
+        return self.hardness if own.hardness is None else own.hardness
+
+
+def _require_positive(place: str, values: Any, keys: tuple[str, ...]) -> None:
+    for key in keys:
+        value = getattr(values, key.removesuffix("_um").removesuffix("_hbs"))
+        if value is not None and not value > 0.0:
+            raise ConfigError(f"{place}.{key} = {from_si(key, value):g} must be positive")
+
+
+def read_wear_options(values: Mapping[str, Any]) -> WearOptions:
+    """Options from the boundary keys of ``wear``."""
+    sides = {name: read(FlankMaterial, values.get(name, {}), f"wear.{name}") for name in SIDES}
+    own = {key: value for key, value in values.items() if key not in SIDES}
+    return read(WearOptions, own, "wear", **sides)

@@ -1,0 +1,80 @@
+"""The wear of a configuration's gears: its mesh, its wear law, and what the life leaves on the flanks as a fault."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from dataclasses import replace
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from gensig.errors import ConfigError
+from gensig.faults.registry import read_faults
+from gensig.life.options import read_wear_options
+from gensig.life.wear_case import WearCase, wear_case
+from gensig.systems.registry import SIDES, read_sliced_pair, section
+
+Array = NDArray[np.float64]
+
+N_PROFILE = 65  # depths along the flank that a fault of kind wear is given
+
+
+def read_wear_case(config: Mapping[str, Any]) -> WearCase:
+    """Build the wear of a spur or helical pair from the boundary keys of a configuration.
+
+    Raises
+    ------
+    ConfigError    for faulty gears, and for what ``wear_case`` refuses
+    """
+    if read_faults(config["fault"]):
+        raise ConfigError(f"fault={config['fault']['kind']}: a life begins with sound flanks; take fault=healthy")
+    system = read_sliced_pair(config)
+    if system.pair.pinion.helix_angle == 0.0 and not system.modification.is_any:  # all slices are alike
+        system = replace(system, slices=replace(system.slices, n_slices=1))
+    return wear_case(system.sliced_mesh(), system.material, read_wear_options(section(config, "wear")), system.torque)
+
+
+def wear_fault(case: WearCase, depth: Array) -> dict[str, Any]:
+    """A compound fault option whose parts wear both gears' teeth as a life has worn them.
+
+    Parameters
+    ----------
+    depth : (2, slice, node) m    off both flanks; the mean over the slices counts, as a fault of kind wear is the same
+        across the face
+
+    Depths normal to the flank become those along the transverse line of action, over cos(beta_b).
+    """
+    slant = np.cos(case.pair.base_helix_angle)
+    parts = []
+    for side, name in enumerate(SIDES):
+        profile = flank_profile(case, side, depth[side].mean(axis=0) / slant)
+        greatest = float(profile.max())
+        shape = profile / greatest if greatest > 0.0 else np.zeros_like(profile)
+        parts.append(
+            {
+                "kind": "wear",
+                "gear": name,
+                "tooth": "all",
+                "wear_depth_um": round(greatest * 1e6, 6),
+                "wear_profile": [round(float(one), 6) for one in shape],
+                "limit_um": max(case.options.threshold * 1e6, greatest * 1e6),
+            }
+        )
+    return {"kind": "compound", "parts": parts, "vary": {}}
+
+
+def flank_profile(case: WearCase, side: int, depth: Array, n_profile: int = N_PROFILE) -> Array:
+    """Depth at curvature radii evenly spaced from the lower end of the involute to the tip, (profile,) m.
+
+    Parameters
+    ----------
+    side : 0 pinion, 1 wheel
+    depth : (node,) m    at the nodes of the path; below them the mate does not reach, and nothing is worn
+    """
+    gear = (case.pair.pinion, case.pair.wheel)[side]
+    tip = np.sqrt(gear.tip_radius**2 - gear.base_radius**2)
+    place = np.linspace(gear.junction_curvature_radius, tip, n_profile)
+    curvature = case.path.curvature[side]
+    order = np.argsort(curvature)
+    return np.interp(place, curvature[order], depth[order], left=0.0)

@@ -1,0 +1,242 @@
+"""Root stress of pairs: scale laws, limits, symmetry, the mesh's own load sharing, and what is refused."""
+
+import math
+from dataclasses import replace
+
+import numpy as np
+import pytest
+
+from gensig.compose import compose, options
+from gensig.errors import ConfigError, GeometryError
+from gensig.life.root_stress import (
+    deep_tooth_factor,
+    helix_factor,
+    load_distribution_factor,
+    normal_contact_ratio,
+    rim_thickness_factor,
+    root_factors,
+    root_width,
+    spread_along_face,
+)
+from gensig.systems.registry import read_pair
+from gensig.systems.root_strength import read_root_strength
+
+PUMP = "gear=engine_pump_drive"
+EQUAL = (PUMP, "gear.pinion.face_width_mm=20", "gear.pinion.bore_radius_mm=31.5")
+PAPER_LAW = ("mesh.law=paper", "mesh.pair_coupling=sum", "mesh.contact=linear")
+
+
+def case(*words):
+    return read_root_strength(compose("generate", list(words)))
+
+
+def pair(*words):
+    return read_pair(compose("generate", list(words)))
+
+
+def test_figures_of_the_pump_drive():
+    """Computed independently of this project for 54/54, m 3, b 20: factors and the forces that give the stress."""
+    outer, tip = (case(PUMP, f"strength.load_point={point}") for point in ("outer_single_pair", "tip"))
+    assert outer.decisive == tip.decisive == "wheel"
+    factors = outer.factors["wheel"]
+    assert (factors.form_factor, factors.stress_correction_factor) == pytest.approx((1.167, 2.141), abs=6e-4)
+    factors = tip.factors["wheel"]
+    assert (factors.form_factor, factors.stress_correction_factor) == pytest.approx((2.312, 1.714), abs=6e-4)
+    assert factors.contact_ratio_factor == pytest.approx(0.674, abs=6e-4)
+    for stress, forces in ((349.39e6, (8393, 7847)), (292.88e6, (7036, 6578))):
+        assert (outer.force_for(stress), tip.force_for(stress)) == pytest.approx(forces, abs=1.0)
+
+
+def test_a_force_gives_the_stress_it_was_asked_for():
+    loaded = case(PUMP, "strength.application_factor=1.25", "strength.face_load_factor=1.2").under(349.39e6)
+    found = loaded.gears()["wheel"]
+    assert found.stress == pytest.approx(349.39e6, rel=1e-12)
+    assert found.nominal == pytest.approx(349.39e6 / 1.5, rel=1e-12)
+    assert found.safety.paper == pytest.approx(1.353, abs=5e-4)
+    assert loaded.tangential_force == pytest.approx(case(PUMP).force_for(349.39e6) / 1.5, rel=1e-12)
+
+
+def test_stress_goes_with_force_and_against_width_and_module_squared():
+    base = case(*EQUAL).gears()["wheel"].nominal
+    assert case(*EQUAL, "operating.torque_nm=260").gears()["wheel"].nominal == pytest.approx(2.0 * base)
+    wide = case(*EQUAL, "gear.pinion.face_width_mm=40", "gear.wheel.face_width_mm=40")
+    assert wide.gears()["wheel"].nominal == pytest.approx(0.5 * base)
+    large = [f"gear.{key}" for key in ("normal_module_mm=6", "pinion.bore_radius_mm=63", "wheel.bore_radius_mm=63")]
+    # at the same torque the force is half too
+    assert case(*EQUAL, *large).gears()["wheel"].nominal == pytest.approx(0.25 * base, rel=1e-9)
+
+
+def test_a_wider_gear_is_helped_by_a_module_at_either_end():
+    found = pair(PUMP)
+    assert root_width(found, found.wheel) == pytest.approx(20e-3)
+    assert root_width(found, found.pinion) == pytest.approx(26e-3)
+    found = pair(PUMP, "gear.pinion.face_width_mm=22")
+    assert root_width(found, found.pinion) == pytest.approx(22e-3)
+
+
+def test_no_helix_is_a_spur_gear():
+    spur = case(PUMP).factors["wheel"].stress_per_force
+    for edition in (2019, 2006):
+        words = (PUMP, "system=helical_pair", f"strength.edition={edition}", "gear.helix_angle_deg=0.01")
+        assert case(*words).factors["wheel"].stress_per_force == pytest.approx(spur, rel=2e-3)
+
+
+def test_load_distribution_goes_on_at_its_bounds():
+    few, many = pair("system=helical_pair", "gear.addendum_coefficient=0.9"), pair("system=helical_pair")
+    assert normal_contact_ratio(few) < 2.0 < normal_contact_ratio(many)
+    for found in (few, many):
+        ratio = normal_contact_ratio(found)
+        narrow = [
+            replace(
+                found,
+                pinion=replace(found.pinion, face_width=width),
+                wheel=replace(found.wheel, face_width=width),
+            )
+            for width in np.array([1e-9, 0.5, 0.999999, 1.5]) * found.face_width / found.overlap_ratio
+        ]
+        values = [load_distribution_factor(one) for one in narrow]
+        assert values[0] == pytest.approx(1.0 if ratio < 2.0 else math.sqrt(0.5), rel=1e-6)
+        assert values[2] == pytest.approx(values[3], rel=1e-5)
+        assert values[3] == pytest.approx(ratio**-0.5)
+        assert values[0] > values[1] > values[2]
+    assert load_distribution_factor(pair(PUMP)) == 1.0
+    deep = pair(PUMP, "gear.addendum_coefficient=1.25", "gear.cutter_tip_radius_coefficient=0.2")
+    assert normal_contact_ratio(deep) > 2.0
+    assert load_distribution_factor(deep) == 0.7
+
+
+def test_helix_factor():
+    found = pair("system=helical_pair")  # 18 degrees, overlap above 1
+    assert helix_factor(found, edition=2006) == pytest.approx(1.0 - 18.0 / 120.0)
+    assert helix_factor(found, edition=2019) == pytest.approx(0.85 / math.cos(math.radians(18.0)) ** 3)
+    steep = pair("system=helical_pair", "gear.helix_angle_deg=38")
+    assert helix_factor(steep, edition=2006) == pytest.approx(0.75)
+    assert helix_factor(pair(PUMP), edition=2019) == 1.0
+
+
+def test_rim_and_deep_teeth():
+    wheel = pair(PUMP).wheel
+    height = wheel.tip_radius - wheel.root_radius
+    rims = {share: replace(wheel, bore_radius=wheel.root_radius - share * height) for share in (0.51, 0.8, 1.2, 3.0)}
+    values = {share: rim_thickness_factor(gear) for share, gear in rims.items()}
+    assert values[3.0] == values[1.2] == 1.0
+    assert values[0.8] == pytest.approx(1.6 * math.log(2.242 / 0.8))
+    assert values[0.51] > values[0.8] > 1.6
+    with pytest.raises(GeometryError, match="reduce bore_radius_mm"):
+        rim_thickness_factor(replace(wheel, bore_radius=wheel.root_radius - 0.4 * height))
+    assert [deep_tooth_factor(ratio, 4) for ratio in (2.0, 2.3, 2.6)] == pytest.approx([1.0, 0.8342, 0.7])
+    assert deep_tooth_factor(2.3, 5) == 1.0
+    assert deep_tooth_factor(2.6, None) == 0.7
+
+
+def test_the_papers_mesh_peaks_at_isos_load_point():
+    """Without contact beyond the path one pair is alone between B and D, and its end is ISO's load point."""
+    loaded = case(PUMP, *PAPER_LAW).under(349.39e6)
+    history, gears = loaded.history(), loaded.gears()
+    for name, place in (
+        ("wheel", loaded.pair.path_of_contact - loaded.pair.base_pitch),
+        ("pinion", loaded.pair.base_pitch),
+    ):
+        at = history.stress[name].argmax()
+        assert history.stress[name][at] == pytest.approx(gears[name].stress, rel=1e-7)
+        assert history.share[at] == pytest.approx(1.0)
+        assert history.roll[at] == pytest.approx(place, abs=1e-6 * loaded.pair.base_pitch)
+
+
+def test_light_loads_come_near_it_and_heavy_ones_share_more():
+    shares = []
+    for torque in (1.0, 130.0, 680.0):
+        loaded = case(PUMP, f"operating.torque_nm={torque}")
+        shares.append(loaded.history().stress["wheel"].max() / loaded.gears()["wheel"].stress)
+    assert 1.0 >= shares[0] > shares[1] > shares[2]
+    assert shares[0] == pytest.approx(1.0, abs=0.01)
+
+
+def test_equal_gears_see_the_same_from_either_end():
+    history = case(*EQUAL, *PAPER_LAW).history(n_phases=400)
+    pinion, wheel = history.stress["pinion"], history.stress["wheel"]
+    path = case(*EQUAL).pair.path_of_contact
+    inside = np.linspace(0.01, 0.99, 60) * path
+    np.testing.assert_allclose(
+        np.interp(inside, history.roll, pinion), np.interp(path - inside, history.roll, wheel), rtol=5e-3
+    )
+    assert pinion.max() == pytest.approx(wheel.max(), rel=1e-7)
+    assert pinion[inside.searchsorted(0.2 * path)] != pytest.approx(wheel[inside.searchsorted(0.2 * path)], rel=0.1)
+
+
+@pytest.mark.parametrize("coupling", ["coupled", "independent"])
+@pytest.mark.parametrize("law", ["paper", "one_sided"])
+def test_slices_of_a_spur_pair_are_the_pair_itself(coupling, law):
+    whole = case(*EQUAL, f"mesh.law={law}", "operating.torque_nm=400").history()
+    words = (*EQUAL, f"mesh.law={law}", "system=helical_pair", f"mesh.slice_coupling={coupling}", "mesh.n_slices=8")
+    sliced = case(*words, "gear=engine_pump_drive", "operating.torque_nm=400").history()
+    for name in ("pinion", "wheel"):
+        inside = np.linspace(0.02, 0.98, 200) * whole.roll[-2]
+        np.testing.assert_allclose(
+            np.interp(inside, whole.roll, whole.stress[name]),
+            np.interp(inside, sliced.roll, sliced.stress[name]),
+            rtol=2e-3,
+            atol=2e-3 * whole.stress[name].max(),
+        )
+
+
+def test_spreading_keeps_the_sum_and_evens_out():
+    rng = np.random.default_rng(1)
+    own, structure = rng.random((3, 2, 40)) * (rng.random((3, 2, 40)) > 0.5), 1.0 + rng.random((3, 2, 40))
+    found = spread_along_face(own, structure, 9.0)
+    np.testing.assert_allclose(found.sum(axis=2), own.sum(axis=2), rtol=1e-12)
+    assert found.min() > 0.0
+    assert found.max() < own.max()
+    np.testing.assert_allclose(spread_along_face(own, structure, 0.0), own)
+    even = np.ones((1, 40))
+    np.testing.assert_allclose(spread_along_face(even, np.full((1, 40), 2.0), 9.0), even, rtol=1e-12)
+    # one loaded slice: exponential to either side, over the root of the coupling
+    one = np.zeros((1, 401))
+    one[0, 200] = 1.0
+    tail = spread_along_face(one, np.ones((1, 401)), 100.0)[0]
+    assert tail[230] / tail[220] == pytest.approx(math.exp(-1.0), rel=2e-3)
+
+
+def test_misalignment_raises_the_stress():
+    words = ("system=helical_pair", "mesh.n_slices=12")
+    straight = case(*words).history().stress["wheel"].max()
+    crooked = case(*words, "modification.misalignment_um=10").history().stress["wheel"].max()
+    assert crooked > 1.1 * straight
+
+
+@pytest.mark.parametrize("name", sorted(options("gear")))
+def test_every_gear_option_has_a_root_stress(name):
+    config = compose("generate", [f"gear={name}"])
+    words = [f"gear={name}"] + (
+        [] if config["gear"]["helix_angle_deg"] == 0 else ["system=helical_pair", f"gear={name}"]
+    )
+    loaded = case(*words)
+    history = loaded.history(n_phases=40)
+    for gear, found in loaded.gears().items():
+        assert 5e6 < found.stress < 2e9
+        assert 0.4 * found.stress < history.stress[gear].max() < 1.5 * found.stress
+    assert 0.99 < history.share.max() <= 1.0 + 1e-9 or loaded.pair.total_contact_ratio > 1.2
+
+
+def test_the_force_over_the_mesh_gives_its_stress():
+    loaded = case(PUMP)
+    force = loaded.force_over_mesh_for(200e6)
+    torque = force * loaded.pair.pinion.pitch_radius
+    found = case(PUMP, f"operating.torque_nm={torque!r}").history().stress
+    assert max(values.max() for values in found.values()) == pytest.approx(200e6, rel=1e-5)
+    assert force > loaded.force_for(200e6)
+    exact = case(PUMP, *PAPER_LAW)
+    assert exact.force_over_mesh_for(200e6) == pytest.approx(exact.force_for(200e6), rel=1e-5)
+
+
+def test_mistakes():
+    with pytest.raises(ConfigError, match="give a positive one"):
+        case(PUMP).force_for(-1.0)
+    with pytest.raises(ConfigError, match=r"operating.torque_nm = 0 must be positive"):
+        case(PUMP, "operating.torque_nm=0").gears()
+    with pytest.raises(ConfigError, match=r"strength\.load_point"):
+        root_factors(pair(PUMP), load_point="root")
+    with pytest.raises(ConfigError, match=r"strength\.edition"):
+        root_factors(pair(PUMP), edition=1996)
+    with pytest.raises(ConfigError, match="system=helical_pair"):
+        case("gear=beihang_61_132")

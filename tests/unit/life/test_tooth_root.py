@@ -1,0 +1,165 @@
+"""Form and stress correction factors of ISO 6336-3: against our own tooth, handbooks, other programs, and limits."""
+
+import math
+from dataclasses import replace
+
+import numpy as np
+import pytest
+from scipy.optimize import brentq
+
+from gensig.errors import ExtrapolationError
+from gensig.geometry.gear import Gear
+from gensig.geometry.tooth_profile import involute_point, root_curve
+from gensig.geometry.tooth_profile import load_angle as flank_load_angle
+from gensig.life.tooth_root import TANGENT, root_loading, root_section, virtual_gear
+
+
+def gear(n_teeth, *, shift=0.0, module=3e-3, rounding=0.38, helix=0.0):
+    return Gear(
+        name="pinion",
+        n_teeth=n_teeth,
+        normal_module=module,
+        pressure_angle=math.radians(20.0),
+        addendum_coefficient=1.0,
+        clearance_coefficient=0.25,
+        cutter_tip_radius_coefficient=rounding,
+        profile_shift=shift,
+        face_width=20e-3,
+        bore_radius=2e-3,
+        helix_angle=math.radians(helix),
+    )
+
+
+def touching(found, angle=TANGENT):
+    """Where our own root curve makes ``angle`` with the centreline: its parameter gamma."""
+
+    def slope(gamma):
+        roll = (found.rounding_center_depth / math.tan(gamma) + found.rounding_center_offset) / found.pitch_radius
+        return gamma - roll - angle
+
+    return brentq(slope, found.pressure_angle, 0.5 * math.pi)
+
+
+SHAPES = [(18, 0.0, 0.38), (23, 0.3, 0.25), (54, 0.0, 0.38), (84, -0.2, 0.3), (400, 0.0, 0.38)]
+
+
+@pytest.mark.parametrize(("n_teeth", "shift", "rounding"), SHAPES)
+def test_the_critical_section_lies_on_our_own_root_curve(n_teeth, shift, rounding):
+    found = gear(n_teeth, shift=shift, rounding=rounding)
+    section = root_section(found)
+    at = touching(found)
+    x, y = root_curve(found, np.array([at]))
+    assert section.thickness == pytest.approx(2.0 * y[0], rel=1e-9)
+    assert section.height == pytest.approx(x[0], rel=1e-9)
+    # at 28 degrees it would be elsewhere
+    assert section.thickness != pytest.approx(
+        2.0 * root_curve(found, np.array([touching(found, math.radians(28.0))]))[1][0], rel=1e-3
+    )
+    around = at + np.linspace(-2e-2, 2e-2, 201)
+    x, y = root_curve(found, around)
+    dx, dy = np.gradient(x, around), np.gradient(y, around)
+    curvature = np.abs(dx * np.gradient(dy, around) - dy * np.gradient(dx, around)) / np.hypot(dx, dy) ** 3
+    assert section.fillet_radius == pytest.approx(1.0 / curvature[100], rel=1e-5)
+
+
+@pytest.mark.parametrize(("n_teeth", "shift", "rounding"), SHAPES)
+def test_the_lever_arm_is_that_of_our_own_flank(n_teeth, shift, rounding):
+    found = gear(n_teeth, shift=shift, rounding=rounding)
+    tip = virtual_gear(found).tip_curvature_radius
+    distance = np.linspace(0.0, 0.6 * found.base_pitch, 7)
+    loading = root_loading(found, distance)
+    x, y = involute_point(found, tip - distance)
+    angle = flank_load_angle(found, tip - distance)
+    np.testing.assert_allclose(loading.load_angle, angle, rtol=1e-9, atol=1e-12)
+    np.testing.assert_allclose(
+        loading.lever_arm, x - y * np.tan(angle) - root_section(found).height, rtol=1e-7, atol=1e-12
+    )
+
+
+# load at the tip, rack alpha 20 degrees, h_a 1, c 0.25, rho 0.38: table of Chinese design handbooks (DIN 3990 charts)
+HANDBOOK = [
+    (18, 2.91, 1.53), (19, 2.85, 1.54), (20, 2.80, 1.55), (22, 2.72, 1.57), (25, 2.62, 1.59), (30, 2.52, 1.625),
+    (40, 2.40, 1.67), (50, 2.32, 1.70), (60, 2.28, 1.73), (80, 2.22, 1.77), (100, 2.18, 1.79), (200, 2.12, 1.865),
+]  # fmt: skip
+
+
+@pytest.mark.parametrize(("n_teeth", "form", "correction"), HANDBOOK)
+def test_handbook_factors(n_teeth, form, correction):
+    loading = root_loading(gear(n_teeth), 0.0)
+    assert loading.form_factor[0] == pytest.approx(form, rel=0.01)
+    assert loading.stress_correction_factor[0] == pytest.approx(correction, rel=0.01)
+
+
+def test_another_program():
+    """din3990 (a DIN 3990-11 calculation, public on GitHub under hanslhansl), its test 1: load at the tip."""
+    for n_teeth, shift, thickness, arm, fillet, form, correction in (
+        (19, 0.50, 8.748743, 8.174658, 1.316148, 2.246336, 1.914726),
+        (104, 0.15, 9.239505, 7.834246, 1.325999, 2.161657, 2.008782),
+    ):
+        found = gear(n_teeth, shift=shift, module=4e-3, rounding=0.25)
+        section, loading = root_section(found), root_loading(found, 0.0)
+        assert section.thickness * 1e3 == pytest.approx(thickness, rel=2e-4)
+        assert section.fillet_radius * 1e3 == pytest.approx(fillet, rel=2e-4)
+        assert loading.lever_arm[0] * 1e3 == pytest.approx(arm, rel=2e-4)
+        assert loading.form_factor[0] == pytest.approx(form, rel=3e-4)
+        assert loading.stress_correction_factor[0] == pytest.approx(correction, rel=3e-4)
+
+
+def test_many_teeth_are_a_rack():
+    """The rack's own section: straight sides at 20 degrees down to a circle of the rounding's radius."""
+    alpha, rounding, found = math.radians(20.0), 0.38, gear(10**6, module=1e-3)
+    # centre of the circle: b from the centreline, a below the pitch line; tangent at 30 degrees to the centreline
+    a = 1.25 - rounding
+    b = math.pi / 4.0 + 1.25 * math.tan(alpha) - rounding * math.tan(alpha) + rounding / math.cos(alpha)
+    section, loading = root_section(found), root_loading(found, 0.0)
+    thickness, depth = 2.0 * (b - rounding * math.cos(TANGENT)), a + rounding * math.sin(TANGENT)
+    assert section.thickness == pytest.approx(1e-3 * thickness, rel=1e-5)
+    assert section.fillet_radius == pytest.approx(1e-3 * rounding, rel=1e-4)
+    half_tip = math.pi / 4.0 - math.tan(alpha)
+    arm = 1.0 + depth - half_tip * math.tan(alpha)
+    assert loading.lever_arm[0] == pytest.approx(1e-3 * arm, rel=1e-5)
+    assert loading.form_factor[0] == pytest.approx(6.0 * arm / thickness**2, rel=1e-4)
+    assert (loading.form_factor[0], loading.stress_correction_factor[0]) == pytest.approx((2.06, 1.97), rel=5e-3)
+
+
+def test_factors_do_not_depend_on_size_and_a_rounder_root_has_less_stress():
+    small, large = (root_loading(gear(30, module=size), [0.0, 2.0 * size]) for size in (1e-3, 25e-3))
+    np.testing.assert_allclose(small.stress_factor, large.stress_factor, rtol=1e-12)
+    sharp, round_ = (root_loading(gear(30, rounding=radius), 0.0).stress_factor[0] for radius in (0.2, 0.38))
+    assert sharp > 1.03 * round_
+    higher, lower = root_loading(gear(30), [0.0, 2e-3]).stress_factor
+    assert higher > lower
+
+
+def test_the_product_is_that_of_both_factors_and_goes_on_below_the_section():
+    distance = np.linspace(0.0, 5e-3, 400)
+    loading = root_loading(gear(54), distance)
+    np.testing.assert_allclose(
+        loading.stress_factor, loading.form_factor * loading.stress_correction_factor, rtol=1e-12
+    )
+    deep = root_loading(gear(54), np.linspace(0.0, 22e-3, 400))
+    assert deep.lever_arm[-1] < 0.0
+    assert np.isfinite(deep.stress_factor).all()
+    assert (deep.stress_factor >= 0.0).all()
+    assert np.abs(np.diff(deep.stress_factor)).max() < 0.05
+
+
+def test_a_helical_gear_has_the_factors_of_its_virtual_gear():
+    helical = gear(40, helix=20.0)
+    virtual = virtual_gear(helical)
+    near = [
+        root_loading(gear(n), 0.0).stress_factor[0] for n in (math.floor(virtual.n_teeth), math.ceil(virtual.n_teeth))
+    ]
+    assert virtual.n_teeth == pytest.approx(40 / math.cos(math.radians(20.0)) ** 3, rel=0.02)
+    assert min(near) < root_loading(helical, 0.0).stress_factor[0] < max(near)
+    assert virtual_gear(gear(40)).tip_radius == gear(40).tip_radius
+
+
+def test_a_notch_out_of_range_is_said():
+    sharp = replace(gear(400), cutter_tip_radius_coefficient=0.02)
+    with pytest.raises(ExtrapolationError, match=r"notch parameter .* outside 1\.\.8"):
+        root_loading(sharp, 0.0)
+    assert (
+        root_loading(sharp, 0.0, allow_extrapolation=True).stress_factor[0]
+        > root_loading(gear(400), 0.0).stress_factor[0]
+    )

@@ -1,0 +1,200 @@
+"""Parts of the wear life: curvature of what is worn off, limits, fitted laws, the way into a fault, what is refused."""
+
+from dataclasses import replace
+
+import numpy as np
+import pytest
+from numpy.testing import assert_allclose
+
+from gensig.compose import compose
+from gensig.errors import ConfigError, ExtrapolationError, SimulationError
+from gensig.faults.base import faulty_teeth
+from gensig.faults.registry import read_faults
+from gensig.life.archard import LEAST_CURVATURE_SHARE, flank_radii, hertz_pressure, hunting_turns, worn_curvature
+from gensig.life.life_laws import FittedLaw, fitted_laws, life_map, torque_exponent
+from gensig.life.options import read_wear_options
+from gensig.life.wear_life import wear_life, worn_flanks
+from gensig.systems.wear import read_wear_case, wear_fault
+
+FULL = ("gear=harbin_38_55", "gear.addendum_coefficient=1", "wear.threshold_um=20")
+
+
+def case_of(*words):
+    return read_wear_case(compose("generate", list(words)))
+
+
+@pytest.fixture(scope="module")
+def full():
+    return case_of(*FULL)
+
+
+def test_curvature_of_a_parabola_and_of_a_straight_wear(full):
+    arc = full.path.arc
+    middle = arc.mean(axis=1, keepdims=True)
+    reach = np.full(arc.shape[1], 1.5e-4)
+    depth = 4.0 * (arc - middle) ** 2
+    assert_allclose(worn_curvature(full.path, depth, reach)[:, 8:-8], 8.0, rtol=0.1)
+    assert_allclose(worn_curvature(full.path, 3e-3 * arc, reach), 0.0, atol=1e-6)
+    # a wave as long as the half width, to which its second difference over the half width alone is blind
+    wave = 1e-6 * np.cos(2.0 * np.pi * (arc - arc[:, :1]) / 6e-4)
+    felt = worn_curvature(full.path, wave, np.full(arc.shape[1], 6e-4))
+    assert np.all(np.abs(felt[:, 20:-20]).max(axis=1) > 0.1 * 1e-6 * (2.0 * np.pi / 6e-4) ** 2)
+
+
+def test_hollow_flanks_press_no_less_than_nearly_flat_ones(full):
+    load = full.line_load(full.new_flanks())
+    arc = full.path.arc
+    hollow = -1e3 * (arc - arc.mean(axis=1, keepdims=True))[:, None] ** 2
+    new = hertz_pressure(full.path, load, full.material)
+    worn = hertz_pressure(full.path, load, full.material, hollow - hollow.min())
+    assert_allclose(worn[0, 10:-10], new[0, 10:-10] * LEAST_CURVATURE_SHARE**0.5)
+
+
+def test_radii_of_new_and_worn_flanks(full):
+    nothing = np.zeros((2, len(full.path.position)))
+    load = full.line_load(full.new_flanks())[0]
+    radii = flank_radii(full.path, nothing, load, full.material)
+    assert_allclose(radii["worn"], radii["new"])
+    assert_allclose(radii["by_eq_22"], radii["new"])
+    life = wear_life(full)
+    worn = flank_radii(full.path, life.depth[-1][:, 0], load, full.material)
+    assert_allclose(worn["by_eq_22"], radii["new"], rtol=3e-3)  # a shift of some um on radii of mm
+    assert np.abs(worn["worn"] / radii["new"] - 1.0).max() > 0.2  # what the profile itself does
+
+
+def test_a_limit_of_the_transmission_error_finds_the_threshold(full):
+    new = full.error_range(full.new_flanks())
+    limit = new + 5e-6
+    words = (*FULL, f"wear.transmission_error_limit_um={limit * 1e6}")
+    life = wear_life(case_of(*words))
+    assert life.ended_by == "transmission_error"
+    assert life.threshold < full.options.threshold
+    assert full.error_range(life.depth[-1]) == pytest.approx(limit, rel=1e-3)
+    by_depth = wear_life(case_of(*words, "wear.threshold_um=1"))
+    assert by_depth.ended_by == "depth"
+    assert by_depth.threshold == pytest.approx(1e-6, rel=1e-6)
+    with pytest.raises(ConfigError, match="is reached by new flanks already"):
+        wear_life(case_of(*FULL, "wear.transmission_error_limit_um=0.5"))
+
+
+def test_sum_adds_both_flanks(full):
+    life = wear_life(case_of(*FULL, "wear.criterion=sum"))
+    assert life.depth[-1].sum(axis=0).max() == pytest.approx(20e-6, rel=1e-6)
+    assert life.life < 0.8 * wear_life(full).life
+
+
+def test_sharing_follows_the_contact_ratio():
+    assert case_of("gear=harbin_38_55").loads is None
+    assert case_of("gear=harbin_38_55", "wear.sharing=mesh").loads is not None
+    assert case_of().loads is not None
+    assert case_of("wear.sharing=one_pair").loads is None
+
+
+def test_laws_know_their_range_and_refuse_a_negative_life():
+    case = case_of("gear=harbin_38_55")
+    lives = life_map(case, [50.0, 100.0, 200.0, 400.0], [3.0, 6.0, 12.0])
+    power, logarithm, exponential = fitted_laws(lives, 200.0, 12.0)
+    assert (power.b, power.c) == pytest.approx((1.0, 1.0))
+    assert power.life(200.0, 12.0) == pytest.approx(lives.hours[2, 2])
+    assert power.largest_error < 1e-9
+    assert exponential.life(200.0, 6.0) == pytest.approx(lives.hours[2, 1], rel=0.3)
+    assert logarithm.largest_error > 0.1
+    with pytest.raises(SimulationError, match="gives a life of -"):
+        logarithm.life(900.0, 12.0, allow_extrapolation=True)
+    for law, torque, speed in ((power, 500.0, 6.0), (power, 100.0, 2.0), (logarithm, 100.0, 3.0)):
+        with pytest.raises(ExtrapolationError, match="was fitted for a"):
+            law.life(torque, speed)
+    assert power.life(500.0, 6.0, allow_extrapolation=True) > 0.0
+    printed = FittedLaw(
+        form="logarithm", a=709.3, b=127.3, c=0.0, torque=(10.0, 300.0), speed=(12.0, 12.0), largest_error=0.0
+    )
+    with pytest.raises(SimulationError, match="gives a life of -"):  # inside its range
+        printed.life(265.0, 12.0)
+    with pytest.raises(ConfigError, match="two torques or more"):
+        life_map(case, [50.0], [3.0, 6.0])
+    with pytest.raises(ConfigError, match="all positive"):
+        life_map(case, [50.0, 60.0], [-3.0, 6.0])
+
+
+def test_local_exponent(full):
+    assert torque_exponent(case_of("gear=harbin_38_55")) == pytest.approx(1.0, abs=1e-9)
+    assert torque_exponent(full) == pytest.approx(1.0, abs=0.15)
+
+
+@pytest.mark.parametrize("words", [FULL, ("system=helical_pair", "mesh.n_slices=8", "wear.threshold_um=5")])
+def test_what_is_worn_off_is_a_fault(words):
+    case = case_of(*words)
+    depth = wear_life(case).depth[-1]
+    faults = read_faults(wear_fault(case, depth))
+    teeth = faulty_teeth(case.pair, faults)
+    assert len(teeth) == case.pair.pinion.n_teeth + case.pair.wheel.n_teeth
+    for side, name in enumerate(("pinion", "wheel")):
+        tooth = teeth[name, 0]
+        loss = tooth.material_loss[0]
+        curvature = case.path.curvature[side]
+        mean = depth[side].mean(axis=0) / np.cos(case.pair.base_helix_angle)
+        order = np.argsort(curvature)
+        inside = (curvature > curvature.min() + 4e-4) & (curvature < curvature.max() - 4e-4)
+        found = np.interp(curvature, tooth.profile.curvature_radius, loss)
+        assert_allclose(found[inside], mean[inside], atol=0.05 * mean.max())
+        assert loss[tooth.profile.curvature_radius < curvature[order][0] - 4e-4].max(initial=0.0) == 0.0
+
+
+def test_turns_until_the_same_teeth_meet(full):
+    assert hunting_turns(full.pair) == 55
+    assert hunting_turns(case_of("gear.pinion.n_teeth=42").pair) == 2
+
+
+@pytest.mark.parametrize(
+    ("words", "message"),
+    [
+        (["wear.rule=archard"], "wear.rule = 'archard'; allowed: band, fixed_intervals"),
+        (["wear.criterion=both"], "allowed: first, sum"),
+        (["wear.sharing=none"], "allowed: mesh, one_pair"),
+        (["wear.geometry=old"], "allowed: worn, unworn"),
+        (["wear.load_radius=tip"], "allowed: base, reference"),
+        (["wear.n_intervals=0"], "must lie in 1"),
+        (["wear.n_intervals=2.5"], "is not a whole number"),
+        (["wear.threshold_um=0"], "wear.threshold_um = 0 must be positive"),
+        (["wear.threshold_um=-3"], "wear.threshold_um = -3 must be positive"),
+        (["wear.threshold_um=nan"], "is not finite"),
+        (["wear.threshold_um=2000"], "is deeper than the tooth"),
+        (["wear.coefficient=0"], "wear.coefficient = 0 must be positive"),
+        (["wear.hardness_hbs=-1"], "wear.hardness_hbs = -1 must be positive"),
+        (["wear.pinion.hardness_hbs=0"], "wear.pinion.hardness_hbs = 0 must be positive"),
+        (["wear.wheel.coefficient=-1e-6"], "wear.wheel.coefficient = -1e-06 must be positive"),
+        (["wear.wheel.coefficient=hard"], "is not a number"),
+        (["wear.step_um=0"], "wear.step_um = 0 must be positive"),
+        (["wear.wheel=3"], "wear.wheel = 3 must be a group of keys"),
+        (["wear.transmission_error_limit_um=0"], "must be positive"),
+        (["wear.transmission_error_limit_um=9", "wear.geometry=unworn"], "needs wear.geometry=worn"),
+        (["wear.transmission_error_limit_um=9", "wear.sharing=one_pair"], "wear.sharing=mesh"),
+        (["wear.transmission_error_limit_um=9", "gear=harbin_38_55"], "needs wear.sharing=mesh"),
+        (["operating.torque_nm=0"], "operating.torque_nm = 0 must be positive"),
+        (["fault=crack"], "a life begins with sound flanks"),
+    ],
+)
+def test_bad_input_is_one_line(words, message):
+    with pytest.raises(ConfigError) as caught:
+        case_of(*words)
+    assert message in str(caught.value)
+    assert "\n" not in str(caught.value)
+
+
+def test_a_history_with_gaps_is_refused(full):
+    for turns in ([2.0, 1.0], [-1.0, 1.0], [np.nan], [[1.0]]):
+        with pytest.raises(ConfigError, match="never falls"):
+            worn_flanks(full, np.array(turns))
+    with pytest.raises(ConfigError, match="give one for each"):
+        worn_flanks(full, np.array([1.0, 2.0]), torque=np.array([1.0]))
+    with pytest.raises(ConfigError, match="must be positive"):
+        worn_flanks(full, np.array([1.0, 2.0]), torque=np.array([1.0, -2.0]))
+
+
+def test_values_of_a_gear_override_those_of_both():
+    keys = compose("generate", ["wear.pinion.coefficient=1e-6", "wear.wheel.hardness_hbs=200"])["wear"]
+    options = read_wear_options(keys)
+    assert options.wear_factor("pinion") == pytest.approx(1e-6 / (187 * 9.80665e6))
+    assert options.wear_factor("wheel") == pytest.approx(6.25e-6 / (200 * 9.80665e6))
+    assert options.hardness_of("pinion") == pytest.approx(187 * 9.80665e6)
+    assert replace(options, sharing="mesh").sharing == "mesh"
