@@ -152,7 +152,7 @@ def dynamic_root_stress(strength: RootStrength, line: EngineLine, mesh: int, loa
     """
     if not load.greatest > 0.0:
         raise ConfigError(
-            f"mesh {line.mesh_names[mesh]}: its force never closes the driving flanks; change their order"
+            f"mesh {line.mesh_names[mesh]}: its force never closes the driving flanks; swap edge_from and edge_to of its row"
         )
     pinion = strength.pair.pinion
     loaded = replace(strength, flanks=replace(strength.flanks, torque=load.greatest * pinion.base_radius))
