@@ -61,6 +61,7 @@ def plot_dampers(
         xlim=(0, 720),
         xticks=range(0, 721, 90),
     )
+    axes[0, 1].set_ylim(None, 1.35 * first.load.greatest / 1e3)  # room for the legend
     axes[1, 0].set(
         title=f"Tooth force by orders at {rpm:g} r/min", xlabel="order", ylabel="amplitude, kN", xlim=(0, 60)
     )
@@ -73,7 +74,7 @@ def plot_dampers(
     axes[1, 1].margins(y=0.3)
     axes[1, 1].set_ylim(0.0, None)
     for one in axes.flat:
-        one.legend(fontsize=8)
+        one.legend(fontsize=8, loc="upper left" if one is axes[0, 0] else "upper right")
     sizes = "; ".join(
         f"node {one.node}: {one.ring_inertia:.3g} kg m$^2$, {one.damping:.3g} N m s/rad, {one.stiffness:.3g} N m/rad"
         for one in dampers

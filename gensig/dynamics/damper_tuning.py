@@ -9,7 +9,7 @@ response functions, Mechanical Systems and Signal Processing 4 (1990) 53-63.
 from __future__ import annotations
 
 import math
-from collections.abc import Callable, Sequence
+from collections.abc import Callable, Iterable, Sequence
 from dataclasses import dataclass
 
 import numpy as np
@@ -23,7 +23,7 @@ Array = NDArray[np.float64]
 ComplexArray = NDArray[np.complex128]
 
 LEAST_INERTIA = 0.05  # of the largest allowed: a smaller ring is no damper
-DAMPING_RATIOS = (0.005, 5.0)  # searched, of the ring on its spring
+DAMPING_RATIOS = (0.05, 5.0)  # searched, of the ring on its spring; assumed: rubber has a loss factor of 0.1 and more
 RATE_MARGIN = 10.0  # by which the rate damping over inertia of a viscous damper may leave the excited frequencies
 POPULATION, GENERATIONS = 10, 100  # per unknown, and at most
 SETTLED = 1e-3  # of the population's spread; the simplex goes on from there
@@ -76,7 +76,7 @@ def seen_from_nodes(
     elements: Elements,
     element: int,
     torques: Callable[[float], Array],
-    speeds: Sequence[float],
+    speeds: Iterable[float],
     places: dict[int, int],
     *,
     n_orders: int,

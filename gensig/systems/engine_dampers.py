@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Mapping, Sequence
+from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import dataclass, replace
 from typing import Any
 
@@ -96,7 +96,7 @@ def tooth_load(line: EngineLine, mesh: int, response: SteadyResponse) -> ToothLo
 
 
 def seen_by_dampers(
-    line: EngineLine, mesh: int, nodes: Sequence[int], speeds: Sequence[float], torque: float
+    line: EngineLine, mesh: int, nodes: Sequence[int], speeds: Iterable[float], torque: float
 ) -> SeenFromNodes:
     """Force of a mesh over a range of speeds (rad/s) at one brake torque, for dampers on ``nodes``.
 
@@ -152,7 +152,8 @@ def dynamic_root_stress(strength: RootStrength, line: EngineLine, mesh: int, loa
     """
     if not load.greatest > 0.0:
         raise ConfigError(
-            f"mesh {line.mesh_names[mesh]}: its force never closes the driving flanks; swap edge_from and edge_to of its row"
+            f"mesh {line.mesh_names[mesh]}: its force never closes the driving flanks; swap edge_from and edge_to of "
+            "its row"
         )
     pinion = strength.pair.pinion
     loaded = replace(strength, flanks=replace(strength.flanks, torque=load.greatest * pinion.base_radius))

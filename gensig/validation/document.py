@@ -71,9 +71,9 @@ SOURCE_TEXTS = {
     "engine_response": "1688 r/min, 12.68 kN m, linear: meshes never part. The paper prints no size, pressure, cam, "
     "pump or firing order; all are assumed (`excitation=engine_v20`, docs/theory/engine_excitation.md), none is tuned. "
     "Two firing orders: `least_couples` of the crank, the default, and `in_sequence`.",
-    "engine_dampers": "The same, with ISO's root stress of the pump gear under the greatest tooth force of a cycle, and "
-    "dampers on both gears of the pump drive, whose sizes the paper does not print (docs/theory/dampers.md). Waterfalls "
-    "are steady at every speed, by 10 r/min.",
+    "engine_dampers": "The same, with ISO's root stress of the pump gear under the greatest tooth force of a cycle, "
+    "and dampers on both gears of the pump drive, whose sizes the paper does not print (docs/theory/dampers.md). "
+    "Waterfalls are steady at every speed, by 10 r/min.",
 }
 TITLES = {
     "geometry": "Teeth and root transition curve",
