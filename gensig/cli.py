@@ -92,17 +92,10 @@ def _tune_damper(parser: argparse.ArgumentParser) -> None:
     parser.add_argument("--out", required=True, metavar="FILE", help="option to write: DIR/system/NAME.yaml")
     parser.add_argument("--mesh", type=int, nargs=2, required=True, metavar="N", help="nodes of its two gears")
     parser.add_argument("--nodes", type=int, nargs="+", metavar="N", help="with a damper each (default: the gears)")
-    parser.add_argument(
-        "--most-inertia", type=float, metavar="KG_M2", help="of a ring (default: that of the node it is on)"
-    )
+    parser.add_argument("--most-inertia", type=float, metavar="KG_M2", help="of a ring (default: that of its node)")
     parser.add_argument("--viscous", action="store_true", help="rings that only a fluid holds (default: a spring too)")
-    parser.add_argument(
-        "--run",
-        type=float,
-        nargs=3,
-        metavar=("LOW", "HIGH", "STEP"),
-        help="speeds of the crank, r/min (default: those of system.campbell, 25)",
-    )
+    speeds = "speeds of the crank, r/min (default: those of system.campbell, 25)"
+    parser.add_argument("--run", type=float, nargs=3, metavar=("LOW", "HIGH", "STEP"), help=speeds)
     parser.add_argument("--torque", type=float, metavar="NM", help="brake torque (default: excitation.reference)")
     parser.add_argument("--seed", type=int, default=0, metavar="N", help="of the search (default: 0)")
     parser.add_argument("--json", metavar="FILE", help="write forces, root stress and safety before and after")
