@@ -87,6 +87,21 @@ def _forced_response(parser: argparse.ArgumentParser) -> None:
     parser.add_argument("--plot", metavar="FILE", help="write a figure (PNG, SVG or PDF)")
 
 
+def _tune_damper(parser: argparse.ArgumentParser) -> None:
+    _overrides(parser)
+    parser.add_argument("--out", required=True, metavar="FILE", help="option to write: DIR/system/NAME.yaml")
+    parser.add_argument("--mesh", type=int, nargs=2, required=True, metavar="N", help="nodes of its two gears")
+    parser.add_argument("--nodes", type=int, nargs="+", metavar="N", help="with a damper each (default: the gears)")
+    parser.add_argument("--most-inertia", type=float, metavar="KG_M2", help="of a ring (default: that of its node)")
+    parser.add_argument("--viscous", action="store_true", help="rings that only a fluid holds (default: a spring too)")
+    speeds = "speeds of the crank, r/min (default: those of system.campbell, 25)"
+    parser.add_argument("--run", type=float, nargs=3, metavar=("LOW", "HIGH", "STEP"), help=speeds)
+    parser.add_argument("--torque", type=float, metavar="NM", help="brake torque (default: excitation.reference)")
+    parser.add_argument("--seed", type=int, default=0, metavar="N", help="of the search (default: 0)")
+    parser.add_argument("--json", metavar="FILE", help="write forces, root stress and safety before and after")
+    parser.add_argument("--plot", metavar="FILE", help="write a figure (PNG, SVG or PDF)")
+
+
 def _modify_flank(parser: argparse.ArgumentParser) -> None:
     _overrides(parser)
     parser.add_argument("--out", required=True, metavar="FILE", help="option to write: DIR/modification/NAME.yaml")
@@ -293,6 +308,13 @@ VERBS: dict[str, Verb] = {
         "gensig forced-response system=engine_gear_train excitation=engine_v20 --run 650 1750 10 --plot response.png",
         "gensig.commands.forced_response:forced_response",
         _forced_response,
+    ),
+    "tune-damper": Verb(
+        "torsional dampers that make the worst tooth force of an engine's mesh least; root stress before and after",
+        "gensig tune-damper system=engine_gear_train excitation=engine_v20 --mesh 21 45 "
+        "--out mine/system/damped.yaml --plot dampers.png",
+        "gensig.commands.tune_damper:tune_damper",
+        _tune_damper,
     ),
     "twin": Verb(
         "a configuration like a measured healthy machine",

@@ -25,7 +25,7 @@ class LineMatrices:
     loss_stiffness : (dof, dof) N m/rad, loss factor times stiffness of the shafts
     directions : (mesh, dof) gradient of the approach of a mesh along its transverse line of action, m per unit
     mesh_stiffness, mesh_damping, mesh_loss_factor, backlash : (mesh,) N/m, N s/m, 1, m
-    rigid : (part, dof) the motion that deforms nothing, 1 for the first node of the part
+    rigid : (part, dof) the motion of each elastic part that deforms no spring, in the ratios of its speeds
     coordinate_names, coordinate_mass : (coordinate,) every node and every gear's x and y before merging
     expand : (coordinate, dof) coordinates = expand @ dof
     coordinate_node : (coordinate,) the node that each belongs to
@@ -104,8 +104,9 @@ def line_matrices(line: ShaftLine, *, merge_rigid: bool = True, lateral: bool = 
             for gear_place, sign in ((mesh.driving, 1.0), (mesh.driven, -1.0)):
                 turn, x = along - frames[gear_place], n_nodes + 2 * gear_place
                 directions[row, x : x + 2] += sign * math.sin(turn), -sign * math.cos(turn)
-    rotation = np.zeros((len(line.parts), n_coordinates))
-    for part, nodes in enumerate(line.parts):
+    elastic_parts = line.elastic_parts
+    rotation = np.zeros((len(elastic_parts), n_coordinates))
+    for part, nodes in enumerate(elastic_parts):
         rotation[part, list(nodes)] = np.abs(line.speed_ratio[list(nodes)])
     gear_names = [f"{line.gears[place].name} {axis}" for place in moving for axis in "xy"]
     return LineMatrices(

@@ -38,7 +38,8 @@ class Node:
 class Shaft:
     """A torsional spring between two nodes: stiffness in N m/rad, viscous damping in N m s/rad, loss factor.
 
-    A ``rigid`` one is a compound that may be merged; one without stiffness always is.
+    A ``rigid`` one is a compound that may be merged; one whose stiffness is None always is. One of stiffness 0 is a
+    damper alone.
     """
 
     first: int
@@ -55,9 +56,11 @@ class Shaft:
             raise ConfigError(f"{place}: it joins a node to itself")
         if self.stiffness is None and not self.rigid:
             raise ConfigError(f"{place}: it has no stiffness; give one, or make it rigid")
-        if self.stiffness is not None and not 0.0 < self.stiffness < math.inf:
-            raise ConfigError(f"{place}: stiffness {self.stiffness:g} N m/rad must be positive")
+        if self.stiffness is not None and not 0.0 <= self.stiffness < math.inf:
+            raise ConfigError(f"{place}: stiffness {self.stiffness:g} N m/rad must not be negative")
         _check_losses(place, self.damping, self.loss_factor)
+        if self.stiffness == self.damping == 0.0:
+            raise ConfigError(f"{place}: it has neither stiffness nor damping; give one of both")
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -195,6 +198,20 @@ class ShaftLine:
         """Nodes of each part of the line that nothing joins to the others; a free line has a rigid mode for each."""
         part = self._turning[1]
         return tuple(tuple(n for n, own in enumerate(part) if own == one) for one in range(max(part) + 1))
+
+    @property
+    def elastic_parts(self) -> tuple[tuple[int, ...], ...]:
+        """Nodes that springs, compounds and meshes hold to each other: the parts, less rings that only a fluid holds.
+
+        Each turns as one without deforming anything, first that of the first node.
+        """
+        leader = list(range(len(self.nodes)))
+        joints = [(shaft.first, shaft.second) for shaft in self.shafts if shaft.stiffness != 0.0]
+        joints += [(self.gears[mesh.driving].node, self.gears[mesh.driven].node) for mesh in self.meshes]
+        for first, second in joints:
+            one, other = sorted((leader[first], leader[second]))
+            leader = [one if own == other else own for own in leader]
+        return tuple(tuple(n for n, own in enumerate(leader) if own == one) for one in sorted(set(leader)))
 
     @property
     def n_loops(self) -> int:

@@ -8,6 +8,7 @@ from typing import Any
 
 from gensig.dynamics.bearing import BallBearing, support_stiffness
 from gensig.dynamics.bearing import Shaft as BearingShaft
+from gensig.dynamics.dampers import TorsionalDamper
 from gensig.dynamics.pair import Body, Support
 from gensig.errors import ConfigError
 from gensig.material import Material
@@ -75,6 +76,7 @@ class LineOptions:
     gears_csv: str | None
     lateral: bool
     viscous_damper_node: int | None
+    dampers: tuple[TorsionalDamper, ...]
     backlash: float = unit("um")
     loss_factor: LossFactors
     support: GearHolding
@@ -96,9 +98,26 @@ def read_options(machine: Mapping[str, Any]) -> LineOptions:
         "loss_factor": read(LossFactors, machine.get("loss_factor", {}), "system.loss_factor"),
         "campbell": read(Campbell, machine.get("campbell", {}), "system.campbell"),
         "support": read(GearHolding, own_support, "system.support", bearing=bearing, shaft=shaft),
+        "dampers": _read_dampers(machine.get("dampers", ())),
     }
     own = {key: value for key, value in machine.items() if key not in groups}
     options = read(LineOptions, own, "system", **groups)
     if options.backlash < 0.0:
         raise ConfigError(f"system.backlash_um = {options.backlash * 1e6:g} must not be negative")
     return options
+
+
+def _read_dampers(values: Any) -> tuple[TorsionalDamper, ...]:
+    """The list ``system.dampers``; their nodes are checked against the line's."""
+    if not isinstance(values, list | tuple):
+        raise ConfigError(f"system.dampers = {values!r} must be a list of dampers, [] for none")
+    found = []
+    for place, one in enumerate(values):
+        where = f"system.dampers[{place}]"
+        if not isinstance(one, Mapping):
+            raise ConfigError(f"{where} = {one!r} must be a group of keys")
+        try:
+            found.append(read(TorsionalDamper, one, "damper"))
+        except ConfigError as error:
+            raise ConfigError(f"{where}{str(error).removeprefix('damper')}") from None
+    return tuple(found)

@@ -8,6 +8,7 @@ from typing import Any
 
 import numpy as np
 
+from gensig.dynamics.dampers import with_dampers
 from gensig.dynamics.line_matrices import LineMatrices, line_matrices
 from gensig.dynamics.modal import Modes, natural_modes
 from gensig.dynamics.pair import Rotor
@@ -35,7 +36,8 @@ from gensig.systems.shaft_tables import read_gears, read_shafting, shipped_table
 class DriveLine:
     """A line with what its tables say beyond its matrices.
 
-    ``numbers`` (node,) as the table counts them; ``pairs`` (mesh,) the driving gear as pinion.
+    ``numbers`` (node,) as the table counts them, rings of dampers on from there; ``pairs`` (mesh,) the driving gear as
+    pinion.
     """
 
     name: str
@@ -100,6 +102,7 @@ def read_drive_line(config: Mapping[str, Any]) -> DriveLine:
     line = ShaftLine(nodes=nodes, shafts=tuple(shafts), gears=tuple(gears), meshes=tuple(meshes))
     check_gears_in_mesh(gear_rows, line)
     check_whole(list(node_rows.values()), numbers, line)
+    line, numbers = with_dampers(line, numbers, options.dampers)
     return DriveLine(
         name=options.name,
         line=line,

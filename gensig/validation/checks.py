@@ -9,6 +9,7 @@ from gensig.errors import ConfigError
 from gensig.validation.body_checks import BODY
 from gensig.validation.case import read_case
 from gensig.validation.dynamics_checks import DYNAMICS
+from gensig.validation.engine_damper_checks import DAMPERS, read_damper_case
 from gensig.validation.engine_response_checks import FORCED, read_forced_case
 from gensig.validation.fault_checks import FAULT
 from gensig.validation.geometry_checks import GEOMETRY
@@ -31,6 +32,7 @@ KINDS: tuple[tuple[dict[str, Any], Callable[[tuple[str, ...]], Any]], ...] = (
     (HOT, read_hot_case),
     (LINES, read_line_case),
     (FORCED, read_forced_case),
+    (DAMPERS, read_damper_case),
     (WEAR, read_wear_point),
 )
 

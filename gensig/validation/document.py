@@ -20,6 +20,7 @@ SOURCE_TITLES = {
     "wear_reference": "Reference numbers for the wear life",
     "wear_paper": "What the wear-life paper prints and claims",
     "engine_response": "What the same paper prints of the running engine",
+    "engine_dampers": "Tooth load, dampers, spectra and waterfalls of the same engine",
 }
 SOURCE_TEXTS = {
     "spur_reference": "Computed independently of this project (rack geometry, potential-energy method, 2-D finite "
@@ -71,6 +72,9 @@ SOURCE_TEXTS = {
     "engine_response": "1688 r/min, 12.68 kN m, linear: meshes never part. The paper prints no size, pressure, cam, "
     "pump or firing order; all are assumed (`excitation=engine_v20`, docs/theory/engine_excitation.md), none is tuned. "
     "Two firing orders: `least_couples` of the crank, the default, and `in_sequence`.",
+    "engine_dampers": "The same, with ISO's root stress of the pump gear under the greatest tooth force of a cycle, "
+    "and dampers on both gears of the pump drive, whose sizes the paper does not print (docs/theory/dampers.md). "
+    "Waterfalls are steady at every speed, by 10 r/min.",
 }
 TITLES = {
     "geometry": "Teeth and root transition curve",
@@ -180,6 +184,14 @@ TITLES = {
     "engine_alone": "Speed fluctuation by the cylinders alone",
     "ratios": "Pump end against flywheel",
     "spectrum": "Orders of the largest lines",
+    "root_stress": "Root stress under the dynamic tooth load, ISO's load point",
+    "root_stress_over_mesh": "The same over the mesh, largest of all teeth",
+    "stress_drop": "Root stress less by dampers",
+    "safety_paper": "Safety under the dynamic tooth load, the paper's convention",
+    "safety_iso": "Safety under the dynamic tooth load, ISO 6336-3",
+    "half_orders": "Largest half order over the largest whole order",
+    "disturbance_5_hz": "Disturbance of the dynamometer over order 1",
+    "waterfall": "Frequency at which an order is largest over the run: 1, 5 and 10 for modes 1, 2 and 3",
     "tooth_force": "Forces of the pump drive's teeth",
     "cycle": "The assumed cycle",
 }

@@ -28,6 +28,7 @@ SOURCES = (
     "engine_reference",
     "engine_paper",
     "engine_response",
+    "engine_dampers",
     "wear_reference",
     "wear_paper",
 )
