@@ -24,7 +24,8 @@ from gensig.mesh.pair_table import check_teeth
 from gensig.records import signal_shapes
 from gensig.rows import MISSING, Stream, read_seed, record_system, replace_key, stream, whole_number
 from gensig.systems.pair_machine import PairMachine, severity
-from gensig.systems.registry import read_system
+from gensig.systems.machines import read_machine
+from gensig.systems.registry import LINE
 from gensig.systems.shaft_sensors import SWITCHES
 from gensig.units import from_si, split_unit, to_si
 
@@ -71,7 +72,7 @@ def make_plan(config: Mapping[str, Any]) -> Plan:
     """
     seed, names = read_seed(config), list(config["plan"]["classes"])
     counts = read_counts(config)
-    read_system(config).check()
+    read_machine(config).check()
     if "wear" in config:  # configurations of earlier data sets have none
         read_wear_options(config["wear"])
     conditions = _draw(config, config["plan"]["vary"], counts.condition_points, stream(seed, Stream.CONDITION), "plan")
@@ -258,7 +259,7 @@ def record_bytes(config: Mapping[str, Any], *, as_stored: bool = False) -> int:
 
     Shards are cut by the latter, so that how samples are stored does not change a plan.
     """
-    bulk = {name: shape for name, shape in signal_shapes(config, read_system(config)).items() if SIGNALS[name].is_bulk}
+    bulk = {name: shape for name, shape in signal_shapes(config, read_machine(config)).items() if SIGNALS[name].is_bulk}
     counts = as_stored and config["dataset"]["sample_type"] == "int16"
     return sum(
         math.prod(shape) * (2 if counts and name in SCALES else SIGNALS[name].n_bytes) for name, shape in bulk.items()
@@ -337,16 +338,26 @@ def _draw_faults(
     return faults
 
 
+def _gear_sizes(config: Mapping[str, Any], gear: str) -> tuple[int, dict[str, float]]:
+    """Teeth of a gear, and the sizes in mm that a fault may be a share of."""
+    if config["system"]["kind"] == LINE:  # whose gears stand in a table
+        own = getattr(read_machine(config).pair, gear)
+        sizes = {"normal_module": own.normal_module, "face_width": own.face_width}
+        return own.n_teeth, {name: from_si("size_mm", value) for name, value in sizes.items()}
+    values = config["gear"][gear]
+    sizes = {"normal_module": config["gear"]["normal_module_mm"], "face_width": values["face_width_mm"]}
+    return values["n_teeth"], sizes
+
+
 def _for_gear(config: Mapping[str, Any], gear: str, key: str, spec: Any) -> Any:
     """A distribution for the faulted gear: ``distribution: tooth`` over its teeth, ``of`` as shares of a size of it."""
     if not isinstance(spec, Mapping):
         return spec
-    own = config["gear"][gear]
-    if spec.get("distribution") == "tooth":
-        return {**spec, "distribution": "integers", "low": 0, "high": own["n_teeth"] - 1}
-    if "of" not in spec:
+    if spec.get("distribution") != "tooth" and "of" not in spec:
         return spec
-    sizes = {"normal_module": config["gear"]["normal_module_mm"], "face_width": own["face_width_mm"]}
+    n_teeth, sizes = _gear_sizes(config, gear)
+    if spec.get("distribution") == "tooth":
+        return {**spec, "distribution": "integers", "low": 0, "high": n_teeth - 1}
     unit = split_unit(key)[1]
     if spec["of"] not in sizes or unit not in ("mm", "um"):
         raise ConfigError(

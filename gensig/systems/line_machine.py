@@ -45,11 +45,15 @@ class Governor:
 
 @dataclass(frozen=True, slots=True, kw_only=True, eq=False)
 class OwnMesh:
-    """A spur mesh by its own teeth: table, errors of the teeth (tooth,) m, and teeth that enter at the start."""
+    """A spur mesh by its own teeth: table, errors of the teeth (tooth,) m, and teeth that enter at the start.
+
+    ``start_phase`` in pitches must agree with where the crank stands; None follows from it.
+    """
 
     table: PairTable
     errors: tuple[Array, Array] | None = None
     start_teeth: tuple[int, int] = (0, 0)
+    start_phase: float | None = None
 
 
 @dataclass(frozen=True, slots=True, kw_only=True, eq=False)
@@ -216,7 +220,7 @@ def _mesh(
             damping=damping,
             errors=own.errors,
             start_teeth=own.start_teeth,
-            start_phase=phase,
+            start_phase=phase if own.start_phase is None else own.start_phase,
         )
     return phase_mesh(
         name,

@@ -75,6 +75,7 @@ class LineOptions:
     gears_csv: str | None
     lateral: bool
     viscous_damper_node: int | None
+    record_mesh: tuple[int, ...] | None = None
     backlash: float = unit("um")
     loss_factor: LossFactors
     support: GearHolding

@@ -35,7 +35,8 @@ from gensig.systems.shaft_tables import read_gears, read_shafting, shipped_table
 class DriveLine:
     """A line with what its tables say beyond its matrices.
 
-    ``numbers`` (node,) as the table counts them; ``pairs`` (mesh,) the driving gear as pinion.
+    ``numbers`` (node,) as the table counts them; ``pairs`` (mesh,) the driving gear as pinion; ``record_mesh`` the
+    numbers of the nodes whose mesh records are made of.
     """
 
     name: str
@@ -44,6 +45,7 @@ class DriveLine:
     pairs: tuple[GearPair, ...]
     lateral: bool
     campbell: Campbell
+    record_mesh: tuple[int, ...] | None = None
 
     def matrices(self, *, merge_rigid: bool = False) -> LineMatrices:
         """Mass, damping and stiffness, the meshes apart; merged for integration, as the table has them for modes."""
@@ -107,6 +109,7 @@ def read_drive_line(config: Mapping[str, Any]) -> DriveLine:
         pairs=tuple(pairs),
         lateral=options.lateral,
         campbell=options.campbell,
+        record_mesh=options.record_mesh,
     )
 
 
