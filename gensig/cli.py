@@ -80,6 +80,9 @@ def _forced_response(parser: argparse.ArgumentParser) -> None:
         "--run-torque", type=float, default=0.0, metavar="NM", help="brake torque of the run (default: 0)"
     )
     parser.add_argument(
+        "--time", type=float, metavar="S", help="also integrate so many seconds with teeth that part and rattle"
+    )
+    parser.add_argument(
         "--json",
         metavar="FILE",
         help="write speed_fluctuation_rpm, angle_deg by orders, tooth forces, and the run",

@@ -21,6 +21,7 @@ from gensig.dynamics.line_mesh import LineMesh, pair_mesh, phase_mesh
 from gensig.dynamics.modal import with_viscous_losses
 from gensig.dynamics.newmark import LineMotion, LineSolver, integrate_line, static_start
 from gensig.errors import ConfigError
+from gensig.geometry.contact import GearPair
 from gensig.mesh.pair_table import PairTable
 from gensig.systems.engine_line import EngineLine
 from gensig.systems.mesh_phase import start_rolls
@@ -32,6 +33,7 @@ LEAST_APPROACH = 2e-6  # m, at which a mesh that carries next to nothing is take
 TABLE_STEP = 100.0 * math.pi / 30.0  # rad/s of the crank between torques that a run-up goes over
 TABLE_SHARE = 0.1  # of the largest torque between them
 MOST_TABLES = 24
+LEAD_SAMPLES = 256  # before time 0: more than the low-pass looks back
 ROUNDED = 1e-12  # of the largest torque, below which a course of it over the cycle is constant
 
 
@@ -122,9 +124,6 @@ class RunningLine:
         )
 
 
-LEAD_SAMPLES = 256  # before time 0: more than the low-pass looks back
-
-
 def running_line(
     machine: EngineLine,
     course: EngineCourse,
@@ -168,6 +167,11 @@ def mesh_forces(machine: EngineLine, speed: float, torque: float) -> Array:
     closed, elements = machine.linear()
     response = steady_response(closed, machine.on_line(machine.torques(speed, torque)), speed, n_orders=1)
     return response.element_forces(elements)[0]
+
+
+def named_by_side(pair: GearPair) -> GearPair:
+    """The pair with its gears named as faults and tables name them; in a line they have names of their own."""
+    return replace(pair, pinion=replace(pair.pinion, name="pinion"), wheel=replace(pair.wheel, name="wheel"))
 
 
 def reference_force(machine: EngineLine, place: int, force: float) -> float:

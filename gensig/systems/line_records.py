@@ -36,6 +36,7 @@ from gensig.systems.line_machine import (
     OwnMesh,
     RunningLine,
     mesh_forces,
+    named_by_side,
     reference_force,
     running_line,
     steady_course,
@@ -251,11 +252,8 @@ def read_line_machine(config: Mapping[str, Any]) -> LineMachine:
         still = Support(stiffness_x=0.0, stiffness_y=0.0, damping_x=0.0, damping_y=0.0)
         inertia = drive.line.nodes[gear.node].inertia
         bodies.append(Body(mass=gear.mass or 0.0, inertia=inertia, support=gear.support or still))
-    named = replace(
-        pair, pinion=replace(pair.pinion, name="pinion"), wheel=replace(pair.wheel, name="wheel")
-    )  # as faults and tables name the sides
     machine = LineMachine(
-        pair=named,
+        pair=named_by_side(pair),
         material=read_material(config),
         mesh=read_mesh_options(section(config, "mesh")),
         pinion=bodies[0],
