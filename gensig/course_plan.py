@@ -10,8 +10,8 @@ from gensig.courses import RandomWalk
 from gensig.dataset.distributions import check_distribution
 from gensig.errors import ConfigError
 from gensig.faults.registry import fault_parts
-from gensig.systems.operation import QUANTITIES, RIPPLES, FileCourse, read_course, read_ripple, read_schedule
 from gensig.systems.machines import read_machine
+from gensig.systems.operation import QUANTITIES, RIPPLES, FileCourse, read_course, read_ripple, read_schedule
 from gensig.units import to_si
 
 SEED_KEY, DURATION_KEY, SPEED_KEY = "operating.course_seed", "operating.duration_s", "operating.speed_rpm"

@@ -32,8 +32,8 @@ from gensig.execution.base import Executor, ShardFailure
 from gensig.planning import check_switches, make_plan
 from gensig.records import signal_shapes, simulate_records
 from gensig.rows import read_seed
-from gensig.systems.pair_machine import PairMachine
 from gensig.systems.machines import read_machine
+from gensig.systems.pair_machine import PairMachine
 from gensig.units import channel_unit, from_si
 from gensig.version import __version__
 

@@ -23,8 +23,8 @@ from gensig.life.options import read_wear_options
 from gensig.mesh.pair_table import check_teeth
 from gensig.records import signal_shapes
 from gensig.rows import MISSING, Stream, read_seed, record_system, replace_key, stream, whole_number
-from gensig.systems.pair_machine import PairMachine, severity
 from gensig.systems.machines import read_machine
+from gensig.systems.pair_machine import PairMachine, severity
 from gensig.systems.registry import LINE
 from gensig.systems.shaft_sensors import SWITCHES
 from gensig.units import from_si, split_unit, to_si

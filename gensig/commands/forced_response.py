@@ -33,7 +33,7 @@ LONGEST_TIME = 60.0  # s
 class Found:
     """What the verb writes: the operating point, the steady vibration, the nodes looked at, and the run of speeds.
 
-    ``seen`` is half the peak to peak of the speed that each toothed wheel shows, rad/s; ``in_time`` is where teeth part.
+    ``seen`` is half the peak to peak of the speed that each toothed wheel shows, rad/s; ``in_time`` lets teeth part.
     """
 
     torques: EngineTorques
@@ -205,9 +205,7 @@ def _print_time(content: dict[str, Any]) -> None:
     for node, whole, cycle in shown:
         print(f"  node {node:>3} +- {whole:.2f} r/min, +- {cycle:.2f} of the mean cycle")
     keys = ("least_tooth_force_n", "greatest_tooth_force_n", "contact_loss_fraction", "back_contact_fraction")
-    for name, low, high, apart, back in zip(
-        content["meshes"], *(content[f"time_{key}"] for key in keys), strict=True
-    ):
+    for name, low, high, apart, back in zip(content["meshes"], *(content[f"time_{key}"] for key in keys), strict=True):
         print(f"  mesh {name:>6} {low:9.0f} .. {high:.0f} N, apart {apart:.1%}, on the back flanks {back:.1%}")
 
 

@@ -273,8 +273,8 @@ def _torques(
         rise = float(rotation @ matrices.mass @ rotation) / crank * np.gradient(course.speed / crank, course.time)
         throws = machine.engine.throw_nodes
         for node in throws:
-            dof = int(np.argmax(matrices.expand[machine.drive.numbers.index(node)]))
-            found.append(ShaftTorque(dof=dof, table=np.array([1.0 / len(throws)]), factor=rise))
+            throw = int(np.argmax(matrices.expand[machine.drive.numbers.index(node)]))
+            found.append(ShaftTorque(dof=throw, table=np.array([1.0 / len(throws)]), factor=rise))
     return tuple(found)
 
 

@@ -79,6 +79,11 @@ class LineMachine(PairMachine):
         return (*(f"{side}_rotation" for side in SIDES), *lateral, *(f"{name}{SPEED}" for name in self.engine.wheels))
 
     @property
+    def most_pairs(self) -> int:
+        """Nothing: the loads of teeth are not told."""
+        raise ConfigError("dataset.store_mesh_state: a drive line does not tell the loads of its teeth; take false")
+
+    @property
     def mesh_force(self) -> float:
         """Mean normal force of the mesh at the set-point, N, or what closes it by 2 um."""
         speed = self.operating.speed / self.ratio
@@ -118,8 +123,6 @@ class LineMachine(PairMachine):
 
     def simulate_alone(self, run: Run) -> CleanRecord | SimulationError | None:
         """One record; nothing of a drive line is simulated side by side."""
-        if run.tell_mesh:
-            raise ConfigError("dataset.store_mesh_state: a drive line does not tell the loads of its teeth; take false")
         try:
             return self._record(run)
         except SimulationError as error:
@@ -223,7 +226,7 @@ class LineMachine(PairMachine):
     def _seen(self, run: Run, line: RunningLine, motion: LineMotion, name: str, kind: tuple[str, int]) -> Array:
         """Deviation from the nominal speed that a toothed wheel shows, (sample,) rad/s."""
         place, wheel = self._wheel(name)
-        disc = run.discs[place] if run.discs else Disc(index=0.0, places=wheel.spacing * np.arange(wheel.n_teeth))
+        disc = run.discs[place] if run.discs else Disc(index=0.0, places=wheel.spacing * np.arange(float(wheel.n_teeth)))
         ratio = self.engine.ratios[wheel.node]
         angle = ratio * (line.turned + motion.nominal_angle) + motion.signals[kind]
         return instantaneous_speed(wheel, disc, angle, self.sensing.sampling_rate) - ratio * motion.nominal_speed
