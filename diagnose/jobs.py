@@ -66,26 +66,28 @@ def run_jobs(
     jobs: Sequence[Job],
     *,
     n_workers: int,
-    on_done: Callable[[list[Outcome]], None],
-) -> list[Outcome]:
-    """Run all jobs and collect their predictions in the order of the jobs.
+    on_done: Callable[[list[Any]], None],
+    run: Callable[[Task, TrainSettings, Job], list[Any]] | None = None,
+) -> list[Any]:
+    """Run all jobs, each by `run_job` or ``run``, and collect what they give in the order of the jobs.
 
     Raises
     ------
     GensigError    as raised by a job, or if a worker was killed
     """
+    run = run or run_job
     if n_workers == 1 or len(jobs) == 1:
         results = []
         with _one_thread():
             for job in jobs:
-                results.append(run_job(task, settings, job))
+                results.append(run(task, settings, job))
                 on_done(results[-1])
         _loaded.clear()
         _domains.clear()
         _shams.clear()
         return [prediction for result in results for prediction in result]
     context = multiprocessing.get_context("spawn")
-    executor = ProcessPoolExecutor(min(n_workers, len(jobs)), context, _start_worker, (task, settings))
+    executor = ProcessPoolExecutor(min(n_workers, len(jobs)), context, _start_worker, (task, settings, run))
     try:
         futures = [executor.submit(_run_in_worker, job) for job in jobs]
         for future in as_completed(futures):
@@ -272,16 +274,16 @@ def _domain(protocol: str, train: WindowSet, validation: WindowSet) -> Domain:
     return _domains[protocol]
 
 
-def _start_worker(task: Task, settings: TrainSettings) -> None:
+def _start_worker(task: Task, settings: TrainSettings, run: Callable[..., list[Any]]) -> None:
     from threadpoolctl import threadpool_limits
 
     torch.set_num_threads(1)
     threadpool_limits(1)
-    _work.update(task=task, settings=settings)
+    _work.update(task=task, settings=settings, run=run)
 
 
-def _run_in_worker(job: Job) -> list[Outcome]:
-    return run_job(_work["task"], _work["settings"], job)
+def _run_in_worker(job: Job) -> list[Any]:
+    return [*_work["run"](_work["task"], _work["settings"], job)]
 
 
 @contextmanager

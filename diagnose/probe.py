@@ -19,7 +19,11 @@ if TYPE_CHECKING:
 FloatArray = NDArray[np.floating]
 METADATA, RESULTS = "metadata_probe", "result_probe"
 # Never probed, and why. By the role that the schema gives a column ...
-LABELS = {"label": "it is the class", "fault": "it describes the fault"}
+LABELS = {
+    "label": "it is the class",
+    "fault": "it describes the fault",
+    "age": "it says how far the damage of a life may have come",
+}
 FAULT_PARAMETERS = "params/fault."
 # ... and by name.
 EXCLUDED = {

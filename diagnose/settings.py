@@ -12,8 +12,27 @@ from gensig.errors import ConfigError
 BASELINES = ("indicators", "indicators_without_level", "rms_threshold", "nearest_spectrum", "minirocket")
 DEVICES = ("auto", "cpu", "cuda")
 HEADS = ("severity", "gear")
+TASKS = ("classes", "remaining_life")
 BOTH = "both"  # of normalise: without the level, and beside it a second training with it
 LEAST_ROCKET_FEATURES = 84  # one for each of the kernels
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class LifeSettings:
+    """What ``task=remaining_life`` is told beside; each key is explained in ``configs/train.yaml``."""
+
+    early_life_h: float | None
+    early_life_share: float
+    coverage: float
+    with_age: bool
+
+    def __post_init__(self) -> None:
+        if self.early_life_h is not None:
+            _check_between("remaining_life.early_life_h", self.early_life_h, most=float("inf"))
+        _check_between("remaining_life.early_life_share", self.early_life_share, most=1)
+        _check_between("remaining_life.coverage", self.coverage, most=1)
+        if not isinstance(self.with_age, bool):
+            raise ConfigError(f"remaining_life.with_age must be true or false, not {self.with_age!r}")
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -22,6 +41,7 @@ class TrainSettings:
 
     data: str
     out: str
+    task: str
     model: Mapping[str, Any]
     protocols: tuple[str, ...] | None
     classes: tuple[str, ...] | None
@@ -51,16 +71,12 @@ class TrainSettings:
     n_threads: int | None
     device: str
     tensorboard: bool
+    remaining_life: LifeSettings
 
     def __post_init__(self) -> None:
-        for name in (
-            "window_samples",
-            "stride_samples",
-            "epochs",
-            "patience",
-            "n_seeds_control",
-            "n_bootstrap",
-        ):
+        if self.task not in TASKS:
+            raise ConfigError(f"task must be one of {', '.join(TASKS)}, not {self.task!r}")
+        for name in ("window_samples", "stride_samples", "epochs", "patience", "n_seeds_control", "n_bootstrap"):
             _check_whole(name, getattr(self, name), least=1)
         _check_whole("batch_size", self.batch_size, least=2)
         _check_whole("minirocket_features", self.minirocket_features, least=LEAST_ROCKET_FEATURES)
@@ -116,8 +132,16 @@ def settings_from(config: Mapping[str, Any]) -> TrainSettings:
         raise ConfigError("seeds must be a list of different values, at least one")
     values["baselines"] = () if values["baselines"] is False else _as_tuple("baselines", values["baselines"]) or ()
     values["heads"] = () if values["heads"] is False else _as_tuple("heads", values["heads"]) or ()
+    values["remaining_life"] = _life_settings(values["remaining_life"])
     values["data"], values["out"] = str(values["data"]), str(values["out"])
     return TrainSettings(**values)
+
+
+def _life_settings(value: Any) -> LifeSettings:
+    known = [field.name for field in dataclasses.fields(LifeSettings)]
+    if not isinstance(value, Mapping) or set(value) != set(known):
+        raise ConfigError(f"remaining_life must hold {', '.join(known)} and nothing else")
+    return LifeSettings(**{str(key): given for key, given in value.items()})
 
 
 def _as_tuple(name: str, value: Any) -> tuple[Any, ...] | None:
@@ -142,3 +166,9 @@ def _check_rate(name: str, value: Any) -> None:
 def _check_number(name: str, value: Any) -> None:
     if isinstance(value, bool) or not isinstance(value, int | float) or not 0 <= value <= 1:
         raise ConfigError(f"{name} must be a number from 0 to 1, not {value!r}")
+
+
+def _check_between(name: str, value: Any, *, most: float) -> None:
+    """Refuse what is not above 0 and below `most`; for 1 that is a share."""
+    if isinstance(value, bool) or not isinstance(value, int | float) or not 0 < value < most:
+        raise ConfigError(f"{name} must be a number above 0{' and below 1' if most == 1 else ''}, not {value!r}")

@@ -100,6 +100,7 @@ def task_from(dataset: Any, settings: TrainSettings) -> Task:
         normalise="rms" if settings.normalise == BOTH else settings.normalise,
         classes=settings.classes,
         channels=settings.channels,
+        one_class=settings.task == "remaining_life",
     )
     crossed = channels_to_cross(dataset.channel_names, settings.channels, settings.test_channels)
     return replace(task, cross_channels=crossed)
@@ -137,7 +138,7 @@ def run_study(
         else:
             on_done(", ".join(dict.fromkeys(one.method for one in predictions)))
 
-    n_workers = settings.n_threads or _n_cores()
+    n_workers = settings.n_threads or n_cores()
     outcomes = run_jobs(task, settings, jobs, n_workers=n_workers, on_done=report)
     predictions = [outcome for outcome in outcomes if isinstance(outcome, Prediction)]
     novelty = [outcome for outcome in outcomes if isinstance(outcome, NoveltyRun)]
@@ -179,7 +180,7 @@ def run_study(
         "novelty": novelty_results,
         "protocols_left_out": choose_protocols(task, settings.protocols)[1],
         "duration_s": round(time.perf_counter() - started, 1),
-        "environment": _environment(),
+        "environment": environment(),
     }
 
 
@@ -281,14 +282,15 @@ def _calibration(task: Task, network: Sequence[Prediction]) -> dict[str, Any]:
     return calibration_scores(*(list(column) for column in zip(*runs, strict=True)))
 
 
-def _n_cores() -> int:
+def n_cores() -> int:
     """Cores this process may use."""
     if sys.platform == "linux":
         return len(os.sched_getaffinity(0))
     return os.cpu_count() or 1
 
 
-def _environment() -> dict[str, str]:
+def environment() -> dict[str, str]:
+    """Versions that a result depends on, and when it was made."""
     import sklearn
     import torch
 

@@ -82,7 +82,7 @@ def train_network(
         model = build_model(model_config, n_channels=len(scale), n_classes=n_classes, input_scale=scale)
         model.to(device)  # the weights were drawn on the processor: the same ones on every device
         optimizer = torch.optim.AdamW(model.parameters(), lr=settings.learning_rate, weight_decay=settings.weight_decay)
-        n_drawn = _windows_an_epoch(train, settings.epoch_fraction)
+        n_drawn = windows_an_epoch(train, settings.epoch_fraction)
         n_batches = max(n_drawn // settings.batch_size, 1)
         schedule = torch.optim.lr_scheduler.OneCycleLR(
             optimizer, max_lr=settings.learning_rate, total_steps=settings.epochs * n_batches, pct_start=0.15
@@ -222,7 +222,7 @@ def input_scale(windows: WindowSet) -> list[float]:
     return [float(value) for value in np.where(power > 0, np.sqrt(power), 1.0)]
 
 
-def _windows_an_epoch(windows: WindowSet, fraction: float) -> int:
+def windows_an_epoch(windows: WindowSet, fraction: float) -> int:
     """Windows that hold the given share of the signal, at most as many as are planned."""
     length = sum(signal.shape[-1] for signal in windows.signals)
     return max(min(round(fraction * length / windows.window_samples), len(windows)), 1)

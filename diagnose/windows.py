@@ -33,6 +33,7 @@ class Task:
     channel_names : in the order of the network's input
     window_samples, stride_samples : length of a window and step from one to the next, in samples
     normalise : ``"rms"`` divides each channel of each window by its RMS, ``"none"`` keeps m/s^2
+    one_class : whether one class will do, for what is no classification
     cross_channels : channels that `CROSS_SENSOR` trains and tests on, or in one line why there are none
     """
 
@@ -42,6 +43,7 @@ class Task:
     window_samples: int
     stride_samples: int
     normalise: str
+    one_class: bool = False
     cross_channels: tuple[tuple[str, ...], tuple[str, ...]] | str = "no channels to test on are named"
 
     def __post_init__(self) -> None:
@@ -50,7 +52,7 @@ class Task:
         check_names("normalisation", (self.normalise,), NORMALISATIONS)
         if self.window_samples < 1 or self.stride_samples < 1:
             raise ConfigError("window_samples and stride_samples must be at least 1")
-        if len(self.class_names) < 2:
+        if len(self.class_names) < 2 and not self.one_class:
             raise ConfigError(f"one class only ({', '.join(self.class_names)}): nothing to tell apart")
 
     @property
@@ -98,6 +100,7 @@ def task_of(
     normalise: str,
     classes: Sequence[str] | None = None,
     channels: Sequence[str] | None = None,
+    one_class: bool = False,
 ) -> Task:
     """Task over the named classes and channels, all of the data set's where None."""
     return Task(
@@ -107,6 +110,7 @@ def task_of(
         window_samples=window_samples,
         stride_samples=stride_samples,
         normalise=normalise,
+        one_class=one_class,
     )
 
 

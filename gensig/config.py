@@ -107,7 +107,7 @@ def _with_whole_parts(fault: dict[str, Any], config_dir: str | Path | None) -> d
 
 
 SECTIONS = (
-    "system", "gear", "material", "strength", "modification", "heat", "fault", "operating", "sensing", "plan",
+    "system", "gear", "material", "strength", "modification", "heat", "fault", "operating", "sensing", "plan", "life",
     "executor", "mesh", "wear", "solver", "quality", "dataset",
 )  # fmt: skip
 OPTIONAL_SECTIONS = ("excitation",)

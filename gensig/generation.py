@@ -29,6 +29,7 @@ from gensig.dynamics._vector import n_lanes
 from gensig.dynamics.decimation import usable_band
 from gensig.errors import ConfigError, DatasetError
 from gensig.execution.base import Executor, ShardFailure
+from gensig.life.life_options import runs_to_failure
 from gensig.planning import check_switches, make_plan
 from gensig.records import signal_shapes, simulate_records
 from gensig.rows import read_seed
@@ -246,6 +247,7 @@ def open_shard(path: Path, config: Mapping[str, Any], n_records: int, params: Se
         attributes=root_attributes(config, system),
         compression=config["dataset"]["compression"],
         sample_type=config["dataset"]["sample_type"],
+        lives=runs_to_failure(config),
     )
 
 

@@ -13,24 +13,25 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from gensig.dataset.distributions import GRID, LEVELS, design_points, level_values, n_levels, values_at
+from gensig.dataset.distributions import GRID, LEVELS, n_levels
 from gensig.dataset.plan import Plan, record_ids, shard_places
 from gensig.dataset.schema import SCALES, SIGNALS
+from gensig.draws import draw_faults, draw_values, fault_sizes, fault_specs
 from gensig.errors import ConfigError
 from gensig.faults.base import faulty_teeth
-from gensig.faults.registry import COMPOUND, fault_parts, read_faults
+from gensig.faults.registry import fault_parts, read_faults
+from gensig.life.life_options import runs_to_failure
 from gensig.life.options import read_wear_options
+from gensig.lives import snapshots
 from gensig.mesh.pair_table import check_teeth
 from gensig.records import signal_shapes
 from gensig.rows import MISSING, Stream, read_seed, record_system, replace_key, stream, whole_number
 from gensig.systems.machines import read_machine
 from gensig.systems.pair_machine import PairMachine, severity
-from gensig.systems.registry import LINE
 from gensig.systems.shaft_sensors import SWITCHES
-from gensig.units import from_si, split_unit, to_si
+from gensig.units import from_si
 
 SHARD_BYTES = 65_536_000  # 80 records of 4 x 51,200 float32 samples
-SCALED = ("low", "high", "mean", "std", "values")  # of a distribution that is a share of a size
 MOST_IN_GRID = 1_000_000  # records; a product of levels is soon larger than meant
 KEYS = (
     "n_records", "n_units", "n_gearboxes", "conditions_per_unit", "n_repeats", "classes", "design", "vary", "sham",
@@ -70,14 +71,18 @@ def make_plan(config: Mapping[str, Any]) -> Plan:
     ------
     ConfigError    for counts, keys or distributions that cannot be used
     """
+    _check_plan(config)
+    if "wear" in config:  # configurations of earlier data sets have none
+        read_wear_options(config["wear"])
+    if runs_to_failure(config):
+        return _plan_of_lives(config)
     seed, names = read_seed(config), list(config["plan"]["classes"])
     counts = read_counts(config)
     read_machine(config).check()
-    if "wear" in config:  # configurations of earlier data sets have none
-        read_wear_options(config["wear"])
-    conditions = _draw(config, config["plan"]["vary"], counts.condition_points, stream(seed, Stream.CONDITION), "plan")
+    vary, points = config["plan"]["vary"], counts.condition_points
+    conditions = draw_values(config, vary, points, stream(seed, Stream.CONDITION), "plan")
     faults = {
-        name: _draw_faults(config, fault, counts.fault_points, stream(seed, Stream.FAULT, index))
+        name: draw_faults(config, fault, counts.fault_points, stream(seed, Stream.FAULT, index))
         for index, (name, fault) in enumerate(config["classes"].items())
     }
     sound = next((name for name in names if not fault_parts(config["classes"][name])), None)
@@ -111,6 +116,43 @@ def make_plan(config: Mapping[str, Any]) -> Plan:
     return _as_plan(config, rows)
 
 
+def _plan_of_lives(config: Mapping[str, Any]) -> Plan:
+    """One row a snapshot, life by life; every unit has gears of its own, as they fail only once."""
+    seed, names = read_seed(config), list(config["plan"]["classes"])
+    machine = read_machine(config)
+    machine.check()
+    machine.pair.require_continuous_drive()
+    n_gearboxes = read_gearboxes(config, whole_number("plan.n_units", config["plan"]["n_units"], at_least=1))
+    machines: dict[tuple[tuple[str, float], ...], PairMachine] = {}
+    rows: list[dict[str, Any]] = []
+    for look in snapshots(config):
+        drawn = tuple(look.values.items())
+        if drawn not in machines:
+            machines[drawn] = record_system(config, look.values)
+        start = stream(seed, Stream.START, len(rows))
+        rows.append(
+            {
+                "label": look.label,
+                "label_name": names[look.label],
+                "unit_id": f"unit-{look.unit:04d}",
+                "gearbox_id": f"gearbox-{look.unit % n_gearboxes:04d}",
+                "specimen_id": f"specimen-{look.unit:04d}",
+                "condition_id": f"condition-{look.condition:06d}",
+                "repeat": 0,
+                **_row(config, machines[drawn], look.fault, look.values, start, is_checked=look.is_last),
+                **look.columns,
+            }
+        )
+    return _as_plan(config, rows)
+
+
+def read_gearboxes(config: Mapping[str, Any], n_units: int) -> int:
+    """Number of gearboxes, at most one a unit; about the square root of the units where it is not given."""
+    given = config["plan"]["n_gearboxes"]
+    asked = round(math.sqrt(n_units)) if given is None else given
+    return min(n_units, whole_number("plan.n_gearboxes", asked, at_least=1))
+
+
 def read_counts(config: Mapping[str, Any]) -> Counts:
     """Check and work out every count of the plan; a grid's from its levels.
 
@@ -119,19 +161,10 @@ def read_counts(config: Mapping[str, Any]) -> Counts:
     ConfigError    for counts that cannot be used or do not agree
     """
     plan = config["plan"]
-    if odd := sorted(set(plan).symmetric_difference(KEYS)):
-        raise ConfigError(
-            f"plan: {'unknown' if odd[0] in plan else 'missing'} key '{odd[0]}'; it has {', '.join(KEYS)}"
-        )
     n_classes = len(plan["classes"])
     n_units = whole_number("plan.n_units", plan["n_units"], at_least=1)
-    asked = round(math.sqrt(n_units)) if plan["n_gearboxes"] is None else plan["n_gearboxes"]
-    n_gearboxes = min(n_units, whole_number("plan.n_gearboxes", asked, at_least=1))
+    n_gearboxes = read_gearboxes(config, n_units)
     n_repeats = whole_number("plan.n_repeats", plan["n_repeats"], at_least=1)
-    if not isinstance(plan["sham"], bool):
-        raise ConfigError(f"plan.sham = {plan['sham']!r} must be true or false")
-    for key in plan["vary"]:
-        replace_key(copy.deepcopy(dict(config)), key, 0.0)
     per_unit, n_faults = plan["conditions_per_unit"], 1
     if plan["design"] == GRID:
         if per_unit is not None:
@@ -159,6 +192,19 @@ def read_counts(config: Mapping[str, Any]) -> Counts:
     )
 
 
+def _check_plan(config: Mapping[str, Any]) -> None:
+    """Refuse keys that plans of any kind do not have."""
+    plan = config["plan"]
+    if odd := sorted(set(plan).symmetric_difference(KEYS)):
+        raise ConfigError(
+            f"plan: {'unknown' if odd[0] in plan else 'missing'} key '{odd[0]}'; it has {', '.join(KEYS)}"
+        )
+    if not isinstance(plan["sham"], bool):
+        raise ConfigError(f"plan.sham = {plan['sham']!r} must be true or false")
+    for key in plan["vary"]:
+        replace_key(copy.deepcopy(dict(config)), key, 0.0)
+
+
 def _grid_size(config: Mapping[str, Any]) -> tuple[int, int]:
     """Points of the grid over the conditions, and the least number that the grids of all faults divide."""
     vary = config["plan"]["vary"]
@@ -178,7 +224,7 @@ def _n_points(where: str, vary: Mapping[str, Any]) -> int:
 
 def _fault_varies(config: Mapping[str, Any]) -> dict[str, dict[str, Any]]:
     """Distributions of the keys of each class."""
-    return {name: _fault_specs(config, fault)[0] for name, fault in config["classes"].items()}
+    return {name: fault_specs(config, fault)[0] for name, fault in config["classes"].items()}
 
 
 def describe_design(config: Mapping[str, Any]) -> str:
@@ -213,10 +259,13 @@ def _row(
     fault: dict[str, Any],
     values: dict[str, float],
     start: np.random.Generator,
+    *,
+    is_checked: bool = True,
 ) -> dict[str, Any]:
-    """Columns of one record that follow from its drawn values."""
+    """Columns of one record that follow from its drawn values; the teeth of one with larger faults need no check."""
     applied = read_faults(fault)
-    check_teeth(system.pair, system.material, system.mesh, faulty_teeth(system.pair, applied))
+    if is_checked:
+        check_teeth(system.pair, system.material, system.mesh, faulty_teeth(system.pair, applied))
     parts = fault_parts(fault)
     return {
         "faults_json": json.dumps(parts, separators=(",", ":")),
@@ -230,7 +279,7 @@ def _row(
         "torque_nm": system.operating.torque,
         "snr_db": MISSING if system.sensing.snr is None else system.sensing.snr,
         **{f"params/{key}": float(value) for key, value in values.items()},
-        **{f"params/fault.{key}": value for key, value in _sizes(fault).items()},
+        **{f"params/fault.{key}": value for key, value in fault_sizes(fault).items()},
     }
 
 
@@ -272,103 +321,3 @@ def check_switches(config: Mapping[str, Any]) -> None:
     for key in (*(f"store_{switch}" for switch in switches), *SWITCHES):
         if not isinstance(config["dataset"][key], bool):
             raise ConfigError(f"dataset.{key} = {config['dataset'][key]!r} must be true or false")
-
-
-def _draw(
-    config: Mapping[str, Any], vary: Mapping[str, Any], points: NDArray[np.int64], rng: np.random.Generator, where: str
-) -> dict[str, list[Any]]:
-    """Values of every varied key, (condition,) each.
-
-    In a grid a key with levels has that of the condition's point, the first key slowest. All others are drawn together
-    from one space-filling design.
-    """
-    design = config["plan"]["design"]
-    names = {key: f"{where}.vary.{key}" for key in vary}
-    crossed = [key for key in vary if design == GRID and n_levels(names[key], vary[key]) is not None]
-    drawn = [key for key in vary if key not in crossed]
-    unit = design_points(design, len(points), len(drawn), rng)
-    values = {key: values_at(names[key], vary[key], unit[:, k]) for k, key in enumerate(drawn)}
-    step = 1
-    for key in reversed(crossed):
-        levels = level_values(names[key], vary[key])
-        values[key] = [levels[point // step % len(levels)] for point in points.tolist()]
-        step *= len(levels)
-    return {key: values[key] for key in vary}
-
-
-def _sizes(fault: Mapping[str, Any]) -> dict[str, float]:
-    """The numbers of a fault by key; those of a compound one carry the place of their part."""
-    if "parts" in fault:
-        numbered = enumerate(fault["parts"])
-        return {f"parts.{place}.{key}": value for place, part in numbered for key, value in _sizes(part).items()}
-    numbers = {key: value for key, value in fault.items() if isinstance(value, int | float) and key != "tooth"}
-    return {key: float(value) for key, value in numbers.items()}
-
-
-def _fault_specs(
-    config: Mapping[str, Any], fault: Mapping[str, Any]
-) -> tuple[dict[str, Any], dict[str, tuple[int, str]]]:
-    """Distributions of a fault by name, and the part and key that each is of."""
-    read_faults(fault)
-    specs: dict[str, Any] = {}
-    places: dict[str, tuple[int, str]] = {}
-    for place, part in enumerate(fault_parts(fault)):
-        for key, spec in (part.get("vary") or {}).items():
-            if key not in part or key == "vary":
-                raise ConfigError(f"fault.vary: '{key}' is no key of fault={part['kind']}")
-            name = f"parts.{place}.{key}" if fault["kind"] == COMPOUND else key
-            specs[name], places[name] = _for_gear(config, part["gear"], key, spec), (place, key)
-    return specs, places
-
-
-def _draw_faults(
-    config: Mapping[str, Any], fault: Mapping[str, Any], points: NDArray[np.int64], rng: np.random.Generator
-) -> list[dict[str, Any]]:
-    """One complete fault a condition, its severity distribution drawn; one design for all parts of a compound fault."""
-    specs, places = _fault_specs(config, fault)
-    parts = [{key: value for key, value in part.items() if key != "vary"} for part in fault_parts(fault)]
-    drawn = _draw(config, specs, points, rng, "fault")
-    faults: list[dict[str, Any]] = []
-    for condition in range(len(points)):
-        own = [dict(plain) for plain in parts]
-        for name, values in drawn.items():
-            place, key = places[name]
-            own[place][key] = values[condition]
-        faults.append({"kind": fault["kind"], "parts": own} if fault["kind"] == COMPOUND else (own or [dict(fault)])[0])
-    return faults
-
-
-def _gear_sizes(config: Mapping[str, Any], gear: str) -> tuple[int, dict[str, float]]:
-    """Teeth of a gear, and the sizes in mm that a fault may be a share of."""
-    if config["system"]["kind"] == LINE:  # whose gears stand in a table
-        own = getattr(read_machine(config).pair, gear)
-        sizes = {"normal_module": own.normal_module, "face_width": own.face_width}
-        return own.n_teeth, {name: from_si("size_mm", value) for name, value in sizes.items()}
-    values = config["gear"][gear]
-    sizes = {"normal_module": config["gear"]["normal_module_mm"], "face_width": values["face_width_mm"]}
-    return values["n_teeth"], sizes
-
-
-def _for_gear(config: Mapping[str, Any], gear: str, key: str, spec: Any) -> Any:
-    """A distribution for the faulted gear: ``distribution: tooth`` over its teeth, ``of`` as shares of a size of it."""
-    if not isinstance(spec, Mapping):
-        return spec
-    if spec.get("distribution") != "tooth" and "of" not in spec:
-        return spec
-    n_teeth, sizes = _gear_sizes(config, gear)
-    if spec.get("distribution") == "tooth":
-        return {**spec, "distribution": "integers", "low": 0, "high": n_teeth - 1}
-    unit = split_unit(key)[1]
-    if spec["of"] not in sizes or unit not in ("mm", "um"):
-        raise ConfigError(
-            f"fault.vary.{key}: of = {spec['of']!r}; a length may be drawn as a share of {', '.join(sizes)}"
-        )
-    size = from_si(key, to_si("size_mm", sizes[spec["of"]]))
-
-    def scaled(value: Any) -> Any:
-        return [scaled(one) for one in value] if isinstance(value, list) else value * size
-
-    try:
-        return {name: scaled(value) if name in SCALED else value for name, value in spec.items() if name != "of"}
-    except TypeError:
-        raise ConfigError(f"fault.vary.{key}: {', '.join(SCALED)} must be numbers, or lists of them") from None

@@ -33,6 +33,7 @@ FIXED_KEYS = (
     "strength.",
     "heat.",
     "wear.",
+    "life.",
     "mesh.n_slices",
     "mesh.coupling_modules",
     "sensing.sampling_rate_hz",
@@ -69,7 +70,9 @@ class Stream(IntEnum):
     DROPPED = 15
     TACHO = 16
     HEALTHY_TWIN = 17
-    TOOTHED_WHEEL = 18
+    LIFE = 18
+    LIFE_HISTORY = 19
+    TOOTHED_WHEEL = 20
 
 
 def stream(seed: int, cause: Stream, index: int = 0) -> np.random.Generator:

@@ -19,6 +19,7 @@ from gensig.errors import ConfigError
 
 # suffix: (factor to SI, what it measures); longer suffixes first, so that kg_m2 is not read as m2
 UNITS: dict[str, tuple[float, str]] = {
+    "mpa_sqrt_m": (1e6, "stress intensity"),
     "kg_m2": (1.0, "moment of inertia"),
     "w_per_m2k": (1.0, "heat transfer coefficient"),
     "w_per_mk": (1.0, "thermal conductivity"),
@@ -41,6 +42,7 @@ UNITS: dict[str, tuple[float, str]] = {
     "n": (1.0, "force"),
     "kg": (1.0, "mass"),
     "s": (1.0, "time"),
+    "h": (3600.0, "time"),
     "hz": (1.0, "frequency"),
     "gpa": (1e9, "stress"),
     "mpa": (1e6, "stress"),

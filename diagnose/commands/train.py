@@ -5,14 +5,18 @@ from __future__ import annotations
 import sys
 from collections.abc import Sequence
 from pathlib import Path
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
 from diagnose.commands.parser import refuse_existing, verb_parser
 from gensig.errors import ConfigError
 
+if TYPE_CHECKING:
+    from diagnose.settings import TrainSettings
+
 HELP = """\
 Train a network and its baselines on splits of a data set and write a report. Default protocols: by_unit,
-cross_specimen and the leaky one, as far as the data set has them.
+cross_specimen and the leaky one, as far as the data set has them. task=remaining_life says how long each machine still
+runs, on data sets that run to failure.
 
   data=DIR    data set made by gensig generate
   out=DIR     folder to write; must not exist or be empty. Receives report.html, metrics.json, figures, models/
@@ -24,6 +28,7 @@ examples:
   diagnose train data=runs/quickstart out=runs/report protocols=[by_unit] seeds=[0,1,2,3,4] epochs=30
   diagnose train data=runs/quickstart out=runs/cross protocols=[cross_speed,cross_torque,unseen_severity_outer]
   diagnose train data=runs/quickstart out=runs/novelty protocols=[healthy_only,open_set,cross_sensor]
+  diagnose train data=runs/lives out=runs/remaining task=remaining_life normalise=none
   diagnose train -m data=runs/quickstart out=runs/levels normalise=rms,none"""
 
 
@@ -67,6 +72,9 @@ def _train_one(config: dict[str, Any]) -> None:
     settings = settings_from(config)
     out = Path(settings.out)
     refuse_existing(out)
+    if settings.task == "remaining_life":
+        _train_life(settings, out)
+        return
     from diagnose.novelty_report import novelty_tables
     from diagnose.progress import progress
     from diagnose.protocols import choose_protocols
@@ -84,4 +92,28 @@ def _train_one(config: dict[str, Any]) -> None:
         metrics = run_study(task, settings, out, protocols=protocols, jobs=jobs, on_done=on_done)
     page = write_report(out, metrics)
     print("\n".join([*result_table(metrics), *novelty_tables(metrics["novelty"])]))
+    print(f"report: {page}")
+
+
+def _train_life(settings: TrainSettings, out: Path) -> None:
+    from diagnose.life_report import life_tables, write_life_report
+    from diagnose.life_study import check_life_settings, plan_life_study, run_life_study
+    from diagnose.lives import lives_of
+    from diagnose.progress import progress
+    from diagnose.study import settings_for, task_from
+    from gensig.dataset.reader import open_dataset
+
+    check_life_settings(settings)
+    task = task_from(open_dataset(settings.data), settings)
+    settings = settings_for(task.dataset, settings)
+    protocols, left_out, jobs = plan_life_study(task, settings)
+    for name, reason in left_out.items():
+        print(f"protocol {name} is left out: {reason}", file=sys.stderr, flush=True)
+    out.mkdir(parents=True, exist_ok=True)
+    with progress(len(jobs)) as on_done:
+        metrics, predictions = run_life_study(
+            task, settings, out, protocols=protocols, left_out=left_out, jobs=jobs, on_done=on_done
+        )
+    page = write_life_report(out, metrics, lives_of(task), predictions)
+    print("\n".join(life_tables(metrics)))
     print(f"report: {page}")

@@ -10,7 +10,7 @@ from gensig.errors import DatasetError
 
 SCHEMA_VERSION = 1
 
-ROLES = ("id", "label", "fault", "unit", "condition", "result", "noise")
+ROLES = ("id", "label", "fault", "unit", "condition", "result", "noise", "age")
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -131,7 +131,22 @@ COLUMNS: dict[str, Column] = _table(
         "noise",
         "share of the samples that were lost and filled in all channels; 0 where none can be, NaN in a failed record",
     ),
+    ("life_id", "str64", "", "unit", "the life that the record is a snapshot of, one a unit (run to failure only)"),
+    ("life_time_h", "float64", "h", "age", "clock time since the machine was new, standstills included (likewise)"),
+    ("life_cycles", "float64", "1", "age", "turns of the driving shaft since the machine was new (likewise)"),
+    (
+        "remaining_life_h",
+        "float64",
+        "h",
+        "label",
+        "clock time until the end of the life, a lower bound where life_failed is 0 (likewise)",
+    ),
+    ("life_failed", "int8", "1", "label", "1: the life ends in failure; 0: it is censored at the horizon (likewise)"),
+    ("life_growing", "int8", "1", "fault", "1 where the damage grows at this record's load, 0 where not (likewise)"),
 )
+
+# Columns that only the snapshots of lives have.
+LIFE_COLUMNS = ("life_id", "life_time_h", "life_cycles", "remaining_life_h", "life_failed", "life_growing")
 
 SIGNALS: dict[str, Column] = {
     column.name: column

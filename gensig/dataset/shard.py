@@ -18,6 +18,7 @@ from gensig.dataset.quantization import quantized
 from gensig.dataset.schema import (
     COLUMNS,
     DEFAULTS,
+    LIFE_COLUMNS,
     PARAMS,
     REQUIRED_ATTRIBUTES,
     SAMPLE_TYPES,
@@ -44,6 +45,7 @@ class ShardWriter:
     attributes : dict    root attributes; `sampling_rate_hz`, `channel_names` and `class_names` are required
     compression : str    one of `COMPRESSIONS`, for the time signals
     sample_type : str    'float32', or 'int16': accelerations become counts, and the writer adds their scales
+    lives : bool         whether records are snapshots of lives, with `LIFE_COLUMNS`
 
     Attributes
     ----------
@@ -67,6 +69,7 @@ class ShardWriter:
         attributes: Mapping[str, Attribute],
         compression: str = "none",
         sample_type: str = "float32",
+        lives: bool = False,
     ) -> None:
         self.path = Path(path)
         self.n_records = n_records
@@ -75,7 +78,7 @@ class ShardWriter:
         self.compression = compression
         self.sample_type = sample_type
         self.scales = {name: SCALES[name] for name in signals if name in SCALES and sample_type == "int16"}
-        self.columns = dict(COLUMNS)
+        self.columns = {name: column for name, column in COLUMNS.items() if lives or name not in LIFE_COLUMNS}
         for name in params:
             full_name = f"{PARAMS}/{name}"
             self.columns[full_name] = Column(

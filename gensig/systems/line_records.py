@@ -226,7 +226,9 @@ class LineMachine(PairMachine):
     def _seen(self, run: Run, line: RunningLine, motion: LineMotion, name: str, kind: tuple[str, int]) -> Array:
         """Deviation from the nominal speed that a toothed wheel shows, (sample,) rad/s."""
         place, wheel = self._wheel(name)
-        disc = run.discs[place] if run.discs else Disc(index=0.0, places=wheel.spacing * np.arange(float(wheel.n_teeth)))
+        disc = (
+            run.discs[place] if run.discs else Disc(index=0.0, places=wheel.spacing * np.arange(float(wheel.n_teeth)))
+        )
         ratio = self.engine.ratios[wheel.node]
         angle = ratio * (line.turned + motion.nominal_angle) + motion.signals[kind]
         return instantaneous_speed(wheel, disc, angle, self.sensing.sampling_rate) - ratio * motion.nominal_speed

@@ -17,6 +17,7 @@ from gensig.validation.helical_checks import SLICED, read_sliced_case
 from gensig.validation.line_checks import LINES, read_line_case
 from gensig.validation.mesh_checks import MESH
 from gensig.validation.rows import SOURCES, Result, Row, judge, read_rows
+from gensig.validation.run_up_checks import RUN_UP, read_run_up_case
 from gensig.validation.standard_checks import STANDARD
 from gensig.validation.strength_checks import STRENGTH, read_strength_case
 from gensig.validation.wear_checks import WEAR, read_wear_point
@@ -26,6 +27,7 @@ KINDS: tuple[tuple[dict[str, Any], Callable[[tuple[str, ...]], Any]], ...] = (
     ({**GEOMETRY, **BODY, **MESH, **FAULT, **STANDARD, **DYNAMICS}, read_case),
     (SLICED, read_sliced_case),
     (STRENGTH, read_strength_case),
+    (RUN_UP, read_run_up_case),
     (HOT, read_hot_case),
     (LINES, read_line_case),
     (FORCED, read_forced_case),

@@ -52,6 +52,7 @@ UNITS = {
     "h": 3600.0,
     "K": 1.0,
     "kW": 1e3,
+    "dB": 1.0,
     "MPa": 1e6,
     "1e9 N/m": 1e9,
     "N/(mm um)": 1e9,  # per face width

@@ -72,7 +72,7 @@ def test_a_record_depends_on_its_row_alone_and_a_sham_has_no_fault(folder):
         (["system.record_mesh=[3,4]"], "no such mesh"),
         (["sensing.channels=[pinion_x]"], "with system.lateral=true also pinion_x"),
         (["sensing.channels=[crank_speed]"], "allowed: pinion_rotation, wheel_rotation, flywheel_speed"),
-        (["sensing.path.kind=modal", "sensing.sensors=[a]"], "a transfer path takes bearing channels"),
+        (["sensing=housing"], "no channel pinion_x"),
         (["sensing.sensor.low_cutoff_hz=1"], "take sensing=shaft_line"),
         (["mesh.law=paper"], "the meshes of a drive line are one-sided"),
         (["solver.precision=float32"], "integrated in float64"),

@@ -1,0 +1,155 @@
+"""Pits that come and grow with the load cycles of a flank: Miner's sum on a pitting S-N line, then number and size."""
+
+from __future__ import annotations
+
+import math
+from dataclasses import dataclass
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from gensig.errors import ConfigError
+from gensig.faults.flank_loss import flank_area
+from gensig.faults.pitting import DistributedPitting
+from gensig.geometry.contact import GearPair
+from gensig.life.growth import GrowthLaw
+from gensig.life.spread import Spread
+from gensig.material import Material
+from gensig.units import unit
+
+Array = NDArray[np.float64]
+
+N_SIZES = 121
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class PitGrowthOptions:
+    """Pitting S-N line, what comes after its end, and how units differ.
+
+    ``cycles`` at the contact stress ``strength`` end a flank's life without pits; at another stress s they are
+    cycles (strength / s)^exponent. From there on ``pits_per_life`` pits a tooth come in as many cycles again, and their
+    median diameter grows as the damage to the power ``size_exponent``. ``end_share`` is the pitted share of the flank
+    at which the life ends.
+    """
+
+    cycles: float
+    strength: float = unit("mpa")
+    exponent: float
+    pits_per_life: float
+    size_exponent: float
+    end_share: float
+    rate_scatter: float
+    start_scatter: float
+
+    def __post_init__(self) -> None:
+        for key, high in (
+            ("cycles", 1e12), ("strength", 1e10), ("exponent", 40.0), ("pits_per_life", 1e4), ("end_share", 1.0),
+        ):  # fmt: skip
+            if not 0.0 < getattr(self, key) <= high:
+                raise ConfigError(f"life.pitting.{key} = {getattr(self, key):g} must lie above 0, to {high:g}")
+        if not 0.0 <= self.size_exponent <= 2.0:
+            raise ConfigError(f"life.pitting.size_exponent = {self.size_exponent:g} must lie in 0..2")
+
+    @property
+    def spread(self) -> Spread:
+        """How units differ; the start's is that of the first pits' size."""
+        return Spread(rate_scatter=self.rate_scatter, start_scatter=self.start_scatter)
+
+
+@dataclass(frozen=True, slots=True, kw_only=True, eq=False)
+class PitGrowth(GrowthLaw):
+    """The law of one gear's pits; its size is the damage, 1 where the first pits come. Made by ``pit_growth``.
+
+    Parameters
+    ----------
+    stress_at_one : float    contact stress in Pa at 1 N m; it goes with the root of the torque
+    first_diameter : float   median diameter of the first pits, m
+    spread_area : float      mean area of a pit over that of one of median diameter
+    area : float             of a flank, m2
+    """
+
+    options: PitGrowthOptions
+    sizes: Array
+    meshes: float
+    stress_at_one: float
+    first_diameter: float
+    spread_area: float
+    area: float
+
+    def rate(self, size: Array, torque: float) -> Array:
+        """Damage a turn of the pinion, (size,): Miner's sum (ISO 6336-6)."""
+        stress = self.stress_at_one * math.sqrt(torque)
+        lasting = self.options.cycles * (self.options.strength / stress) ** self.options.exponent
+        return np.full(np.shape(size), self.meshes / lasting)
+
+    def n_pits(self, size: float) -> float:
+        """Mean number of pits on a flank: as many in every further part of the life."""
+        return self.options.pits_per_life * max(size - 1.0, 0.0)
+
+    def diameter(self, size: float) -> float:
+        """Median diameter of the pits, m."""
+        return self.first_diameter * max(size, 1.0) ** self.options.size_exponent
+
+    def share(self, size: float) -> float:
+        """Pitted share of the flank, pits side by side."""
+        return self.n_pits(size) * 0.25 * math.pi * self.diameter(size) ** 2 * self.spread_area / self.area
+
+    def fault(self, size: float) -> dict[str, Any]:
+        """Pitted share and size of the pits."""
+        return {"pitted_share": round(self.share(size), 12), "pit_diameter_mm": round(self.diameter(size) * 1e3, 9)}
+
+    def told(self, size: float, torque: float) -> dict[str, float]:
+        """Damage and mean number of pits."""
+        return {"pitting_damage": size, "n_pits": self.n_pits(size)}
+
+
+def contact_stress(pair: GearPair, material: Material, torque: float) -> float:
+    """Nominal contact stress of a spur pair under a torque of the pinion in N m, Pa.
+
+    Hertz's largest pressure of the two flanks at the pitch point, the whole load on one pair (ISO 6336-2, sigma_H0).
+    """
+    radii = (pair.pinion_curvature(pair.pitch_point), pair.wheel_curvature(pair.pitch_point))
+    curvature = sum(1.0 / float(radius) for radius in radii)
+    reduced = material.youngs_modulus / (1.0 - material.poisson_ratio**2)
+    load = torque / pair.pinion.base_radius / pair.face_width
+    return math.sqrt(load * reduced * curvature / (2.0 * math.pi))
+
+
+def pit_growth(
+    pair: GearPair, material: Material, pits: DistributedPitting, options: PitGrowthOptions, first: float = 1.0
+) -> PitGrowth:
+    """The law of pits like ``pits``, whose diameter is that of the first ones, times ``first``.
+
+    Raises
+    ------
+    ConfigError    for helical gears, and an end that such pits do not reach
+    """
+    if pair.pinion.helix_angle != 0.0:
+        raise ConfigError("life: pit growth asks for spur gears: its contact stress is that of one spur pair")
+    gear = {"pinion": pair.pinion, "wheel": pair.wheel}[pits.gear]
+    law = PitGrowth(
+        options=options,
+        sizes=np.array([0.0, 1.0]),
+        meshes=1.0 if pits.gear == "pinion" else 1.0 / pair.ratio,
+        stress_at_one=contact_stress(pair, material, 1.0),
+        first_diameter=pits.pit_diameter * first,
+        spread_area=math.exp(2.0 * pits.diameter_scatter**2),
+        area=flank_area(gear),
+    )
+    if law.first_diameter <= 0.0 or not law.share(2.0) > 0.0:
+        raise ConfigError("life: pits without a diameter never reach life.pitting.end_share")
+    most = 0.7 * (pits.region_high - pits.region_low)
+    if options.end_share > most:
+        raise ConfigError(
+            f"life.pitting.end_share = {options.end_share:g} must be {most:.3g} or less, 0.7 of the region of the pits"
+        )
+    end = 2.0
+    while law.share(end) < options.end_share:
+        end *= 2.0
+    low = 1.0
+    for _ in range(60):
+        middle = 0.5 * (low + end)
+        low, end = (middle, end) if law.share(middle) < options.end_share else (low, middle)
+    sizes = np.concatenate([np.linspace(0.0, 1.0, 20, endpoint=False), np.linspace(1.0, end, N_SIZES - 20)])
+    return PitGrowth(**{name: getattr(law, name) for name in law.__dataclass_fields__ if name != "sizes"}, sizes=sizes)
