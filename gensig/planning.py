@@ -78,7 +78,9 @@ def make_plan(config: Mapping[str, Any]) -> Plan:
         return _plan_of_lives(config)
     seed, names = read_seed(config), list(config["plan"]["classes"])
     counts = read_counts(config)
-    read_machine(config).check()
+    machine = read_machine(config)
+    machine.check()
+    signal_shapes(config, machine)  # refuses what the machine does not tell
     vary, points = config["plan"]["vary"], counts.condition_points
     conditions = draw_values(config, vary, points, stream(seed, Stream.CONDITION), "plan")
     faults = {
