@@ -10,8 +10,8 @@ from gensig.courses import RandomWalk
 from gensig.dataset.distributions import check_distribution
 from gensig.errors import ConfigError
 from gensig.faults.registry import fault_parts
+from gensig.systems.machines import read_machine
 from gensig.systems.operation import QUANTITIES, RIPPLES, FileCourse, read_course, read_ripple, read_schedule
-from gensig.systems.registry import read_system
 from gensig.units import to_si
 
 SEED_KEY, DURATION_KEY, SPEED_KEY = "operating.course_seed", "operating.duration_s", "operating.speed_rpm"
@@ -46,7 +46,7 @@ def settle_courses(config: dict[str, Any], typed: Collection[str]) -> None:
     if DURATION_KEY in typed:
         raise ConfigError(f"{DURATION_KEY} and operating.turns are both given; leave one out")
     steady = {**operating, **dict.fromkeys((*QUANTITIES, *RIPPLES))}
-    system = read_system({**config, "operating": steady})
+    system = read_machine({**config, "operating": steady})
     least = least_speed(config, system.operating.speed)
     n_teeth = {"pinion": system.pair.pinion.n_teeth, "wheel": system.pair.wheel.n_teeth}
     gears = _faulted(config) & set(n_teeth) if schedule.turns_of == "faulted" else {schedule.turns_of}

@@ -11,6 +11,8 @@ from numpy.typing import NDArray
 from gensig.dataset.distributions import GRID, design_points, level_values, n_levels, values_at
 from gensig.errors import ConfigError
 from gensig.faults.registry import COMPOUND, fault_parts, read_faults
+from gensig.systems.machines import read_machine
+from gensig.systems.registry import LINE
 from gensig.units import from_si, split_unit, to_si
 
 SCALED = ("low", "high", "mean", "std", "values")  # of a distribution that is a share of a size
@@ -80,16 +82,26 @@ def draw_faults(
     return faults
 
 
+def _gear_sizes(config: Mapping[str, Any], gear: str) -> tuple[int, dict[str, float]]:
+    """Teeth of a gear, and the sizes in mm that a fault may be a share of."""
+    if config["system"]["kind"] == LINE:  # whose gears stand in a table
+        own = getattr(read_machine(config).pair, gear)
+        sizes = {"normal_module": own.normal_module, "face_width": own.face_width}
+        return own.n_teeth, {name: from_si("size_mm", value) for name, value in sizes.items()}
+    values = config["gear"][gear]
+    sizes = {"normal_module": config["gear"]["normal_module_mm"], "face_width": values["face_width_mm"]}
+    return values["n_teeth"], sizes
+
+
 def _for_gear(config: Mapping[str, Any], gear: str, key: str, spec: Any) -> Any:
     """A distribution for the faulted gear: ``distribution: tooth`` over its teeth, ``of`` as shares of a size of it."""
     if not isinstance(spec, Mapping):
         return spec
-    own = config["gear"][gear]
-    if spec.get("distribution") == "tooth":
-        return {**spec, "distribution": "integers", "low": 0, "high": own["n_teeth"] - 1}
-    if "of" not in spec:
+    if spec.get("distribution") != "tooth" and "of" not in spec:
         return spec
-    sizes = {"normal_module": config["gear"]["normal_module_mm"], "face_width": own["face_width_mm"]}
+    n_teeth, sizes = _gear_sizes(config, gear)
+    if spec.get("distribution") == "tooth":
+        return {**spec, "distribution": "integers", "low": 0, "high": n_teeth - 1}
     unit = split_unit(key)[1]
     if spec["of"] not in sizes or unit not in ("mm", "um"):
         raise ConfigError(

@@ -33,9 +33,9 @@ from gensig.life.life_options import runs_to_failure
 from gensig.planning import check_switches, make_plan
 from gensig.records import signal_shapes, simulate_records
 from gensig.rows import read_seed
+from gensig.systems.machines import read_machine
 from gensig.systems.pair_machine import PairMachine
-from gensig.systems.registry import read_system
-from gensig.units import from_si, is_turning
+from gensig.units import channel_unit, from_si
 from gensig.version import __version__
 
 
@@ -231,14 +231,14 @@ def _check_places(out: Path, rows: Sequence[Mapping[str, Any]], shard_index: int
 
 def block_length(config: Mapping[str, Any]) -> int:
     """Records that are simulated at a time: enough to fill the lanes with them and their twins, few enough to hold."""
-    system = read_system(config)
+    system = read_machine(config)
     n_bytes = 8 * len(system.sensing.channels) * round(system.operating.duration * system.sensing.sampling_rate)
     return max(n_lanes(system.solver.precision), min(MOST_BLOCK, BLOCK_BYTES // n_bytes))
 
 
 def open_shard(path: Path, config: Mapping[str, Any], n_records: int, params: Sequence[str]) -> ShardWriter:
     """Writer for records of one configuration."""
-    system = read_system(config)
+    system = read_machine(config)
     return ShardWriter(
         path,
         n_records=n_records,
@@ -264,14 +264,13 @@ def _shaft_sensors(config: Mapping[str, Any], system: PairMachine) -> dict[str, 
 def root_attributes(config: Mapping[str, Any], system: PairMachine) -> dict[str, Any]:
     """What is the same for every record of a data set."""
     pair = system.pair
-    rotation = [is_turning(name) for name in system.sensing.channel_names]
     return {
         "generator_version": __version__,
         "sampling_rate_hz": system.sensing.sampling_rate,
         "usable_band_hz": list(usable_band(system.sensing.sampling_rate)),
         "channel_names": list(system.sensing.channel_names),
         "source_names": list(system.sensing.channels),
-        "channel_units": ["rad/s^2" if turns else "m/s^2" for turns in rotation],
+        "channel_units": [channel_unit(name) for name in system.sensing.channel_names],
         **_shaft_sensors(config, system),
         "class_names": list(config["plan"]["classes"]),
         "n_teeth_pinion": pair.pinion.n_teeth,

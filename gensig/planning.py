@@ -26,8 +26,8 @@ from gensig.lives import snapshots
 from gensig.mesh.pair_table import check_teeth
 from gensig.records import signal_shapes
 from gensig.rows import MISSING, Stream, read_seed, record_system, replace_key, stream, whole_number
+from gensig.systems.machines import read_machine
 from gensig.systems.pair_machine import PairMachine, severity
-from gensig.systems.registry import read_system
 from gensig.systems.shaft_sensors import SWITCHES
 from gensig.units import from_si
 
@@ -78,7 +78,9 @@ def make_plan(config: Mapping[str, Any]) -> Plan:
         return _plan_of_lives(config)
     seed, names = read_seed(config), list(config["plan"]["classes"])
     counts = read_counts(config)
-    read_system(config).check()
+    machine = read_machine(config)
+    machine.check()
+    signal_shapes(config, machine)  # refuses what the machine does not tell
     vary, points = config["plan"]["vary"], counts.condition_points
     conditions = draw_values(config, vary, points, stream(seed, Stream.CONDITION), "plan")
     faults = {
@@ -119,7 +121,7 @@ def make_plan(config: Mapping[str, Any]) -> Plan:
 def _plan_of_lives(config: Mapping[str, Any]) -> Plan:
     """One row a snapshot, life by life; every unit has gears of its own, as they fail only once."""
     seed, names = read_seed(config), list(config["plan"]["classes"])
-    machine = read_system(config)
+    machine = read_machine(config)
     machine.check()
     machine.pair.require_continuous_drive()
     n_gearboxes = read_gearboxes(config, whole_number("plan.n_units", config["plan"]["n_units"], at_least=1))
@@ -308,7 +310,7 @@ def record_bytes(config: Mapping[str, Any], *, as_stored: bool = False) -> int:
 
     Shards are cut by the latter, so that how samples are stored does not change a plan.
     """
-    bulk = {name: shape for name, shape in signal_shapes(config, read_system(config)).items() if SIGNALS[name].is_bulk}
+    bulk = {name: shape for name, shape in signal_shapes(config, read_machine(config)).items() if SIGNALS[name].is_bulk}
     counts = as_stored and config["dataset"]["sample_type"] == "int16"
     return sum(
         math.prod(shape) * (2 if counts and name in SCALES else SIGNALS[name].n_bytes) for name, shape in bulk.items()

@@ -18,9 +18,9 @@ from gensig.faults.registry import read_faults
 from gensig.geometry.gear import Gear
 from gensig.sensing.instrument import Instrument, draw_instrument
 from gensig.sensing.manufacturing import Gearbox, Quality, Specimen, draw_gearbox, draw_specimen, with_damping_ratio
+from gensig.systems.machines import read_machine
 from gensig.systems.nuisances import with_nuisances
 from gensig.systems.pair_machine import CleanRecord, PairMachine, Run, Start
-from gensig.systems.registry import read_system
 from gensig.systems.shaft_sensors import shaft_signals
 
 Array = NDArray[np.float64]
@@ -72,6 +72,7 @@ class Stream(IntEnum):
     HEALTHY_TWIN = 17
     LIFE = 18
     LIFE_HISTORY = 19
+    TOOTHED_WHEEL = 20
 
 
 def stream(seed: int, cause: Stream, index: int = 0) -> np.random.Generator:
@@ -97,7 +98,7 @@ def record_system(config: Mapping[str, Any], values: Mapping[str, float]) -> Pai
     own = {name: copy.deepcopy(part) if name in varied else part for name, part in config.items()}
     for key, value in values.items():
         replace_key(own, key, value)
-    return read_system(own)
+    return read_machine(own)
 
 
 def row_clean(config: Mapping[str, Any], row: Mapping[str, Any], instrument: Instrument, acceleration: Array) -> Array:
@@ -168,7 +169,12 @@ def row_run(config: Mapping[str, Any], system: PairMachine, row: Mapping[str, An
         specimen=specimen,
         gearbox=gearbox,
         tell_mesh=config["dataset"]["store_mesh_state"],
+        discs=system.draw_discs(stream(read_seed(config), Stream.TOOTHED_WHEEL, _number(row, "gearbox_id"))),
     )
+
+
+def _number(row: Mapping[str, Any], name: str) -> int:
+    return int(str(row[name]).rpartition("-")[2])
 
 
 def _row_start(row: Mapping[str, Any]) -> Start:

@@ -52,6 +52,8 @@ UNITS: dict[str, tuple[float, str]] = {
 
 # how channels end whose acceleration is one of an angle
 TURNING = ("rotation", "tilt_x", "tilt_y")
+# how channels end that are the speed of a shaft, less its nominal one
+SPEED = "_speed"
 
 T = TypeVar("T")
 
@@ -80,6 +82,13 @@ def from_si(name: str, value: float) -> float:
 def is_turning(channel: str) -> bool:
     """Whether a channel's acceleration is that of an angle, in rad/s2."""
     return channel.endswith(TURNING)
+
+
+def channel_unit(channel: str) -> str:
+    """Unit of a channel by its name."""
+    if channel.endswith(SPEED):
+        return "rad/s"
+    return "rad/s^2" if is_turning(channel) else "m/s^2"
 
 
 def read(cls: type[T], values: Mapping[str, Any], where: str, **given: Any) -> T:

@@ -99,7 +99,7 @@ COLUMNS: dict[str, Column] = _table(
         "",
         "result",
         "'error': below its limit; 'levels': teeth bounce, third-octave levels agree within 0.5 dB and indicators "
-        "within 5 %; 'unresolved'; 'none': not looked for",
+        "within 5 %; 'unresolved'; 'none': not looked for; 'energy': a drive line's energy residual",
     ),
     (
         "contact_loss_fraction",

@@ -77,6 +77,7 @@ class LineOptions:
     lateral: bool
     viscous_damper_node: int | None
     dampers: tuple[TorsionalDamper, ...]
+    record_mesh: tuple[int, ...] | None = None
     backlash: float = unit("um")
     loss_factor: LossFactors
     support: GearHolding

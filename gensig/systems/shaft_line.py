@@ -37,7 +37,7 @@ class DriveLine:
     """A line with what its tables say beyond its matrices.
 
     ``numbers`` (node,) as the table counts them, rings of dampers on from there; ``pairs`` (mesh,) the driving gear as
-    pinion.
+    pinion; ``record_mesh`` the numbers of the nodes whose mesh records are made of.
     """
 
     name: str
@@ -46,6 +46,7 @@ class DriveLine:
     pairs: tuple[GearPair, ...]
     lateral: bool
     campbell: Campbell
+    record_mesh: tuple[int, ...] | None = None
 
     def matrices(self, *, merge_rigid: bool = False) -> LineMatrices:
         """Mass, damping and stiffness, the meshes apart; merged for integration, as the table has them for modes."""
@@ -110,6 +111,7 @@ def read_drive_line(config: Mapping[str, Any]) -> DriveLine:
         pairs=tuple(pairs),
         lateral=options.lateral,
         campbell=options.campbell,
+        record_mesh=options.record_mesh,
     )
 
 

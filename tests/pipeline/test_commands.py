@@ -7,7 +7,8 @@ import h5py
 import numpy as np
 import pytest
 
-from gensig.cli import VERBS, main
+from gensig.cli import main
+from gensig.commands.verbs import VERBS
 
 PAPER = ("mesh.law=paper", "mesh.pair_coupling=sum", "mesh.contact=linear")
 

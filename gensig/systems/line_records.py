@@ -1,0 +1,304 @@
+"""Records of an engine's drive line: one spur mesh of it by its own teeth, with the faults and units of every data set.
+
+The machine answers as a gear pair does: its ``pair`` is the driving and the driven gear of that mesh, ``operating`` its
+driving shaft. ``docs/theory/shaft_line_records.md``.
+"""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass, replace
+from functools import lru_cache
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from gensig.dynamics.integrator import Solver, check_memory
+from gensig.dynamics.newmark import LineMotion, LineSolver
+from gensig.dynamics.pair import Body, Support
+from gensig.errors import ConfigError, SimulationError
+from gensig.faults.base import Fault, faulty_teeth
+from gensig.geometry.contact import GearPair
+from gensig.material import Material
+from gensig.mesh.load_distribution import loaded_pair_table
+from gensig.mesh.options import MeshOptions, read_mesh_options
+from gensig.mesh.pair_table import PairTable
+from gensig.sensing.encoder import Disc
+from gensig.sensing.manufacturing import Quality, Specimen, perfect_specimen
+from gensig.sensing.reading import read_sensing
+from gensig.sensing.toothed_wheel import ToothedWheel, draw_wheel, instantaneous_speed
+from gensig.systems.engine_line import EngineLine, read_engine_line
+from gensig.systems.line_machine import (
+    EngineCourse,
+    Governor,
+    OwnMesh,
+    RunningLine,
+    mesh_forces,
+    named_by_side,
+    reference_force,
+    running_line,
+    steady_course,
+    with_supports,
+)
+from gensig.systems.mesh_phase import start_rolls
+from gensig.systems.operation import read_operating
+from gensig.systems.pair_machine import CleanRecord, PairMachine, Run, Start
+from gensig.systems.registry import read_heat, read_material, read_modification, section
+from gensig.systems.supports import in_gearbox
+from gensig.units import SPEED, read
+
+Array = NDArray[np.float64]
+
+SETTLING = 0.3  # s before a record, in which what the start from the linear vibration leaves dies away
+MOST_ENERGY_RESIDUAL = 1e-3
+KNOT = 5e-3  # s between the knots of a course that changes
+AFTER = 0.2  # s for which a course is told after a record: the low-pass looks ahead
+SIDES = ("pinion", "wheel")
+AXES = ("x", "y")
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class LineMachine(PairMachine):
+    """An engine on its drive line; ``place`` is the mesh of the line whose teeth are followed one by one."""
+
+    engine: EngineLine
+    place: int
+
+    @property
+    def ratio(self) -> float:
+        """Speed of the driving gear's shaft over the crank's."""
+        drive = self.engine.drive
+        return self.engine.ratios[drive.numbers[drive.line.gears[drive.line.meshes[self.place].driving].node]]
+
+    @property
+    def channels(self) -> tuple[str, ...]:
+        """What can be recorded: turning and, with lateral motion, bearing of both gears, and the toothed wheels."""
+        lateral = [f"{side}_{axis}" for side in SIDES for axis in AXES] if self.engine.drive.lateral else []
+        return (*(f"{side}_rotation" for side in SIDES), *lateral, *(f"{name}{SPEED}" for name in self.engine.wheels))
+
+    @property
+    def most_pairs(self) -> int:
+        """Nothing: the loads of teeth are not told."""
+        raise ConfigError("dataset.store_mesh_state: a drive line does not tell the loads of its teeth; take false")
+
+    @property
+    def mesh_force(self) -> float:
+        """Mean normal force of the mesh at the set-point, N, or what closes it by 2 um."""
+        speed = self.operating.speed / self.ratio
+        return reference_force(
+            self.engine, self.place, float(mesh_forces(self.engine, speed, self.operating.torque)[self.place])
+        )
+
+    def mesh_table(self, faults: Sequence[Fault] = ()) -> PairTable:
+        """Compliance and gap tables with the given faults."""
+        return _mesh_table(self.pair, self.material, self.mesh, tuple(faults), self.mesh_force)
+
+    def check(self) -> None:
+        """Raise for what would stop every record."""
+        self.require_drive()
+        sensing = self.sensing
+        if unknown := [name for name in sensing.channels if name not in self.channels]:
+            more = "" if self.engine.drive.lateral else "; with system.lateral=true also pinion_x and the like"
+            raise ConfigError(
+                f"sensing.channels: no channel {', '.join(unknown)}; allowed: {', '.join(self.channels)}{more}"
+            )
+        if sensing.path is not None or sensing.n_lead or sensing.nuisances:
+            raise ConfigError(
+                "sensing: records of a drive line have no transfer path, nuisances or sensor dynamics; take "
+                "sensing=shaft_line"
+            )
+        if self.mesh.law != "one_sided":
+            raise ConfigError(f"mesh.law = {self.mesh.law}: the meshes of a drive line are one-sided")
+        if self.solver.precision != "float64":
+            raise ConfigError(f"solver.precision = {self.solver.precision}: a drive line is integrated in float64")
+        self.quality.check_covered(self.pair.pinion, self.pair.wheel)
+        check_memory(self.operating.duration, sensing.sampling_rate, len(sensing.channels), self.solver.precision)
+        self.mesh_table()
+
+    def draw_discs(self, rng: np.random.Generator) -> tuple[Disc, ...]:
+        """The toothed wheels of one gearbox with their errors."""
+        return tuple(draw_wheel(rng, wheel) for wheel in self.engine.wheels.values())
+
+    def simulate_alone(self, run: Run) -> CleanRecord | SimulationError | None:
+        """One record; nothing of a drive line is simulated side by side."""
+        try:
+            return self._record(run)
+        except SimulationError as error:
+            return error
+
+    def _record(self, run: Run) -> CleanRecord:
+        sensing, rate = self.sensing, self.sensing.sampling_rate
+        line = self.line(run)
+        kinds = {name: self._channel(line, name) for name in sensing.channels}
+        drive = self.engine.drive
+        shaft = line.dof(drive.numbers[drive.line.gears[drive.line.meshes[self.place].driving].node])
+        motion = line.run(
+            LineSolver(
+                sampling_rate=rate,
+                oversampling=self.solver.oversampling,
+                max_energy_residual=MOST_ENERGY_RESIDUAL,
+            ),
+            duration=self.operating.duration,
+            channels=list(dict.fromkeys([*kinds.values(), ("angle", shaft)])),
+            settling=SETTLING,
+        )
+        angle = self.ratio * motion.nominal_angle + motion.signals["angle", shaft]
+        gain = np.ones(len(kinds)) if run.gearbox is None else run.gearbox.gain
+        rows = [
+            self._seen(run, line, motion, name, kind) if kind[0] == "angle" else own * motion.signals[kind]
+            for (name, kind), own in zip(kinds.items(), gain, strict=True)
+        ]
+        return CleanRecord(
+            acceleration=np.array(rows),
+            shaft_angle=angle,
+            mean_speed=float(angle[-1] - angle[0]) * rate / max(len(angle) - 1, 1),
+            contact_loss_fraction=float(motion.contact_loss[self.place]),
+            integration_error=motion.energy_residual,
+            integration_check="energy",
+        )
+
+    def line(self, run: Run) -> RunningLine:
+        """The line of one run, ready to be integrated."""
+        specimen = run.specimen or perfect_specimen(self.pair.pinion, self.pair.wheel)
+        start = run.start or Start(tooth_pinion=0, tooth_wheel=0, phase=0.0)
+        engine = self.engine
+        if run.gearbox is not None and engine.drive.lateral:
+            bodies = (self.pinion, slice(0, 2)), (self.wheel, slice(2, 4))
+            held = [in_gearbox(body, run.gearbox, axes, self.quality).support for body, axes in bodies]
+            engine = with_supports(engine, self.place, held)
+        own = OwnMesh(
+            table=self._line_table(run.faults, specimen),
+            errors=(specimen.pinion_error, specimen.wheel_error),
+            start_teeth=(start.tooth_pinion, start.tooth_wheel),
+            start_phase=start.phase,
+        )
+        frequency, ratio = self.operating.drive_frequency, self.operating.drive_damping_ratio
+        return running_line(
+            engine,
+            self._course(),
+            governor=Governor(frequency=frequency, damping_ratio=ratio),
+            own={self.place: own},
+            turned=self.crank_angle(start),
+        )
+
+    def crank_angle(self, start: Start) -> float:
+        """Where the crank stands in its cycle when given teeth of the mesh are at a phase, rad.
+
+        The driving gear's teeth are tied to the crank: the same tooth meets the same cylinder's firing in every record.
+        Where its shaft turns more than once a cycle, the driven gear's tooth chooses the turn.
+        """
+        pitches = start.tooth_pinion + start.phase - _phase_at_rest(self.engine, self.place)
+        turns = pitches / self.pair.pinion.n_teeth + start.tooth_wheel % max(1, round(2.0 * self.ratio))
+        return 2.0 * math.pi * turns / self.ratio % (4.0 * math.pi)
+
+    def _line_table(self, faults: Sequence[Fault], specimen: Specimen) -> PairTable:
+        table = self.mesh_table((*specimen.forms, *faults))
+        return replace(table, pair=replace(self.pair, backlash=self.pair.backlash * specimen.backlash_factor))
+
+    def _course(self) -> EngineCourse:
+        operating = self.operating
+        if operating.is_steady:
+            return steady_course(operating.speed / self.ratio, operating.torque)
+        time = np.arange(-2.0 * SETTLING, operating.duration + AFTER, KNOT)
+        nominal = operating.nominal(time)
+        return EngineCourse(
+            time=time, speed=nominal.speed / self.ratio, torque=operating.torque * nominal.torque_factor
+        )
+
+    def _channel(self, line: RunningLine, name: str) -> tuple[str, int]:
+        """What the integration gives for a channel: a kind and a degree of freedom."""
+        if name.endswith(SPEED):
+            return "angle", line.dof(self._wheel(name)[1].node)
+        side, _, what = name.rpartition("_")
+        drive = self.engine.drive
+        mesh = drive.line.meshes[self.place]
+        gear = mesh.driving if side == "pinion" else mesh.driven
+        if what in AXES:
+            return "acceleration", line.matrices.names.index(f"{drive.line.gears[gear].name} {what}")
+        return "acceleration", line.dof(drive.numbers[drive.line.gears[gear].node])
+
+    def _wheel(self, name: str) -> tuple[int, ToothedWheel]:
+        wanted = name.removesuffix(SPEED)
+        return next((k, wheel) for k, (own, wheel) in enumerate(self.engine.wheels.items()) if own == wanted)
+
+    def _seen(self, run: Run, line: RunningLine, motion: LineMotion, name: str, kind: tuple[str, int]) -> Array:
+        """Deviation from the nominal speed that a toothed wheel shows, (sample,) rad/s."""
+        place, wheel = self._wheel(name)
+        disc = (
+            run.discs[place] if run.discs else Disc(index=0.0, places=wheel.spacing * np.arange(float(wheel.n_teeth)))
+        )
+        ratio = self.engine.ratios[wheel.node]
+        angle = ratio * (line.turned + motion.nominal_angle) + motion.signals[kind]
+        return instantaneous_speed(wheel, disc, angle, self.sensing.sampling_rate) - ratio * motion.nominal_speed
+
+
+def read_line_machine(config: Mapping[str, Any]) -> LineMachine:
+    """The machine of a configuration whose system is a drive line.
+
+    Raises
+    ------
+    ConfigError    for keys or tables that make no engine, and for a mesh that records cannot be made of
+    """
+    engine = read_engine_line(config)
+    drive = engine.drive
+    place = _record_mesh(engine)
+    pair, mesh = drive.pairs[place], drive.line.meshes[place]
+    if read_heat(config).is_any or read_modification(config).is_any:
+        raise ConfigError("heat and modification are of a single helical pair; a drive line takes heat=none")
+    operating, quality = (
+        read_operating(section(config, "operating")),
+        read(Quality, section(config, "quality"), "quality"),
+    )
+    bodies = []
+    for place_of_gear in (mesh.driving, mesh.driven):
+        gear = drive.line.gears[place_of_gear]
+        still = Support(stiffness_x=0.0, stiffness_y=0.0, damping_x=0.0, damping_y=0.0)
+        inertia = drive.line.nodes[gear.node].inertia
+        bodies.append(Body(mass=gear.mass or 0.0, inertia=inertia, support=gear.support or still))
+    machine = LineMachine(
+        pair=named_by_side(pair),
+        material=read_material(config),
+        mesh=read_mesh_options(section(config, "mesh")),
+        pinion=bodies[0],
+        wheel=bodies[1],
+        operating=operating,
+        sensing=read_sensing(section(config, "sensing")),
+        quality=quality,
+        solver=read(Solver, section(config, "solver"), "solver"),
+        engine=engine,
+        place=place,
+    )
+    return replace(machine, operating=replace(operating, speed=operating.speed * machine.ratio))
+
+
+def _record_mesh(engine: EngineLine) -> int:
+    drive = engine.drive
+    spur = [name for name, pair in zip(engine.mesh_names, drive.pairs, strict=True) if not pair.pinion.helix_angle]
+    if drive.record_mesh is None:
+        raise ConfigError(
+            f"system.record_mesh = null: records follow the teeth of one spur mesh; give its two nodes, one of "
+            f"{', '.join(spur) or 'none: this line has no spur mesh'}"
+        )
+    wanted = "/".join(str(node) for node in drive.record_mesh)
+    if wanted not in engine.mesh_names:
+        raise ConfigError(f"system.record_mesh = {list(drive.record_mesh)}: no such mesh; there are {spur} (spur)")
+    if wanted not in spur:
+        raise ConfigError(
+            f"system.record_mesh = {list(drive.record_mesh)} is helical; records follow the teeth of spur meshes: "
+            f"{', '.join(spur)}"
+        )
+    return engine.mesh_names.index(wanted)
+
+
+@lru_cache(maxsize=32)
+def _mesh_table(
+    pair: GearPair, material: Material, mesh: MeshOptions, faults: tuple[Fault, ...], force: float
+) -> PairTable:
+    return loaded_pair_table(pair, material, mesh, faulty_teeth(pair, faults), force=force)
+
+
+def _phase_at_rest(engine: EngineLine, place: int) -> float:
+    """Pitches that the mesh has rolled from A where the crank is at the start of its cycle."""
+    return float(start_rolls(engine.drive)[place] / engine.drive.pairs[place].base_pitch)
