@@ -13,6 +13,7 @@ from gensig.dataset.plan import Plan
 from gensig.dataset.reader import open_dataset
 from gensig.dataset.schema import (
     COLUMNS,
+    LIFE_COLUMNS,
     REQUIRED,
     REQUIRED_ATTRIBUTES,
     SAMPLE_TYPES,
@@ -42,7 +43,8 @@ def test_attributes_keys_and_protocols_are_named(folder: Path) -> None:
 def test_shards_are_as_described(folder: Path) -> None:
     with h5py.File(folder / "shards" / "shard-00000.h5") as file:
         for name, column in COLUMNS.items():
-            assert file[name].dtype == column.storage_dtype
+            assert (name in file) == (name not in LIFE_COLUMNS)
+            assert name in LIFE_COLUMNS or file[name].dtype == column.storage_dtype
         for name in REQUIRED:
             assert file[name].shape[0] == 10
         assert h5py.check_string_dtype(file["record_id"].dtype).encoding == "ascii"
