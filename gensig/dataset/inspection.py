@@ -63,8 +63,9 @@ def _manifest_lines(folder: Path, manifest: Manifest) -> list[str]:
 def _dataset_lines(data: Dataset) -> list[str]:
     usable = data.usable
     duration = data.n_samples / data.sampling_rate
+    units = " and ".join(map(_show, dict.fromkeys(data.attributes.get("channel_units", ["m/s^2"]))))
     lines = [
-        f"  signal       acceleration ({len(data.channel_names)}, {data.n_samples}) float32, m/s^2, "
+        f"  signal       acceleration ({len(data.channel_names)}, {data.n_samples}) float32, {units}, "
         f"{data.sampling_rate:g} Hz, {duration:g} s",
         f"  stored as    {data.sample_type}{' with a scale' * (data.sample_type == 'int16')}, "
         f"compression {data.compression}",
