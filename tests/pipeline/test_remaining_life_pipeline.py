@@ -10,7 +10,8 @@ from diagnose.cli import main as diagnose
 def test_lives_are_made_and_learnt_whole(tmp_path, capsys):
     lives = make(
         tmp_path / "lives", "experiment=run_to_failure", "life=crack_growth", "plan.classes=[crack]",
-        "plan.n_records=null", "plan.n_units=16", "life.snapshot_count=5", "operating.duration_s=0.05", "dataset.records_per_shard=60",
+        "plan.n_records=null", "plan.n_units=16", "life.snapshot_count=5", "operating.duration_s=0.05",
+        "dataset.records_per_shard=60",
     )  # fmt: skip
     out = tmp_path / "report"
     words = ["task=remaining_life", f"data={lives}", f"out={out}", "protocols=[by_unit]", "model=cnn", "epochs=1"]
