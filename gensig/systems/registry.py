@@ -209,7 +209,7 @@ def section(config: Mapping[str, Any], *path: str) -> Mapping[str, Any]:
 
 
 def _read_gear(name: str, gear: Mapping[str, Any], helix_angle: float) -> Gear:
-    own = {key: value for key, value in section(gear, name).items() if key not in BODY_KEYS}
+    own = {key: value for key, value in section({"gear": gear}, "gear", name).items() if key not in BODY_KEYS}
     given = {} if "helix_angle_deg" in own else {"helix_angle": helix_angle}
     return read(Gear, {**{key: gear[key] for key in COMMON_GEAR_KEYS}, **own}, f"gear.{name}", name=name, **given)
 

@@ -106,7 +106,7 @@ def test_what_modify_flank_writes_other_commands_take(tmp_path, capsys, monkeypa
         (["modify-flank", *HELICAL, "--out", "best.txt"], "give a file NAME.yaml"),
         (["modify-flank", *HELICAL, "--out", "best.yaml", "--points", "0"], "--points 0"),
         (["modify-flank", *HELICAL, "--out", "best.yaml", "--torques", "-1"], "must be positive"),
-        (["generate", "system=helical_pair", "out=never"], "system=helical_pair has statics so far"),
+        (["generate", *HELICAL, "mesh.slices_in_phase=true", "out=never"], "slices_in_phase = true is for comparing"),
     ],
 )
 def test_mistakes_are_one_line(words, message, capsys, tmp_path, monkeypatch):
