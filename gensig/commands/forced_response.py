@@ -16,7 +16,7 @@ from gensig.config import read_request
 from gensig.dynamics.engine_torques import EngineTorques
 from gensig.dynamics.forced import SteadyResponse, Waterfall, disturbance_response, over_cycle, run_of_speeds
 from gensig.errors import ConfigError
-from gensig.mesh.options import read_mesh_options
+from gensig.mesh.options import read_mesh_options, read_slice_options
 from gensig.systems.engine_line import EngineLine, read_engine_line
 from gensig.systems.line_time import TimeResponse, own_meshes, time_response
 from gensig.systems.registry import read_material
@@ -115,7 +115,14 @@ def _in_time(line: EngineLine, config: Mapping[str, Any], found: Found, duration
     speed, torque = found.torques.speed, found.torques.brake_torque
     if line.engine.pressure_decides_torque:
         raise ConfigError("--time: excitation.pressure.file decides the torque; leave --time out")
-    own = own_meshes(line, read_material(config), read_mesh_options(config["mesh"]), speed, torque)
+    own = own_meshes(
+        line,
+        read_material(config),
+        read_mesh_options(config["mesh"]),
+        read_slice_options(config["mesh"]),
+        speed,
+        torque,
+    )
     return time_response(line, speed, torque, own=own, nodes=found.nodes, duration=duration)
 
 

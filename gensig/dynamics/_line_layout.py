@@ -12,10 +12,11 @@ from typing import Any, NamedTuple
 # whole numbers of a mesh; those called AT_ say where a flat array begins
 (
     ROLL_DOF, N_PAIRS, FIRST, NODES, AT_TABLE, AT_ROWS, AT_COAST_ROWS, TEETH_A, TEETH_B, AT_KIND_A, AT_KIND_B,
-    AT_ERROR_A, AT_ERROR_B, START_A, START_B, N_KINDS_B, N_PLACES,
-) = range(17)  # fmt: skip
-# what is gathered of a pair: stiffness, gap, and how fast both grow as the mesh rolls on
-STIFFNESS, GAP, STIFFNESS_SLOPE, GAP_SLOPE, N_GATHERED = range(5)
+    AT_ERROR_A, AT_ERROR_B, START_A, START_B, N_KINDS_B, N_SPRINGS, AT_DEPTH, N_PLACES,
+) = range(19)  # fmt: skip
+# what is gathered of a pair: gap and stiffness of each of its springs, each with how fast it grows as the mesh rolls on
+GAP, GAP_SLOPE, STIFFNESS = range(3)
+PER_SPRING = 2
 DRIVE, COAST, N_FLANKS = range(3)
 # what a mesh does at an instant; LOST is a power, ALONG the force on the roll coordinate, J per pitch
 FORCE, TANGENT, RATE_TANGENT, STORED, LOST, ALONG, N_LAW = range(7)
@@ -61,13 +62,15 @@ class Factor(NamedTuple):
 class Meshes(NamedTuple):
     """All meshes: ``number`` (mesh, N_NUMBERS), ``place`` (mesh, N_PLACES), and flat arrays for all of them.
 
-    ``table`` (node, 2) holds stiffness in N/m and gap in m, row after row; ``rows`` the row of every pair of kinds, -1
-    for a pair that never touches; ``kind`` and ``error`` one number a tooth.
+    ``table`` holds, node after node of row after row, the gap in m and the stiffness of every spring in N/m; ``depth``
+    where its springs begin beyond the gap, m; ``rows`` the row of every pair of kinds, -1 for a pair that never
+    touches; ``kind`` and ``error`` one number a tooth.
     """
 
     number: Any
     place: Any
     table: Any
+    depth: Any
     rows: Any
     kind: Any
     error: Any
@@ -134,4 +137,4 @@ class Work(NamedTuple):
     matrix: Any
     law: Any
     pairs: Any
-    gathered: Any
+    reach: Any

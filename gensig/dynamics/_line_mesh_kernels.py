@@ -21,11 +21,16 @@ ROUNDED = 1e-14  # of what forces take off an approach
 
 
 @compiled
-def gather(meshes, mesh, flank, turned, pairs):
-    """Stiffness and gap of the pairs of a flank and their slopes, where the mesh has rolled ``turned`` pitches.
+def gather(meshes, mesh, flank, turned, within, pairs):
+    """Gap and stiffnesses of the pairs of a flank and their slopes, where the mesh has rolled ``turned`` pitches.
 
-    ``pairs`` (mesh, flank, pair, N_GATHERED) takes them; pairs that do not exist get a stiffness of 0. The back flanks
-    meet along the mirrored roll, so their teeth count backwards.
+    ``pairs`` (mesh, flank, pair, what is gathered) takes them; pairs that do not exist stand infinitely far back. The
+    back flanks meet along the mirrored roll, so their teeth count backwards. Of several springs those are left out that
+    begin beyond ``within`` m and a depth more.
+
+    Returns
+    -------
+    up to where what was gathered is all that touches, m
     """
     place = meshes.place[mesh]
     first, n_nodes, n_pairs = place[layout.FIRST], place[layout.NODES], place[layout.N_PAIRS]
@@ -35,6 +40,10 @@ def gather(meshes, mesh, flank, turned, pairs):
         turned = meshes.number[mesh, layout.MIRROR] - turned
     newest = math.floor(turned) - first
     n_cells = n_pairs * n_nodes
+    n_springs, at_depth = place[layout.N_SPRINGS], place[layout.AT_DEPTH]
+    n_columns, reach = n_springs + 1, np.inf
+    if n_springs > 1:
+        reach = within + meshes.depth[at_depth + 1]
     for j in range(n_pairs):
         index = newest - j
         tooth_a = (place[layout.START_A] + sense * index) % place[layout.TEETH_A]
@@ -44,24 +53,32 @@ def gather(meshes, mesh, flank, turned, pairs):
         row = meshes.rows[at_rows + kind_a * place[layout.N_KINDS_B] + kind_b]
         here = pairs[mesh, flank, j]
         if row < 0:
-            here[layout.STIFFNESS] = 0.0
+            here[layout.GAP] = np.inf
             continue
         x = (turned - (index + first)) * n_nodes
         cell = min(max(int(x), 0), n_cells - 1)
-        at = place[layout.AT_TABLE] + row * (n_cells + 1) + cell
-        for column in range(2):
-            low, high = meshes.table[at, column], meshes.table[at + 1, column]
-            here[column] = low + (x - cell) * (high - low)
-            here[layout.STIFFNESS_SLOPE + column] = sense * n_nodes * (high - low)
+        at = place[layout.AT_TABLE] + (row * (n_cells + 1) + cell) * n_columns
+        low, high = meshes.table[at], meshes.table[at + n_columns]
+        here[layout.GAP] = low + (x - cell) * (high - low)
+        here[layout.GAP_SLOPE] = sense * n_nodes * (high - low)
         if flank == DRIVE:
             here[layout.GAP] += (
                 meshes.error[place[layout.AT_ERROR_A] + tooth_a] + meshes.error[place[layout.AT_ERROR_B] + tooth_b]
             )
+        for spring in range(n_springs):
+            if here[layout.GAP] + meshes.depth[at_depth + spring] > reach:
+                break
+            low, high = meshes.table[at + 1 + spring], meshes.table[at + n_columns + 1 + spring]
+            to = layout.STIFFNESS + layout.PER_SPRING * spring
+            here[to] = low + (x - cell) * (high - low)
+            here[to + 1] = sense * n_nodes * (high - low)
+    return reach
 
 
 @compiled
-def flank_law(pairs, damping, shared, within, rate, roll_rate):
-    """Law of the gathered pairs of a flank (pair, N_GATHERED), ``within`` m beyond where sound teeth touch.
+def flank_law(pairs, depth, damping, shared, within, rate, roll_rate):
+    """Law of the gathered pairs of a flank, ``within`` m beyond where sound teeth touch; their springs begin at
+    ``depth`` (spring,) m beyond the gap.
 
     Returns
     -------
@@ -69,13 +86,16 @@ def flank_law(pairs, damping, shared, within, rate, roll_rate):
     the roll
     """
     total, least = 0.0, 0.0
-    for _ in range(len(pairs) + 1):
+    for _ in range(len(pairs) * len(depth) + 1):
         stiffness, force = 0.0, 0.0
         for j in range(len(pairs)):
-            bite = within - pairs[j, layout.GAP]
-            if pairs[j, layout.STIFFNESS] > 0.0 and bite > least:
-                stiffness += pairs[j, layout.STIFFNESS]
-                force += pairs[j, layout.STIFFNESS] * bite
+            for spring in range(len(depth)):
+                bite = within - pairs[j, layout.GAP] - depth[spring]
+                if not bite > least:
+                    break
+                own = pairs[j, layout.STIFFNESS + layout.PER_SPRING * spring]
+                stiffness += own
+                force += own * bite
         total = force / (1.0 + shared * stiffness)
         # each pair that the shared deflection lifts off raises the total, and may so lift another
         if shared * total <= least:
@@ -87,9 +107,13 @@ def flank_law(pairs, damping, shared, within, rate, roll_rate):
     normal, tangent, rate_tangent, lost, along = 0.0, 0.0, 0.0, 0.0, 0.0
     stored = 0.5 * shared * total * total
     for j in range(len(pairs)):
-        own, bite = pairs[j, layout.STIFFNESS], within - pairs[j, layout.GAP] - shared * total
-        if own > 0.0 and bite > 0.0:
-            elastic, slope = own * bite, pairs[j, layout.GAP_SLOPE]
+        for spring in range(len(depth)):
+            bite = within - pairs[j, layout.GAP] - depth[spring] - shared * total
+            if not bite > 0.0:
+                break
+            at = layout.STIFFNESS + layout.PER_SPRING * spring
+            own, slope = pairs[j, at], pairs[j, layout.GAP_SLOPE]
+            elastic = own * bite
             speed = rate - slope * roll_rate
             grown = 1.0 + damping * speed
             pressed = 0.0
@@ -100,7 +124,7 @@ def flank_law(pairs, damping, shared, within, rate, roll_rate):
             normal += pressed
             stored += 0.5 * elastic * bite
             lost += (pressed - elastic) * speed
-            along += pressed * slope - 0.5 * bite * bite * pairs[j, layout.STIFFNESS_SLOPE]
+            along += pressed * slope - 0.5 * bite * bite * pairs[j, at + 1]
     return normal, tangent, rate_tangent, stored, lost, along
 
 
@@ -108,10 +132,12 @@ def flank_law(pairs, damping, shared, within, rate, roll_rate):
 def mesh_law(meshes, mesh, turned, roll_rate, approach, rate, law, work):
     """Law of one mesh on whichever flank it touches, into ``law`` (mesh, N_LAW).
 
-    ``work.gathered`` (mesh, flank) says which flanks ``work.pairs`` holds for this roll; the other is gathered when it
-    may touch.
+    ``work.reach`` (mesh, flank) says up to where ``work.pairs`` holds all that touches for this roll, -inf where it
+    holds nothing yet; what is missing is gathered when it may touch.
     """
-    number, found = meshes.number[mesh], law[mesh]
+    number, place, found = meshes.number[mesh], meshes.place[mesh], law[mesh]
+    n_pairs, at_depth = place[layout.N_PAIRS], place[layout.AT_DEPTH]
+    depth = meshes.depth[at_depth : at_depth + place[layout.N_SPRINGS]]
     found[:] = 0.0
     for flank in range(layout.N_FLANKS):
         within, least, sense = approach, number[layout.LEAST_GAP], 1.0
@@ -119,12 +145,11 @@ def mesh_law(meshes, mesh, turned, roll_rate, approach, rate, law, work):
             within, least, sense = -approach - number[layout.BACKLASH], number[layout.LEAST_COAST_GAP], -1.0
         if not within > least:
             continue
-        if not work.gathered[mesh, flank]:
-            gather(meshes, mesh, flank, turned, work.pairs)
-            work.gathered[mesh, flank] = True
-        n_pairs = meshes.place[mesh, layout.N_PAIRS]
+        if not within <= work.reach[mesh, flank]:
+            work.reach[mesh, flank] = gather(meshes, mesh, flank, turned, within, work.pairs)
         normal, tangent, rate_tangent, stored, lost, along = flank_law(
             work.pairs[mesh, flank, :n_pairs],
+            depth,
             number[layout.DAMPING],
             number[layout.SHARED],
             within,

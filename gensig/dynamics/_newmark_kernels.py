@@ -181,7 +181,7 @@ def look(line, meshes, torques, course, time, state, work):
     angle, speed, gain, knot, share = nominal(course, time, 0)
     push(line, torques, angle, gain, knot, share, q, force)
     roll(meshes, angle, speed, q, v, turned, roll_rate)
-    work.gathered[:] = False
+    work.reach[:] = -math.inf
     for m in range(len(law)):
         approach[m], rate[m] = row_product(line.direction, m, q), row_product(line.direction, m, v)
         mesh_law(meshes, m, turned[m], roll_rate[m], approach[m], rate[m], law, work)
@@ -218,7 +218,7 @@ def advance(line, meshes, torques, course, state, step, first_step, n_steps, cha
             ahead_q[i] = q[i] + step * (v[i] + half * mean[i])
         push(line, torques, angle, gain, knot, share, ahead_q, force_1)
         roll(meshes, angle, speed, ahead_q, ahead_v, turned, roll_rate)
-        work.gathered[:] = False
+        work.reach[:] = -math.inf
         for i in range(n):
             moved[i] = force[i] + force_1[i]
         add_product(line.stiffness, -2.0, q, moved)
@@ -307,7 +307,7 @@ def rest(line, meshes, force, angle, q, law, work):
     before_most = math.inf
     for round_ in range(MOST_PUSHES):
         roll(meshes, angle, 0.0, q, still, turned, idle)
-        work.gathered[:] = False
+        work.reach[:] = -math.inf
         for i in range(n):
             moved[i] = force[i]
         add_product(line.stiffness, -1.0, q, moved)

@@ -112,7 +112,7 @@ def pack_meshes(line: GearedLine, order: Index) -> Meshes:
     """All meshes of the line, its degrees of freedom in ``order``."""
     number = np.zeros((len(line.meshes), layout.N_NUMBERS))
     place = np.zeros((len(line.meshes), layout.N_PLACES), dtype=np.int64)
-    parts: dict[str, list[NDArray]] = {name: [] for name in ("table", "rows", "kind", "error")}
+    parts: dict[str, list[NDArray]] = {name: [] for name in ("table", "depth", "rows", "kind", "error")}
     at_of = np.argsort(order)
 
     def put(name: str, values: NDArray) -> int:
@@ -130,21 +130,29 @@ def pack_meshes(line: GearedLine, order: Index) -> Meshes:
         )  # fmt: skip
         place[m] = (
             at_of[mesh.roll_dof], mesh.n_pairs, mesh.first_pitch, (mesh.stiffness.shape[1] - 1) // mesh.n_pairs,
-            put("table", np.stack([mesh.stiffness, mesh.gap], axis=-1).reshape(-1, 2)),
+            put("table", _columns(mesh).ravel()),
             put("rows", mesh.rows.ravel()), put("rows", mesh.coast_rows.ravel()), n_a, n_b,
             put("kind", mesh.kinds[0]), put("kind", mesh.kinds[1]),
             put("error", mesh.errors[0]), put("error", mesh.errors[1]), *mesh.start_teeth, mesh.rows.shape[1],
+            len(mesh.depth), put("depth", mesh.depth),
         )  # fmt: skip
         if mesh.rows.shape != mesh.coast_rows.shape:
             raise ConfigError(f"mesh '{mesh.name}': rows and coast_rows must be alike")
     return Meshes(
         number=number,
         place=place,
-        table=np.concatenate([*parts["table"], np.empty((0, 2))]),
+        table=np.concatenate([*parts["table"], np.empty(0)]),
+        depth=np.concatenate([*parts["depth"], np.empty(0)]),
         rows=np.concatenate([*parts["rows"], np.empty(0, dtype=np.int64)]).astype(np.int64),
         kind=np.concatenate([*parts["kind"], np.empty(0, dtype=np.int64)]).astype(np.int64),
         error=np.concatenate([*parts["error"], np.empty(0)]),
     )
+
+
+def _columns(mesh: LineMesh) -> Array:
+    """Gap and stiffness of every spring, (row, node, column)."""
+    springs = mesh.stiffness.reshape(len(mesh.gap), len(mesh.depth), -1)
+    return np.concatenate([mesh.gap[:, :, None], np.moveaxis(springs, 1, 2)], axis=2)
 
 
 def pack_torques(line: GearedLine, order: Index, torques: Sequence[ShaftTorque], course: LineCourse) -> Torques:

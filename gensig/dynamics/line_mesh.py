@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import math
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 
 import numpy as np
 from numpy.typing import NDArray
@@ -25,7 +25,9 @@ class LineMesh:
     as they enter. The back flanks meet along the mirrored roll ``mirror`` - u.
 
     direction : (dof,)                 gradient of the approach along the transverse line of action, m/rad or 1
-    stiffness, gap : (row, node)       of one pair in N/m and m, straight between nodes
+    gap : (row, node)                  of one pair in m, straight between nodes
+    depth : (spring,)                  m, how deep a pair bites where each of its springs begins to bear; from 0 on
+    stiffness : (row * spring, node)   of each spring in N/m, those of one row after those of the one before
     rows, coast_rows : (kind, kind)    the row of a pair of kinds of teeth of a and b on either flank, -1 for a pair
                                        that never touches (a missing tooth)
     kinds : (tooth,) of a and of b     the kind of every tooth
@@ -52,14 +54,18 @@ class LineMesh:
     backlash: float
     damping: float
     shared_compliance: float = 0.0
+    depth: Array = field(default_factory=lambda: np.zeros(1))
 
     def __post_init__(self) -> None:
         told = f"mesh '{self.name}'"
-        if self.stiffness.ndim != 2 or self.stiffness.shape != self.gap.shape:
+        if not len(self.depth) or self.depth[0] != 0.0 or not np.all(np.diff(self.depth) > 0.0):
+            raise ConfigError(f"{told}: depth {self.depth} must begin at 0 and grow")
+        if self.stiffness.ndim != 2 or self.stiffness.shape != (len(self.gap) * len(self.depth), *self.gap.shape[1:]):
             raise ConfigError(
-                f"{told}: stiffness {self.stiffness.shape} and gap {self.gap.shape} must be alike, (row, node)"
+                f"{told}: stiffness {self.stiffness.shape} and gap {self.gap.shape} must be alike, (row, node), with "
+                f"{len(self.depth)} springs a row"
             )
-        n_rows, n_nodes = self.stiffness.shape
+        n_rows, n_nodes = self.gap.shape
         if self.n_pairs < 1 or n_nodes < 2 or (n_nodes - 1) % self.n_pairs:
             raise ConfigError(
                 f"{told}: {n_nodes} nodes over {self.n_pairs} pitches; give a whole number of cells a pitch and one "
@@ -87,14 +93,6 @@ class LineMesh:
     def n_teeth(self) -> tuple[int, int]:
         """Teeth of gears a and b."""
         return len(self.kinds[0]), len(self.kinds[1])
-
-    @property
-    def mean_stiffness(self) -> float:
-        """Mean over a pitch of the sum of the pairs of sound teeth (row 0) without gap, shared compliance in series."""
-        n_cells = (self.stiffness.shape[1] - 1) // self.n_pairs
-        touching = np.where(self.gap[0] <= 0.0, self.stiffness[0], 0.0)[:-1]
-        total = touching.reshape(self.n_pairs, n_cells).sum(axis=0)
-        return float(np.mean(total / (1.0 + self.shared_compliance * total)))
 
 
 def phase_mesh(

@@ -275,6 +275,7 @@ class _Run:
 def _scratch(line: GearedLine) -> Work:
     n, m = len(line.names), len(line.meshes)
     most = max([1, *[mesh.n_pairs for mesh in line.meshes]])
+    n_columns = layout.STIFFNESS + layout.PER_SPRING * max([1, *[len(mesh.depth) for mesh in line.meshes]])
     ahead_q, ahead_v, moved, force = np.zeros((4, n))
     turned, roll_rate, free, approach, before, rate, right, near = np.zeros((8, m))
     return Work(
@@ -292,8 +293,8 @@ def _scratch(line: GearedLine) -> Work:
         near=near,
         matrix=np.zeros((m, m)),
         law=np.zeros((m, layout.N_LAW)),
-        pairs=np.zeros((m, layout.N_FLANKS, most, layout.N_GATHERED)),
-        gathered=np.zeros((m, layout.N_FLANKS), dtype=np.bool_),
+        pairs=np.zeros((m, layout.N_FLANKS, most, n_columns)),
+        reach=np.full((m, layout.N_FLANKS), -math.inf),
     )
 
 

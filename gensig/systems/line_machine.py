@@ -6,7 +6,7 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Mapping, Sequence
+from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, replace
 
 import numpy as np
@@ -15,6 +15,7 @@ from numpy.typing import NDArray
 from gensig.dynamics.engine_cycle import CYCLE
 from gensig.dynamics.forced import SteadyResponse, closed_line, steady_response
 from gensig.dynamics.geared_line import GearedLine
+from gensig.dynamics.line_chords import sliced_pair_mesh
 from gensig.dynamics.line_course import LineCourse, ShaftTorque, constant_speed
 from gensig.dynamics.line_matrices import LineMatrices
 from gensig.dynamics.line_mesh import LineMesh, pair_mesh, phase_mesh
@@ -23,8 +24,9 @@ from gensig.dynamics.newmark import LineMotion, LineSolver, integrate_line, stat
 from gensig.errors import ConfigError
 from gensig.geometry.contact import GearPair
 from gensig.mesh.pair_table import PairTable
+from gensig.mesh.sliced_table import SlicedTable
 from gensig.systems.engine_line import EngineLine
-from gensig.systems.mesh_phase import start_rolls
+from gensig.systems.mesh_phase import first_slice_lead, start_rolls
 
 Array = NDArray[np.float64]
 
@@ -47,12 +49,12 @@ class Governor:
 
 @dataclass(frozen=True, slots=True, kw_only=True, eq=False)
 class OwnMesh:
-    """A spur mesh by its own teeth: table, errors of the teeth (tooth,) m, and teeth that enter at the start.
+    """A mesh by its own teeth: table, errors of the teeth (tooth,) m, and teeth that enter at the start.
 
     ``start_phase`` in pitches must agree with where the crank stands; None follows from it.
     """
 
-    table: PairTable
+    table: PairTable | SlicedTable
     errors: tuple[Array, Array] | None = None
     start_teeth: tuple[int, int] = (0, 0)
     start_phase: float | None = None
@@ -214,9 +216,10 @@ def _mesh(
     roll_dof = int(np.argmax(matrices.expand[drive.line.gears[mesh.driving].node]))
     # so many N s/m under the mean force; a mesh that carries less is damped less
     damping = float(matrices.mesh_damping[place]) / reference_force(machine, place, force)
-    name, phase = machine.mesh_names[place], roll / pair.base_pitch
+    name, phase = machine.mesh_names[place], (roll + first_slice_lead(pair)) / pair.base_pitch
     if own is not None:
-        return pair_mesh(
+        make: Callable[..., LineMesh] = sliced_pair_mesh if isinstance(own.table, SlicedTable) else pair_mesh
+        return make(
             name,
             own.table,
             direction=direction,

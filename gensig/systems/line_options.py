@@ -14,6 +14,8 @@ from gensig.errors import ConfigError
 from gensig.material import Material
 from gensig.units import read, unit
 
+HELICAL_MESHES = ("sliced", "constant")
+
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class LossFactors:
@@ -78,6 +80,7 @@ class LineOptions:
     viscous_damper_node: int | None
     dampers: tuple[TorsionalDamper, ...]
     record_mesh: tuple[int, ...] | None = None
+    helical_meshes: str
     backlash: float = unit("um")
     loss_factor: LossFactors
     support: GearHolding
@@ -103,6 +106,8 @@ def read_options(machine: Mapping[str, Any]) -> LineOptions:
     }
     own = {key: value for key, value in machine.items() if key not in groups}
     options = read(LineOptions, own, "system", **groups)
+    if options.helical_meshes not in HELICAL_MESHES:
+        raise ConfigError(f"system.helical_meshes = {options.helical_meshes!r}; allowed: {', '.join(HELICAL_MESHES)}")
     if options.backlash < 0.0:
         raise ConfigError(f"system.backlash_um = {options.backlash * 1e6:g} must not be negative")
     return options

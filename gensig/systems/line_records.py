@@ -1,4 +1,4 @@
-"""Records of an engine's drive line: one spur mesh of it by its own teeth, with the faults and units of every data set.
+"""Records of an engine's drive line: one mesh of it by its own teeth, with the faults and units of every data set.
 
 The machine answers as a gear pair does: its ``pair`` is the driving and the driven gear of that mesh, ``operating`` its
 driving shaft. ``docs/theory/shaft_line_records.md``.
@@ -9,7 +9,6 @@ from __future__ import annotations
 import math
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, replace
-from functools import lru_cache
 from typing import Any
 
 import numpy as np
@@ -19,12 +18,10 @@ from gensig.dynamics.integrator import Solver, check_memory
 from gensig.dynamics.newmark import LineMotion, LineSolver
 from gensig.dynamics.pair import Body, Support
 from gensig.errors import ConfigError, SimulationError
-from gensig.faults.base import Fault, faulty_teeth
-from gensig.geometry.contact import GearPair
-from gensig.material import Material
-from gensig.mesh.load_distribution import loaded_pair_table
-from gensig.mesh.options import MeshOptions, read_mesh_options
+from gensig.faults.base import Fault
+from gensig.mesh.options import SliceOptions, read_mesh_options, read_slice_options
 from gensig.mesh.pair_table import PairTable
+from gensig.mesh.sliced_table import SlicedTable
 from gensig.sensing.encoder import Disc
 from gensig.sensing.manufacturing import Quality, Specimen, perfect_specimen
 from gensig.sensing.reading import read_sensing
@@ -42,7 +39,15 @@ from gensig.systems.line_machine import (
     steady_course,
     with_supports,
 )
-from gensig.systems.mesh_phase import start_rolls
+from gensig.systems.line_teeth import (
+    ToothLaw,
+    neighbour_meshes,
+    require_drive,
+    sound_meshes,
+    start_of,
+    tooth_table,
+)
+from gensig.systems.mesh_phase import start_phase
 from gensig.systems.operation import read_operating
 from gensig.systems.pair_machine import CleanRecord, PairMachine, Run, Start
 from gensig.systems.registry import read_heat, read_material, read_modification, section
@@ -65,6 +70,7 @@ class LineMachine(PairMachine):
 
     engine: EngineLine
     place: int
+    slices: SliceOptions
 
     @property
     def ratio(self) -> float:
@@ -86,14 +92,25 @@ class LineMachine(PairMachine):
     @property
     def mesh_force(self) -> float:
         """Mean normal force of the mesh at the set-point, N, or what closes it by 2 um."""
-        speed = self.operating.speed / self.ratio
-        return reference_force(
-            self.engine, self.place, float(mesh_forces(self.engine, speed, self.operating.torque)[self.place])
-        )
+        return reference_force(self.engine, self.place, float(self.mesh_forces[self.place]))
 
-    def mesh_table(self, faults: Sequence[Fault] = ()) -> PairTable:
-        """Compliance and gap tables with the given faults."""
-        return _mesh_table(self.pair, self.material, self.mesh, tuple(faults), self.mesh_force)
+    @property
+    def mesh_forces(self) -> Array:
+        """Mean normal forces of all meshes at the set-point, (mesh,) N."""
+        return mesh_forces(self.engine, self.operating.speed / self.ratio, self.operating.torque)
+
+    @property
+    def law(self) -> ToothLaw:
+        """What all teeth have in common."""
+        return ToothLaw(material=self.material, options=self.mesh, slices=self.slices)
+
+    def mesh_table(self, faults: Sequence[Fault] = ()) -> PairTable | SlicedTable:
+        """Tables of the mesh with the given faults."""
+        return tooth_table(self.law, self.pair, tuple(faults), self.mesh_force)
+
+    def require_drive(self) -> None:
+        """Raise unless at least one pair is always in contact, by the overlap of the face too."""
+        require_drive(self.pair, self.slices)
 
     def check(self) -> None:
         """Raise for what would stop every record."""
@@ -168,19 +185,32 @@ class LineMachine(PairMachine):
             bodies = (self.pinion, slice(0, 2)), (self.wheel, slice(2, 4))
             held = [in_gearbox(body, run.gearbox, axes, self.quality).support for body, axes in bodies]
             engine = with_supports(engine, self.place, held)
+        turned, forces = self.crank_angle(start), self.mesh_forces
+        teeth = start.tooth_pinion, start.tooth_wheel
+        beside = neighbour_meshes(
+            engine,
+            self.law,
+            forces,
+            self.place,
+            start_of(self.pair, teeth, start.phase),
+            faults=run.faults,
+            specimen=specimen,
+            turned=turned,
+        )
         own = OwnMesh(
             table=self._line_table(run.faults, specimen),
             errors=(specimen.pinion_error, specimen.wheel_error),
-            start_teeth=(start.tooth_pinion, start.tooth_wheel),
+            start_teeth=teeth,
             start_phase=start.phase,
         )
+        sound = sound_meshes(engine, self.law, forces, besides={self.place, *beside})
         frequency, ratio = self.operating.drive_frequency, self.operating.drive_damping_ratio
         return running_line(
             engine,
             self._course(),
             governor=Governor(frequency=frequency, damping_ratio=ratio),
-            own={self.place: own},
-            turned=self.crank_angle(start),
+            own={**sound, **beside, self.place: own},
+            turned=turned,
         )
 
     def crank_angle(self, start: Start) -> float:
@@ -189,11 +219,11 @@ class LineMachine(PairMachine):
         The driving gear's teeth are tied to the crank: the same tooth meets the same cylinder's firing in every record.
         Where its shaft turns more than once a cycle, the driven gear's tooth chooses the turn.
         """
-        pitches = start.tooth_pinion + start.phase - _phase_at_rest(self.engine, self.place)
+        pitches = start.tooth_pinion + start.phase - start_phase(self.engine.drive, self.place)
         turns = pitches / self.pair.pinion.n_teeth + start.tooth_wheel % max(1, round(2.0 * self.ratio))
         return 2.0 * math.pi * turns / self.ratio % (4.0 * math.pi)
 
-    def _line_table(self, faults: Sequence[Fault], specimen: Specimen) -> PairTable:
+    def _line_table(self, faults: Sequence[Fault], specimen: Specimen) -> PairTable | SlicedTable:
         table = self.mesh_table((*specimen.forms, *faults))
         return replace(table, pair=replace(self.pair, backlash=self.pair.backlash * specimen.backlash_factor))
 
@@ -269,36 +299,22 @@ def read_line_machine(config: Mapping[str, Any]) -> LineMachine:
         solver=read(Solver, section(config, "solver"), "solver"),
         engine=engine,
         place=place,
+        slices=read_slice_options(section(config, "mesh")),
     )
     return replace(machine, operating=replace(operating, speed=operating.speed * machine.ratio))
 
 
 def _record_mesh(engine: EngineLine) -> int:
-    drive = engine.drive
-    spur = [name for name, pair in zip(engine.mesh_names, drive.pairs, strict=True) if not pair.pinion.helix_angle]
+    drive, names = engine.drive, engine.mesh_names
     if drive.record_mesh is None:
         raise ConfigError(
-            f"system.record_mesh = null: records follow the teeth of one spur mesh; give its two nodes, one of "
-            f"{', '.join(spur) or 'none: this line has no spur mesh'}"
+            f"system.record_mesh = null: records follow the teeth of one mesh; give its two nodes, one of "
+            f"{', '.join(names) or 'none: this line has no mesh'}"
         )
     wanted = "/".join(str(node) for node in drive.record_mesh)
-    if wanted not in engine.mesh_names:
-        raise ConfigError(f"system.record_mesh = {list(drive.record_mesh)}: no such mesh; there are {spur} (spur)")
-    if wanted not in spur:
+    if wanted not in names:
         raise ConfigError(
-            f"system.record_mesh = {list(drive.record_mesh)} is helical; records follow the teeth of spur meshes: "
-            f"{', '.join(spur)}"
+            f"system.record_mesh = {list(drive.record_mesh)}: no such mesh; there are {', '.join(names)}, the driving "
+            "node first"
         )
-    return engine.mesh_names.index(wanted)
-
-
-@lru_cache(maxsize=32)
-def _mesh_table(
-    pair: GearPair, material: Material, mesh: MeshOptions, faults: tuple[Fault, ...], force: float
-) -> PairTable:
-    return loaded_pair_table(pair, material, mesh, faulty_teeth(pair, faults), force=force)
-
-
-def _phase_at_rest(engine: EngineLine, place: int) -> float:
-    """Pitches that the mesh has rolled from A where the crank is at the start of its cycle."""
-    return float(start_rolls(engine.drive)[place] / engine.drive.pairs[place].base_pitch)
+    return names.index(wanted)

@@ -10,18 +10,16 @@ from numpy.typing import NDArray
 
 from gensig.dynamics.newmark import LineSolver
 from gensig.material import Material
-from gensig.mesh.load_distribution import loaded_pair_table
-from gensig.mesh.options import MeshOptions
+from gensig.mesh.options import MeshOptions, SliceOptions
 from gensig.systems.engine_line import EngineLine
 from gensig.systems.line_machine import (
     Governor,
     OwnMesh,
     mesh_forces,
-    named_by_side,
-    reference_force,
     running_line,
     steady_course,
 )
+from gensig.systems.line_teeth import ToothLaw, sound_meshes
 
 Array = NDArray[np.float64]
 
@@ -53,15 +51,11 @@ class TimeResponse:
 
 
 def own_meshes(
-    machine: EngineLine, material: Material, options: MeshOptions, speed: float, torque: float
+    machine: EngineLine, material: Material, options: MeshOptions, slices: SliceOptions, speed: float, torque: float
 ) -> dict[int, OwnMesh]:
-    """Tables of sound teeth of all spur meshes by their place, each under its mean force."""
-    forces, found = mesh_forces(machine, speed, torque), {}
-    for place, pair in enumerate(machine.drive.pairs):
-        if pair.pinion.helix_angle == 0.0:
-            force = reference_force(machine, place, float(forces[place]))
-            found[place] = OwnMesh(table=loaded_pair_table(named_by_side(pair), material, options, force=force))
-    return found
+    """Tables of sound teeth of the meshes that have any, by their place, each under its mean force."""
+    law = ToothLaw(material=material, options=options, slices=slices)
+    return sound_meshes(machine, law, mesh_forces(machine, speed, torque))
 
 
 def time_response(

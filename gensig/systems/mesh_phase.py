@@ -51,7 +51,8 @@ def tooth_angles(line: DriveLine, turned: float = 0.0) -> Array:
 def start_rolls(line: DriveLine, turned: float = 0.0) -> Array:
     """Distance of a pair of every mesh from A along the line of action, (mesh,) m, within one base pitch from A on.
 
-    What a mesh table over the roll takes as its start, when the first node has turned by ``turned`` rad.
+    In the middle of the face, when the first node has turned by ``turned`` rad. Gears on one shaft have the middles of
+    their faces in one plane (assumed: the tables have no place along the shaft).
     """
     angles = tooth_angles(line, turned)
     rolls = []
@@ -60,6 +61,17 @@ def start_rolls(line: DriveLine, turned: float = 0.0) -> Array:
         past = _past_pitch_point(mesh, pair, sense, float(angles[mesh.driving]))
         rolls.append((pair.pitch_point + past * pair.base_pitch) % pair.base_pitch)
     return np.array(rolls)
+
+
+def first_slice_lead(pair: GearPair) -> float:
+    """How far the slice that enters first is ahead of the middle of the face, where teeth are told, m; spur: 0."""
+    return 0.5 * pair.face_width * math.tan(pair.base_helix_angle)
+
+
+def start_phase(line: DriveLine, place: int, turned: float = 0.0) -> float:
+    """Pitches that the first slice of a pair of one mesh is past A; what a mesh table takes as its start."""
+    pair = line.pairs[place]
+    return float(start_rolls(line, turned)[place] + first_slice_lead(pair)) / pair.base_pitch
 
 
 def _spread(by_node: list[float | None], one: int, other: int) -> None:

@@ -37,7 +37,8 @@ class DriveLine:
     """A line with what its tables say beyond its matrices.
 
     ``numbers`` (node,) as the table counts them, rings of dampers on from there; ``pairs`` (mesh,) the driving gear as
-    pinion; ``record_mesh`` the numbers of the nodes whose mesh records are made of.
+    pinion; ``record_mesh`` the numbers of the nodes whose mesh records are made of; ``slices_helical`` whether helical
+    meshes in time are sliced teeth.
     """
 
     name: str
@@ -47,6 +48,7 @@ class DriveLine:
     lateral: bool
     campbell: Campbell
     record_mesh: tuple[int, ...] | None = None
+    slices_helical: bool = False
 
     def matrices(self, *, merge_rigid: bool = False) -> LineMatrices:
         """Mass, damping and stiffness, the meshes apart; merged for integration, as the table has them for modes."""
@@ -112,6 +114,7 @@ def read_drive_line(config: Mapping[str, Any]) -> DriveLine:
         lateral=options.lateral,
         campbell=options.campbell,
         record_mesh=options.record_mesh,
+        slices_helical=options.helical_meshes == "sliced",
     )
 
 
