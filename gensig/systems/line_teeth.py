@@ -32,6 +32,7 @@ from gensig.systems.shaft_line import DriveLine
 
 Array = NDArray[np.float64]
 
+SOUND_NODES = 128  # most of a pitch of sound helical teeth: short tables are read faster, and these ripple slowly
 FORCES_PER_OCTAVE = 2  # at which sound helical teeth are tabulated: chords reach over all depths of bite
 SIDES = ("pinion", "wheel")
 
@@ -82,10 +83,13 @@ def sound_meshes(
 
     Helical meshes only with ``system.helical_meshes=sliced``; those of ``besides`` are left out.
     """
+    n_nodes = min(law.options.points_per_pitch, SOUND_NODES)
+    thin = replace(law, options=replace(law.options, points_per_pitch=n_nodes))
     found = {}
     for place, pair in enumerate(machine.drive.pairs):
         if place not in besides and (machine.drive.slices_helical or pair.pinion.helix_angle == 0.0):
-            found[place] = OwnMesh(table=_table_in_line(machine, law, place, (), float(forces[place])))
+            own = law if pair.pinion.helix_angle == 0.0 else thin
+            found[place] = OwnMesh(table=_table_in_line(machine, own, place, (), float(forces[place])))
     return found
 
 
