@@ -67,9 +67,10 @@ def test_a_record_depends_on_its_row_alone_and_a_sham_has_no_fault(folder):
 @pytest.mark.parametrize(
     ("words", "told"),
     [
-        (["system.record_mesh=null"], "give its two nodes, one of 21/45"),
-        (["system.record_mesh=[3,18]"], "is helical; records follow the teeth of spur meshes: 21/45"),
-        (["system.record_mesh=[3,4]"], "no such mesh"),
+        (["system.record_mesh=null"], "give its two nodes, one of 3/18, 19/20"),
+        (["system.record_mesh=[18,3]"], "no such mesh; there are 3/18, 19/20"),
+        (["system.helical_meshes=rigid"], "allowed: sliced, constant"),
+        (["system.record_mesh=[3,18]", "mesh.slices_in_phase=true"], "take false"),
         (["sensing.channels=[pinion_x]"], "with system.lateral=true also pinion_x"),
         (["sensing.channels=[crank_speed]"], "allowed: pinion_rotation, wheel_rotation, flywheel_speed"),
         (["sensing=housing"], "no channel pinion_x"),
