@@ -36,13 +36,17 @@ GOVERNOR = Governor(frequency=1.0, damping_ratio=0.7)  # assumed; it holds the m
 class TimeResponse:
     """Motion over some time, teeth free to part.
 
-    ``speed`` (node, sample) rad/s, less the nominal one, of the nodes asked for; ``fluctuation`` (node,) rad/s is half
-    its peak to peak, ``cycle_fluctuation`` (node,) that of its mean over the cycles, which what does not repeat leaves.
-    ``contact_loss`` and ``back_contact`` (mesh,) are shares of the time, forces (mesh,) N.
+    ``speed`` (node, sample) rad/s and ``angle`` (node, sample) rad, less the nominal ones, of the nodes asked for;
+    ``fluctuation`` (node,) rad/s is half the peak to peak, ``cycle_fluctuation`` (node,) that of the mean over the
+    cycles, which what does not repeat leaves. ``mesh_force`` (mesh, sample) N, flat to 4 kHz, with its extremes.
+    ``contact_loss`` and ``back_contact`` (mesh,) are shares of the time. ``crank_angle`` (sample,) rad is nominal.
     """
 
     time: Array
+    crank_angle: Array
     speed: Array
+    angle: Array
+    mesh_force: Array
     fluctuation: Array
     cycle_fluctuation: Array
     contact_loss: Array
@@ -80,19 +84,25 @@ def time_response(
     SimulationError    where the energies do not balance to `MOST_ENERGY_RESIDUAL`
     """
     line = running_line(machine, steady_course(speed, torque), governor=GOVERNOR, own=own)
-    channels = [("speed", line.dof(node)) for node in nodes]
+    speeds, angles = ([(kind, line.dof(node)) for node in nodes] for kind in ("speed", "angle"))
+    forces = [("mesh_force", place) for place in range(len(machine.mesh_names))]
     solver = LineSolver(sampling_rate=RATE, oversampling=STEPS, max_energy_residual=MOST_ENERGY_RESIDUAL)
-    motion = line.run(solver, duration=duration, channels=list(dict.fromkeys(channels)), settling=SETTLING)
-    found = np.array([motion.signals[channel] for channel in channels])
+    motion = line.run(
+        solver, duration=duration, channels=list(dict.fromkeys([*speeds, *angles, *forces])), settling=SETTLING
+    )
+    found, angle, force = (np.array([motion.signals[one] for one in channels]) for channels in (speeds, angles, forces))
     return TimeResponse(
         time=np.arange(found.shape[1]) / RATE,
+        crank_angle=motion.nominal_angle,
         speed=found,
+        angle=angle,
+        mesh_force=force,
         fluctuation=0.5 * np.ptp(found, axis=1),
         cycle_fluctuation=0.5 * np.ptp(_mean_cycle(found, motion.nominal_angle), axis=1),
         contact_loss=motion.contact_loss,
         back_contact=motion.back_contact,
-        least_force=motion.least_force,
-        greatest_force=motion.largest_force,
+        least_force=force.min(axis=1),
+        greatest_force=force.max(axis=1),
         energy_residual=motion.energy_residual,
     )
 
