@@ -91,6 +91,8 @@ def time_response(
         solver, duration=duration, channels=list(dict.fromkeys([*speeds, *angles, *forces])), settling=SETTLING
     )
     found, angle, force = (np.array([motion.signals[one] for one in channels]) for channels in (speeds, angles, forces))
+    # teeth that never meet on their back flanks cannot pull: below 0 is what the low-pass rings
+    force = np.where(motion.back_contact[:, None] > 0.0, force, np.maximum(force, 0.0))
     return TimeResponse(
         time=np.arange(found.shape[1]) / RATE,
         crank_angle=motion.nominal_angle,
