@@ -127,7 +127,7 @@ def sweep_response(
 def _way(motion: LineMotion, signals: Array, n_nodes: int, edges: Array, speeds: Array, n_orders: int) -> SweepWay:
     """One way: ``edges`` (bin + 1,) s of its bins, ``speeds`` (bin,) in their middles."""
     found: dict[str, list[Array]] = {key: [] for key in ("angle", "mean", "scatter", "force", "spectra")}
-    frequencies, n_window = np.zeros(0), round(SPECTRUM_WINDOW * RATE)
+    frequencies, n_window = np.zeros(0), min(round(SPECTRUM_WINDOW * RATE), signals.shape[1])
     for begin, end in pairwise(edges):
         inside = slice(math.ceil(begin * RATE), math.floor(end * RATE))
         crank, part = motion.nominal_angle[inside], signals[:, inside]
