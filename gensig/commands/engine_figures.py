@@ -8,6 +8,7 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from gensig.commands.figures import COLOURS, FAULTY, GREY, SOUND, pyplot, save
+from gensig.commands.time_figures import root_row, sweep_rows, time_rows
 from gensig.dynamics.engine_cycle import cycle_angles, gas_torque, inertia_torque
 from gensig.dynamics.forced import Waterfall, cycle_orders
 from gensig.systems.engine_line import EngineLine
@@ -21,19 +22,31 @@ WATERFALL_HZ = 400.0
 
 
 def plot_response(line: EngineLine, found: Found, path: Path) -> None:
-    """Cycle and torques above, speeds and angular displacement spectra below, waterfalls of a run at the bottom."""
-    n_rows = 3 if found.run else 2
+    """Cycle, torques, speeds and angular displacement spectra; below these what else was asked for, row by row."""
+    blocks = {"run": 1 if found.run else 0, "time": 2 if found.in_time else 0}
+    blocks |= {"roots": 1 if found.roots else 0, "sweep": 3 if found.sweep else 0}
+    n_rows = 2 + sum(blocks.values())
     figure, axes = pyplot.subplots(n_rows, 2, figsize=(12, 3.7 * n_rows), layout="constrained", squeeze=False)
     _cycle(axes[0, 0], line, found)
     _orders(axes[0, 1], line, found)
     _speeds(axes[1, 0], line, found)
     _spectra(axes[1, 1], line, found)
+    row = 2
     if found.run:
-        _waterfall(figure, axes[2, 0], line, found.nodes[0], found.run[0])
+        _waterfall(figure, axes[row, 0], line, found.nodes[0], found.run[0])
         if len(found.run) > 1:
-            _waterfall(figure, axes[2, 1], line, found.nodes[1], found.run[1])
+            _waterfall(figure, axes[row, 1], line, found.nodes[1], found.run[1])
         else:
-            axes[2, 1].set_axis_off()
+            axes[row, 1].set_axis_off()
+        row += blocks["run"]
+    if found.in_time is not None:
+        time_rows(axes[row : row + 2], line, found, found.in_time)
+        row += blocks["time"]
+    if found.roots:
+        root_row(axes[row], line, found)
+        row += blocks["roots"]
+    if found.sweep is not None:
+        sweep_rows(figure, axes[row:], line, found, found.sweep)
     figure.suptitle(
         f"{line.drive.name}: {from_si('speed_rpm', found.response.speed):g} r/min, {found.torques.brake_torque:.5g} N m"
     )

@@ -5,35 +5,53 @@ from __future__ import annotations
 import json
 from argparse import Namespace
 from collections.abc import Mapping
-from dataclasses import dataclass, replace
+from dataclasses import dataclass, field, replace
 from pathlib import Path
 from typing import Any
 
 import numpy as np
 
 from gensig.commands.console import replaced_file
+from gensig.commands.engine_in_time import (
+    print_in_time,
+    print_roots,
+    print_sweep,
+    root_content,
+    simulate_sweep,
+    simulate_time,
+    sweep_content,
+    time_content,
+    without_dampers,
+)
 from gensig.config import read_request
 from gensig.dynamics.engine_torques import EngineTorques
 from gensig.dynamics.forced import SteadyResponse, Waterfall, disturbance_response, over_cycle, run_of_speeds
 from gensig.errors import ConfigError
-from gensig.mesh.options import read_mesh_options, read_slice_options
+from gensig.systems.engine_dampers import (
+    DynamicRootStress,
+    dynamic_root_stress,
+    mesh_between,
+    read_mesh_strength,
+    tooth_load,
+)
 from gensig.systems.engine_line import EngineLine, read_engine_line
-from gensig.systems.line_time import TimeResponse, own_meshes, time_response
-from gensig.systems.registry import read_material
+from gensig.systems.line_sweep import Sweep
+from gensig.systems.line_time import TimeResponse
+from gensig.systems.time_root_stress import root_stress_in_time
 from gensig.units import from_si, to_si
 
 FIGURE_TYPES = (".png", ".svg", ".pdf")
 CYCLE_POINTS = 5760
 MOST_SPEEDS = 2000
 RUN_ORDERS = 80  # half orders of a run: up to order 40
-LONGEST_TIME = 60.0  # s
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Found:
     """What the verb writes: the operating point, the steady vibration, the nodes looked at, and the run of speeds.
 
-    ``seen`` is half the peak to peak of the speed that each toothed wheel shows, rad/s; ``in_time`` lets teeth part.
+    ``seen`` is half the peak to peak of the speed that each toothed wheel shows, rad/s; ``in_time`` and ``sweep`` let
+    teeth part. ``roots`` are root stresses by name: linear or in time, with dampers or without.
     """
 
     torques: EngineTorques
@@ -42,6 +60,9 @@ class Found:
     nodes: tuple[int, ...]
     run: tuple[Waterfall, ...]
     in_time: TimeResponse | None = None
+    sweep: Sweep | None = None
+    mesh: int | None = None
+    roots: dict[str, DynamicRootStress] = field(default_factory=dict)
 
 
 def forced_response(arguments: Namespace) -> int:
@@ -51,8 +72,16 @@ def forced_response(arguments: Namespace) -> int:
     config = read_request(arguments.overrides, config_dir=arguments.config_dir).config
     line = read_engine_line(config)
     found = _find(line, arguments, config["seed"])
+    if (arguments.time, arguments.sweep) != (None, None) and line.engine.pressure_decides_torque:
+        raise ConfigError("excitation.pressure.file decides the torque; leave --time and --sweep out")
     if arguments.time is not None:
-        found = replace(found, in_time=_in_time(line, config, found, arguments.time))
+        found = replace(found, in_time=simulate_time(line, config, found.torques, found.nodes, arguments.time))
+    if arguments.mesh is not None:
+        found = replace(found, mesh=mesh_between(line, arguments.mesh))
+        found = replace(found, roots=_roots(line, config, found, arguments.time))
+    if arguments.sweep is not None:
+        sweep = simulate_sweep(line, config, found.nodes, arguments.sweep, arguments.run_torque, RUN_ORDERS)
+        found = replace(found, sweep=sweep)
     content = response_content(line, found)
     if arguments.json:
         with replaced_file(arguments.json) as path:
@@ -100,7 +129,12 @@ def response_content(line: EngineLine, found: Found) -> dict[str, Any]:
         content["disturbance_frequency_hz"] = torques.disturbance_frequency
         content["disturbance_angle_deg"] = np.degrees(np.abs(moved[places]))
     if found.in_time is not None:
-        content |= _time_content(found.in_time)
+        content |= time_content(found.in_time)
+    if found.sweep is not None:
+        content |= sweep_content(found.sweep)
+    if found.mesh is not None:
+        content["root_stress_mesh"] = line.mesh_names[found.mesh]
+        content["root_stress"] = {name: root_content(line, found.mesh, root) for name, root in found.roots.items()}
     if found.run:
         content["run_speeds_rpm"] = from_si("speed_rpm", 1.0) * found.run[0].speeds
         content["run_speed_fluctuation_rpm"] = [from_si("speed_rpm", 1.0) * one.fluctuation for one in found.run]
@@ -108,36 +142,25 @@ def response_content(line: EngineLine, found: Found) -> dict[str, Any]:
     return {key: _plain(value) for key, value in content.items()}
 
 
-def _in_time(line: EngineLine, config: Mapping[str, Any], found: Found, duration: float) -> TimeResponse:
-    """The same operating point integrated in time, its spur meshes by tables of their teeth."""
-    if not 0.0 < duration <= LONGEST_TIME:
-        raise ConfigError(f"--time {duration:g}: give seconds above 0, at most {LONGEST_TIME:g}")
-    speed, torque = found.torques.speed, found.torques.brake_torque
-    if line.engine.pressure_decides_torque:
-        raise ConfigError("--time: excitation.pressure.file decides the torque; leave --time out")
-    own = own_meshes(
-        line,
-        read_material(config),
-        read_mesh_options(config["mesh"]),
-        read_slice_options(config["mesh"]),
-        speed,
-        torque,
-    )
-    return time_response(line, speed, torque, own=own, nodes=found.nodes, duration=duration)
-
-
-def _time_content(found: TimeResponse) -> dict[str, Any]:
-    """What ``--time`` adds."""
-    rpm = from_si("speed_rpm", 1.0)
-    return {
-        "time_speed_fluctuation_rpm": rpm * found.fluctuation,
-        "time_mean_cycle_fluctuation_rpm": rpm * found.cycle_fluctuation,
-        "time_contact_loss_fraction": found.contact_loss,
-        "time_back_contact_fraction": found.back_contact,
-        "time_least_tooth_force_n": found.least_force,
-        "time_greatest_tooth_force_n": found.greatest_force,
-        "time_energy_residual": found.energy_residual,
-    }
+def _roots(
+    line: EngineLine, config: Mapping[str, Any], found: Found, duration: float | None
+) -> dict[str, DynamicRootStress]:
+    """Root stress of the mesh asked for, without the dampers too where there are any."""
+    mesh = found.mesh
+    assert mesh is not None
+    strength = read_mesh_strength(config, line, mesh)
+    roots = {"linear": dynamic_root_stress(strength, line, mesh, tooth_load(line, mesh, found.response))}
+    if found.in_time is not None:
+        roots["in_time"] = root_stress_in_time(strength, line, mesh, found.in_time)
+    if not config["system"]["dampers"]:
+        return roots
+    bare, torques = without_dampers(config), found.torques
+    response = bare.response(torques.speed, torques.brake_torque)
+    roots["linear_without_dampers"] = dynamic_root_stress(strength, bare, mesh, tooth_load(bare, mesh, response))
+    if duration is not None:
+        undamped = simulate_time(bare, config, torques, found.nodes, duration)
+        roots["in_time_without_dampers"] = root_stress_in_time(strength, bare, mesh, undamped)
+    return roots
 
 
 def _find(line: EngineLine, arguments: Namespace, seed: int) -> Found:
@@ -198,22 +221,11 @@ def _print(content: dict[str, Any]) -> None:
         parts = " (would part)" if min(low * mean, high * mean) < 0.0 else ""
         print(f"  mesh {name:>6} {low:9.0f} .. {high:.0f} N, mean {mean:.0f} N{parts}")
     if "time_energy_residual" in content:
-        _print_time(content)
-
-
-def _print_time(content: dict[str, Any]) -> None:
-    print(f"in time, teeth free to part (energy residual {content['time_energy_residual']:.1g}):")
-    shown = zip(
-        content["shown_nodes"],
-        content["time_speed_fluctuation_rpm"],
-        content["time_mean_cycle_fluctuation_rpm"],
-        strict=True,
-    )
-    for node, whole, cycle in shown:
-        print(f"  node {node:>3} +- {whole:.2f} r/min, +- {cycle:.2f} of the mean cycle")
-    keys = ("least_tooth_force_n", "greatest_tooth_force_n", "contact_loss_fraction", "back_contact_fraction")
-    for name, low, high, apart, back in zip(content["meshes"], *(content[f"time_{key}"] for key in keys), strict=True):
-        print(f"  mesh {name:>6} {low:9.0f} .. {high:.0f} N, apart {apart:.1%}, on the back flanks {back:.1%}")
+        print_in_time(content)
+    if "root_stress" in content:
+        print_roots(content)
+    if "sweep_energy_residual" in content:
+        print_sweep(content)
 
 
 def _plain(value: Any) -> Any:

@@ -63,15 +63,24 @@ def _forced_response(parser: argparse.ArgumentParser) -> None:
         "--run", type=float, nargs=3, metavar=("LOW", "HIGH", "STEP"), help="waterfall of speeds, r/min"
     )
     parser.add_argument(
-        "--run-torque", type=float, default=0.0, metavar="NM", help="brake torque of the run (default: 0)"
+        "--run-torque", type=float, default=0.0, metavar="NM", help="brake torque of run and sweep (default: 0)"
     )
     parser.add_argument(
         "--time", type=float, metavar="S", help="also integrate so many seconds with teeth that part and rattle"
     )
     parser.add_argument(
+        "--sweep",
+        type=float,
+        nargs=3,
+        metavar=("LOW", "HIGH", "S"),
+        help="also integrate a run-up and run-down, r/min and seconds each way, under the brake torque of the run",
+    )
+    mesh = "also the root stress of the mesh of two gears, in time with --time; with dampers before and after"
+    parser.add_argument("--mesh", type=int, nargs=2, metavar="N", help=mesh)
+    parser.add_argument(
         "--json",
         metavar="FILE",
-        help="write speed_fluctuation_rpm, angle_deg by orders, tooth forces, and the run",
+        help="write speed_fluctuation_rpm, angle_deg by orders, tooth forces, root stress, the run, the sweep",
     )
     parser.add_argument("--plot", metavar="FILE", help="write a figure (PNG, SVG or PDF)")
 

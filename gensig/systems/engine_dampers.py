@@ -14,6 +14,7 @@ from gensig.dynamics.damper_tuning import SeenFromNodes, seen_from_nodes
 from gensig.dynamics.dampers import TorsionalDamper, with_dampers
 from gensig.dynamics.engine_cycle import CYCLE
 from gensig.dynamics.forced import USUAL_ORDERS, SteadyResponse, over_cycle
+from gensig.dynamics.shaft_line import LineGear
 from gensig.errors import ConfigError
 from gensig.life.strength import Strength
 from gensig.mesh.options import read_mesh_options, read_slice_options
@@ -155,16 +156,10 @@ def dynamic_root_stress(strength: RootStrength, line: EngineLine, mesh: int, loa
             f"mesh {line.mesh_names[mesh]}: its force never closes the driving flanks; swap edge_from and edge_to of "
             "its row"
         )
-    pinion = strength.pair.pinion
-    loaded = replace(strength, flanks=replace(strength.flanks, torque=load.greatest * pinion.base_radius))
+    radius = strength.pair.pinion.base_radius
+    loaded = replace(strength, flanks=replace(strength.flanks, torque=load.greatest * radius))
     history = loaded.history()
-    drive = line.drive
-    gear = drive.line.gears[drive.line.meshes[mesh].driving]
-    ratio = line.ratios[drive.numbers[gear.node]]
-    pitch, start = strength.pair.base_pitch, float(start_rolls(drive)[mesh])
-    n_passes = math.ceil(CYCLE * ratio * gear.n_teeth / (2.0 * math.pi) - 1e-9)
-    way = history.roll + pitch * np.arange(n_passes)[:, None] - start  # of the pinion since crank angle 0
-    crank = way / (pinion.base_radius * ratio)
+    crank = crank_of_passes(strength, line, mesh, history.roll, range(passes_of_a_cycle(line, mesh)))
     angle = CYCLE / len(load.force) * np.arange(len(load.force))
     share = np.maximum(np.interp(crank, angle, load.force, period=CYCLE), 0.0) / load.greatest
     return DynamicRootStress(
@@ -173,3 +168,23 @@ def dynamic_root_stress(strength: RootStrength, line: EngineLine, mesh: int, loa
         history=history,
         passes={name: share * stress for name, stress in history.stress.items()},
     )
+
+
+def passes_of_a_cycle(line: EngineLine, mesh: int) -> int:
+    """Tooth pairs that meet in a mesh during a cycle of the crank, counting one that is cut as whole."""
+    driving = _driving(line, mesh)
+    ratio = line.ratios[line.drive.numbers[driving.node]]
+    return math.ceil(CYCLE * ratio * driving.n_teeth / (2.0 * math.pi) - 1e-9)
+
+
+def crank_of_passes(strength: RootStrength, line: EngineLine, mesh: int, roll: Array, passes: Iterable[int]) -> Array:
+    """Crank angles at which pairs, counted from crank angle 0 on, are at ``roll`` (point,) m, (pass, point) rad."""
+    pinion = strength.pair.pinion
+    ratio = line.ratios[line.drive.numbers[_driving(line, mesh).node]]
+    start = float(start_rolls(line.drive)[mesh])
+    way = roll + strength.pair.base_pitch * np.array(passes)[:, None] - start  # of the pinion since crank angle 0
+    return np.asarray(way / (pinion.base_radius * ratio))
+
+
+def _driving(line: EngineLine, mesh: int) -> LineGear:
+    return line.drive.line.gears[line.drive.line.meshes[mesh].driving]

@@ -2,15 +2,15 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
+from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
 
 from gensig.dynamics.newmark import LineSolver
-from gensig.material import Material
-from gensig.mesh.options import MeshOptions, SliceOptions
+from gensig.mesh.options import read_mesh_options, read_slice_options
 from gensig.systems.engine_line import EngineLine
 from gensig.systems.line_machine import (
     Governor,
@@ -20,6 +20,7 @@ from gensig.systems.line_machine import (
     steady_course,
 )
 from gensig.systems.line_teeth import ToothLaw, sound_meshes
+from gensig.systems.registry import read_material
 
 Array = NDArray[np.float64]
 
@@ -34,13 +35,17 @@ GOVERNOR = Governor(frequency=1.0, damping_ratio=0.7)  # assumed; it holds the m
 class TimeResponse:
     """Motion over some time, teeth free to part.
 
-    ``speed`` (node, sample) rad/s, less the nominal one, of the nodes asked for; ``fluctuation`` (node,) rad/s is half
-    its peak to peak, ``cycle_fluctuation`` (node,) that of its mean over the cycles, which what does not repeat leaves.
-    ``contact_loss`` and ``back_contact`` (mesh,) are shares of the time, forces (mesh,) N.
+    ``speed`` (node, sample) rad/s and ``angle`` (node, sample) rad, less the nominal ones, of the nodes asked for;
+    ``fluctuation`` (node,) rad/s is half the peak to peak, ``cycle_fluctuation`` (node,) that of the mean over the
+    cycles, which what does not repeat leaves. ``mesh_force`` (mesh, sample) N, flat to 4 kHz, with its extremes.
+    ``contact_loss`` and ``back_contact`` (mesh,) are shares of the time. ``crank_angle`` (sample,) rad is nominal.
     """
 
     time: Array
+    crank_angle: Array
     speed: Array
+    angle: Array
+    mesh_force: Array
     fluctuation: Array
     cycle_fluctuation: Array
     contact_loss: Array
@@ -50,11 +55,10 @@ class TimeResponse:
     energy_residual: float
 
 
-def own_meshes(
-    machine: EngineLine, material: Material, options: MeshOptions, slices: SliceOptions, speed: float, torque: float
-) -> dict[int, OwnMesh]:
+def own_meshes(machine: EngineLine, config: Mapping[str, Any], speed: float, torque: float) -> dict[int, OwnMesh]:
     """Tables of sound teeth of the meshes that have any, by their place, each under its mean force."""
-    law = ToothLaw(material=material, options=options, slices=slices)
+    mesh = config["mesh"]
+    law = ToothLaw(material=read_material(config), options=read_mesh_options(mesh), slices=read_slice_options(mesh))
     return sound_meshes(machine, law, mesh_forces(machine, speed, torque))
 
 
@@ -74,19 +78,27 @@ def time_response(
     SimulationError    where the energies do not balance to `MOST_ENERGY_RESIDUAL`
     """
     line = running_line(machine, steady_course(speed, torque), governor=GOVERNOR, own=own)
-    channels = [("speed", line.dof(node)) for node in nodes]
+    speeds, angles = ([(kind, line.dof(node)) for node in nodes] for kind in ("speed", "angle"))
+    forces = [("mesh_force", place) for place in range(len(machine.mesh_names))]
     solver = LineSolver(sampling_rate=RATE, oversampling=STEPS, max_energy_residual=MOST_ENERGY_RESIDUAL)
-    motion = line.run(solver, duration=duration, channels=list(dict.fromkeys(channels)), settling=SETTLING)
-    found = np.array([motion.signals[channel] for channel in channels])
+    motion = line.run(
+        solver, duration=duration, channels=list(dict.fromkeys([*speeds, *angles, *forces])), settling=SETTLING
+    )
+    found, angle, force = (np.array([motion.signals[one] for one in channels]) for channels in (speeds, angles, forces))
+    # teeth that never meet on their back flanks cannot pull: below 0 is what the low-pass rings
+    force = np.where(motion.back_contact[:, None] > 0.0, force, np.maximum(force, 0.0))
     return TimeResponse(
         time=np.arange(found.shape[1]) / RATE,
+        crank_angle=motion.nominal_angle,
         speed=found,
+        angle=angle,
+        mesh_force=force,
         fluctuation=0.5 * np.ptp(found, axis=1),
         cycle_fluctuation=0.5 * np.ptp(_mean_cycle(found, motion.nominal_angle), axis=1),
         contact_loss=motion.contact_loss,
         back_contact=motion.back_contact,
-        least_force=motion.least_force,
-        greatest_force=motion.largest_force,
+        least_force=force.min(axis=1),
+        greatest_force=force.max(axis=1),
         energy_residual=motion.energy_residual,
     )
 

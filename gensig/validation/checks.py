@@ -11,6 +11,7 @@ from gensig.validation.case import read_case
 from gensig.validation.dynamics_checks import DYNAMICS
 from gensig.validation.engine_damper_checks import DAMPERS, read_damper_case
 from gensig.validation.engine_response_checks import FORCED, read_forced_case
+from gensig.validation.engine_time_checks import TIMES, read_time_case
 from gensig.validation.fault_checks import FAULT
 from gensig.validation.geometry_checks import GEOMETRY
 from gensig.validation.heat_checks import HOT, read_hot_case
@@ -33,6 +34,7 @@ KINDS: tuple[tuple[dict[str, Any], Callable[[tuple[str, ...]], Any]], ...] = (
     (LINES, read_line_case),
     (FORCED, read_forced_case),
     (DAMPERS, read_damper_case),
+    (TIMES, read_time_case),
     (WEAR, read_wear_point),
 )
 

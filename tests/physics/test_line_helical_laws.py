@@ -12,7 +12,6 @@ from gensig.dynamics.mesh_statics import mean_mesh_stiffness
 from gensig.dynamics.newmark import LineSolver
 from gensig.errors import ConfigError
 from gensig.faults.registry import read_faults
-from gensig.mesh.options import read_mesh_options, read_slice_options
 from gensig.systems.engine_line import read_engine_line
 from gensig.systems.line_machine import Governor, running_line, steady_course
 from gensig.systems.line_teeth import ToothStart, neighbours, tooth_there
@@ -20,7 +19,6 @@ from gensig.systems.line_time import own_meshes
 from gensig.systems.machines import read_machine
 from gensig.systems.mesh_phase import first_slice_lead, start_phase, start_rolls
 from gensig.systems.pair_machine import Run, Start
-from gensig.systems.registry import read_material
 
 RPM = math.pi / 30.0
 SPEED, TORQUE = 1688.0 * RPM, 12680.0
@@ -53,8 +51,8 @@ def simulated(record, *faults):
 def running(lateral, teeth):
     words = [f"system.lateral={lateral}", f"system.helical_meshes={teeth}", "mesh.n_slices=20"]
     config = read_request(["system=engine_gear_train", "excitation=engine_v20", *words]).config
-    engine, mesh = read_engine_line(config), config["mesh"]
-    own = own_meshes(engine, read_material(config), read_mesh_options(mesh), read_slice_options(mesh), SPEED, TORQUE)
+    engine = read_engine_line(config)
+    own = own_meshes(engine, config, SPEED, TORQUE)
     return running_line(engine, steady_course(SPEED, TORQUE), governor=GOVERNOR, own=own)
 
 
@@ -83,10 +81,7 @@ def test_our_stiffness_is_of_the_size_of_the_tables():
     """0.97 times the printed one where that is out of line, 1.3 to 1.8 elsewhere: docs/theory/shaft_line_records.md."""
     line = running("false", "sliced")
     config = read_request(["system=engine_gear_train", "excitation=engine_v20"]).config
-    own = own_meshes(
-        line.machine, read_material(config), read_mesh_options(config["mesh"]), read_slice_options(config["mesh"]),
-        SPEED, TORQUE,
-    )  # fmt: skip
+    own = own_meshes(line.machine, config, SPEED, TORQUE)
     ratio = [
         mean_mesh_stiffness(own[place].table, abs(force)) / line.machine.drive.line.meshes[place].stiffness
         for place, force in enumerate(line.mesh_force)
