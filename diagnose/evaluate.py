@@ -58,7 +58,7 @@ def evaluate_model(
     from diagnose.turns import load_inputs
 
     task = _matching_task(description, dataset, channels)
-    segments, part, shown = _segments(task, description, protocol, subset)
+    segments, part, shown = chosen_segments(task, description, protocol, subset)
     windows = load_inputs(shown, segments, description.model)
     record, log_probability = over_records(predict_windows(model, windows), windows.record)
     scores = score_predictions(task, [(record, log_probability.argmax(axis=1))], description.n_bootstrap)
@@ -79,6 +79,32 @@ def evaluate_model(
 
 def _matching_task(description: ModelDescription, dataset: Dataset, channels: Sequence[str] | None) -> Task:
     """Task as the network was trained for, on this data set; refuses what does not fit."""
+    wanted = fitting_channels(description, dataset, channels)
+    known, offered = description.class_names, tuple(dataset.class_names)
+    own = data_fingerprint(dataset) == description.data_fingerprint
+    if set(known) - set(offered) or (set(offered) - set(known) and not own):
+        raise DatasetError(
+            f"{dataset.folder} does not fit the model: its classes are {', '.join(offered)}, the model knows "
+            f"{', '.join(known)}"
+        )
+    task = task_of(
+        at_rate(dataset, description.sampling_rate_hz),
+        window_samples=description.window_samples,
+        stride_samples=description.stride_samples,
+        normalise=description.normalise,
+        classes=known,
+        channels=wanted,
+    )
+    if description.test_channel_names is None:
+        return task
+    tested = description.test_channel_names if channels is None else wanted
+    return replace(task, cross_channels=(wanted, tested))
+
+
+def fitting_channels(
+    description: ModelDescription, dataset: Dataset, channels: Sequence[str] | None
+) -> tuple[str, ...]:
+    """Channels of a data set for those of a network; refuses another format, a lower rate and what it has not."""
     where = f"{dataset.folder} does not fit the model"
     if schema_version(dataset) != description.data_schema_version:
         raise DatasetError(
@@ -98,25 +124,10 @@ def _matching_task(description: ModelDescription, dataset: Dataset, channels: Se
         raise DatasetError(
             f"{where}: it has no channel {', '.join(missing)} (it has {', '.join(dataset.channel_names)})"
         )
-    known, offered = description.class_names, tuple(dataset.class_names)
-    own = data_fingerprint(dataset) == description.data_fingerprint
-    if set(known) - set(offered) or (set(offered) - set(known) and not own):
-        raise DatasetError(f"{where}: its classes are {', '.join(offered)}, the model knows {', '.join(known)}")
-    task = task_of(
-        at_rate(dataset, description.sampling_rate_hz),
-        window_samples=description.window_samples,
-        stride_samples=description.stride_samples,
-        normalise=description.normalise,
-        classes=known,
-        channels=wanted,
-    )
-    if description.test_channel_names is None:
-        return task
-    tested = description.test_channel_names if channels is None else wanted
-    return replace(task, cross_channels=(wanted, tested))
+    return wanted
 
 
-def _segments(
+def chosen_segments(
     task: Task, description: ModelDescription, protocol: str | None, subset: str | None
 ) -> tuple[Segments, str, Task]:
     """What to judge, in words, and the task with the channels of that part."""

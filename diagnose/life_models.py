@@ -27,10 +27,14 @@ class Table:
     record: IntArray
 
 
+def operating_names(task: Task) -> tuple[str, ...]:
+    """Those of `OPERATING` that the data set has."""
+    return tuple(name for name in OPERATING if name in task.dataset.column_names)
+
+
 def operating_values(task: Task, record: IntArray) -> FloatArray:
     """(record, column) of `OPERATING`."""
-    known = [name for name in OPERATING if name in task.dataset.column_names]
-    columns = [np.asarray(task.dataset.column(name), dtype=float)[record] for name in known]
+    columns = [np.asarray(task.dataset.column(name), dtype=float)[record] for name in operating_names(task)]
     return np.stack(columns, axis=1) if columns else np.zeros((record.size, 0))
 
 

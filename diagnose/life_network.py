@@ -33,6 +33,7 @@ class LifeNetwork(nn.Module):
     mean, spread : (column,) of what is known beside, in the training
     """
 
+    ear: nn.Module
     mean: torch.Tensor
     spread: torch.Tensor
 
@@ -128,6 +129,15 @@ def said_of_records(
     model: LifeNetwork, windows: WindowSet, beside: FloatArray, *, batch_size: int = 32
 ) -> tuple[NDArray[np.integer], FloatArray]:
     """Records (record,), sorted, and what the network says of them, the mean over their windows, cut to 0..1."""
+    said = said_of_windows(model, windows, beside, batch_size=batch_size)
+    record, share = over_records(said[:, None], windows.record)
+    return record, np.clip(share[:, 0], 0.0, 1.0)
+
+
+def said_of_windows(
+    model: LifeNetwork, windows: WindowSet, beside: FloatArray, *, batch_size: int = 32
+) -> NDArray[np.float64]:
+    """(window,) what the network says, not cut; ``beside`` (record, column) of all records."""
     model.eval()
     device = model.mean.device
     known = beside.astype(np.float32)[windows.record]
@@ -137,5 +147,4 @@ def said_of_records(
         for block in np.array_split(every, -(-every.size // batch_size)):
             signals = torch.from_numpy(windows.cut(block)).to(device)
             said.append(model(signals, torch.from_numpy(known[block]).to(device)).cpu())
-    record, share = over_records(torch.cat(said).numpy().astype(float)[:, None], windows.record)
-    return record, np.clip(share[:, 0], 0.0, 1.0)
+    return torch.cat(said).numpy().astype(float)

@@ -37,12 +37,22 @@ class Snapshots:
     @property
     def low(self) -> FloatArray:
         """(record,) h lower ends of the intervals."""
-        return np.maximum(self.said - self.half_width, 0.0)
+        return interval(self.said, self.half_width, self.early_life)[0]
 
     @property
     def high(self) -> FloatArray:
-        """(record,) h upper ends; the early level stands for itself and all above it."""
-        return np.minimum(self.said + self.half_width, self.early_life)
+        """(record,) h upper ends."""
+        return interval(self.said, self.half_width, self.early_life)[1]
+
+
+def interval(said: FloatArray, half_width: float, early_life: float) -> tuple[FloatArray, FloatArray]:
+    """Lower and upper ends in h about what is said, (...) each; the early level stands for itself and all above it."""
+    return np.maximum(said - half_width, 0.0), np.minimum(said + half_width, early_life)
+
+
+def intervals_hold(n_lives: int, coverage: float) -> bool:
+    """Whether so many calibration lives are enough for intervals of a coverage, see `conformal_half_width`."""
+    return bool((n_lives + 1) * (1 - coverage) >= 1 - 1e-9)
 
 
 def phm_score(error: FloatArray, early_life: float) -> FloatArray:

@@ -12,19 +12,31 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
+from diagnose.domain import Domain, fit_domain
 from diagnose.features import Cache
 from diagnose.jobs import Job, run_jobs
+from diagnose.life_io import AGE, LifeFacts, StoredLife, save_life_model
 from diagnose.life_models import (
     Table,
     age_table,
     constant_regression,
     fit_regression,
     indicator_table,
+    operating_names,
     operating_values,
     with_age,
 )
-from diagnose.life_network import said_of_records, train_life_network
-from diagnose.life_scores import UNITS, Snapshots, by_life, conformal_half_width, gain, life_scores
+from diagnose.life_network import LifeTraining, said_of_records, train_life_network
+from diagnose.life_scores import (
+    UNITS,
+    Snapshots,
+    by_life,
+    conformal_half_width,
+    gain,
+    interval,
+    intervals_hold,
+    life_scores,
+)
 from diagnose.lives import Lives, balanced_weights, choose_life_protocols, early_level, life_segments, lives_of
 from diagnose.model_io import data_fingerprint
 from diagnose.models import build_model, check_window
@@ -51,6 +63,7 @@ class LifePrediction:
     half_width : h, of the intervals; the early level where there are too few calibration lives for one
     early_life : h
     detail : what was fitted or trained, in words
+    stored : the network as it goes on disk; None for a baseline
     """
 
     protocol: str
@@ -61,6 +74,7 @@ class LifePrediction:
     half_width: float
     early_life: float
     detail: str
+    stored: StoredLife | None = None
 
 
 def check_life_settings(settings: TrainSettings) -> None:
@@ -119,36 +133,75 @@ def run_life_job(task: Task, settings: TrainSettings, job: Job) -> list[LifePred
     target = np.minimum(lives.remaining, level) / level
     found = _baselines if job.seed is None else _networks
     predictions = []
-    for method, detail, said in found(task, settings, lives, parts, target, job.seed or 0):
+    for answer in found(task, settings, lives, parts, target, job.seed or 0):
+        said = answer.said
         order = np.argsort(parts["test"].record)
         held_out = parts["validation"].record[lives.failed[parts["validation"].record]]
         error = level * np.abs(said[held_out] - target[held_out])
         half_width = conformal_half_width(error, lives.name[held_out], settings.remaining_life.coverage)
+        stored = None
+        if answer.network is not None:
+            facts = LifeFacts(
+                method=answer.method,
+                early_life_h=level,
+                half_width_h=min(half_width, level),
+                coverage=settings.remaining_life.coverage,
+                n_calibration_lives=int(np.unique(lives.name[held_out]).size),
+                told=tuple(answer.network.told_range),
+                told_range=answer.network.told_range,
+            )
+            training = answer.network.training
+            stored = StoredLife(
+                facts=facts,
+                weights={name: value.numpy() for name, value in training.model.state_dict().items()},
+                domain=answer.network.domain,
+                protocol=protocol,
+                seed=job.seed or 0,
+                best_epoch=training.best_epoch,
+            )
         record = parts["test"].record[order]
         predictions.append(
             LifePrediction(
                 protocol=protocol,
-                method=method,
+                method=answer.method,
                 seed=job.seed or 0,
                 record=record,
                 said=level * said[record],
                 half_width=min(half_width, level),
                 early_life=level,
-                detail=detail,
+                detail=answer.detail,
+                stored=stored,
             )
         )
     return predictions
 
 
-Said = list[tuple[str, str, FloatArray]]  # method, detail, (record,) share of the level, NaN where not asked
+@dataclass(frozen=True, slots=True, kw_only=True)
+class _Network:
+    """A training, with what its windows and columns looked like."""
+
+    training: LifeTraining
+    domain: Domain
+    told_range: dict[str, tuple[float, float]]
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class _Answer:
+    """What one method says: (record,) share of the level, NaN where not asked."""
+
+    method: str
+    detail: str
+    said: FloatArray
+    network: _Network | None = None
 
 
 def _baselines(
     task: Task, settings: TrainSettings, lives: Lives, parts: dict[str, Segments], target: FloatArray, seed: int
-) -> Said:
+) -> list[_Answer]:
     train = parts["train"].record
     usual = constant_regression(target[train], lives.name[train])
-    found = [(CONSTANT, f"{usual:.2f} of the early level for all", np.full(target.size, usual))]
+    detail = f"{usual:.2f} of the early level for all"
+    found = [_Answer(method=CONSTANT, detail=detail, said=np.full(target.size, usual))]
     cache: Cache = {}
     clock = {name: age_table(lives, part) for name, part in parts.items()}
     heard = {
@@ -163,24 +216,29 @@ def _baselines(
         said = np.full(target.size, np.nan)
         for part in ("validation", "test"):
             said[table[part].record] = np.clip(predict(table[part]), 0.0, 1.0)
-        found.append((method, detail, said))
+        found.append(_Answer(method=method, detail=detail, said=said))
     return found
 
 
 def _networks(
     task: Task, settings: TrainSettings, lives: Lives, parts: dict[str, Segments], target: FloatArray, seed: int
-) -> Said:
+) -> list[_Answer]:
     windows = {name: load_inputs(task, part, settings.model, training=name == "train") for name, part in parts.items()}
     every = np.arange(target.size)
     weight = np.zeros(target.size)
     for part in ("train", "validation"):
         weight[parts[part].record] = balanced_weights(lives.name[parts[part].record])
     network, operating = str(settings.model.get("name", "network")), operating_values(task, every)
-    beside = {network: operating}
+    beside = {network: (operating_names(task), operating)}
     if settings.remaining_life.with_age:
-        beside[network + AND_AGE] = np.concatenate([operating, lives.age[:, None]], axis=1)
+        beside[network + AND_AGE] = (
+            (*operating_names(task), AGE),
+            np.concatenate([operating, lives.age[:, None]], axis=1),
+        )
+    domain = fit_domain(windows["train"], windows["validation"])
+    seen = np.unique(windows["train"].record)
     found = []
-    for method, values in beside.items():
+    for method, (names, values) in beside.items():
         training = train_life_network(
             windows["train"], windows["validation"], values, target, weight, settings=settings, seed=seed
         )
@@ -188,7 +246,17 @@ def _networks(
         for part in ("validation", "test"):
             record, share = said_of_records(training.model, windows[part], values)
             said[record] = share
-        found.append((method, f"best epoch {training.best_epoch} of {len(training.validation_loss)}", said))
+        told = zip(names, values[seen].min(axis=0).tolist(), values[seen].max(axis=0).tolist(), strict=True)
+        found.append(
+            _Answer(
+                method=method,
+                detail=f"best epoch {training.best_epoch} of {len(training.validation_loss)}",
+                said=said,
+                network=_Network(
+                    training=training, domain=domain, told_range={name: (low, high) for name, low, high in told}
+                ),
+            )
+        )
     return found
 
 
@@ -202,7 +270,8 @@ def run_life_study(
     jobs: Sequence[Job],
     on_done: Callable[[str], None] = lambda line: None,
 ) -> tuple[dict[str, Any], list[LifePrediction]]:
-    """Run the jobs, write ``predictions.csv`` into `folder`, and return what goes into ``metrics.json``, and them."""
+    """Run the jobs, write ``predictions.csv`` and ``models/<protocol>-<method>-seed<k>`` into `folder`, and return what
+    goes into ``metrics.json``, and the predictions."""
     started = time.perf_counter()
 
     def report(found: list[LifePrediction]) -> None:
@@ -213,6 +282,11 @@ def run_life_study(
         task, settings, jobs, n_workers=n_workers, on_done=report, run=run_life_job
     )
     lives = lives_of(task)
+    for one in predictions:
+        if one.stored is not None:
+            save_life_model(
+                folder / "models" / f"{one.protocol}-{one.method}-seed{one.seed}", task, settings, one.stored
+            )
     write_life_predictions(folder / "predictions.csv", task, lives, predictions)
     metrics = {
         "metrics_schema_version": METRICS_SCHEMA_VERSION,
@@ -266,7 +340,7 @@ def _result(
                 rng=np.random.default_rng(BOOTSTRAP_SEED),
             ),
             "half_width_h": [one.half_width for one in of_seeds],
-            "censored_below_bound": float(np.mean([_below_bound(lives, one) for one in of_seeds])),
+            "censored_below_bound": float(np.mean([below_bound(lives, one) for one in of_seeds])),
             "seeds": [one.seed for one in of_seeds],
             "detail": [one.detail for one in of_seeds],
         }
@@ -277,7 +351,7 @@ def _result(
         "early_life_h": level,
         "phm_unit_h": level / UNITS,
         "coverage_wanted": settings.remaining_life.coverage,
-        "intervals_hold": bool((n_calibration + 1) * (1 - settings.remaining_life.coverage) >= 1 - 1e-9),
+        "intervals_hold": intervals_hold(n_calibration, settings.remaining_life.coverage),
         "n_lives": {subset: _n_lives(lives, record, failed=True) for subset, record in parts.items()},
         "n_lives_censored": {subset: _n_lives(lives, record, failed=False) for subset, record in parts.items()},
         "n_records": {subset: int(record.size) for subset, record in parts.items()},
@@ -288,7 +362,7 @@ def _result(
     }
 
 
-def _below_bound(lives: Lives, prediction: LifePrediction) -> float:
+def below_bound(lives: Lives, prediction: LifePrediction) -> float:
     """Share of the censored test snapshots of which less is said than they have run on; 0 where there are none."""
     censored = ~lives.failed[prediction.record]
     bound = np.minimum(lives.remaining[prediction.record], prediction.early_life)[censored]
@@ -313,8 +387,7 @@ def write_life_predictions(path: Path, task: Task, lives: Lives, predictions: Se
         writer = csv.writer(file, lineterminator="\n")
         writer.writerow([*head, "early_life_h", "predicted_h", "low_h", "high_h", "scored"])
         for one in predictions:
-            low = np.maximum(one.said - one.half_width, 0.0)
-            high = np.minimum(one.said + one.half_width, one.early_life)
+            low, high = interval(one.said, one.half_width, one.early_life)
             for row, record in enumerate(one.record.tolist()):
                 failed = int(lives.failed[record])
                 writer.writerow(

@@ -7,7 +7,7 @@ import json
 from collections.abc import Mapping
 from dataclasses import asdict, dataclass
 from pathlib import Path
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING, Any, Protocol
 
 import numpy as np
 
@@ -16,9 +16,10 @@ from diagnose.windows import Task, subset_segments
 from gensig.errors import DatasetError
 
 if TYPE_CHECKING:
+    from torch import nn
+
     from diagnose.adaptation import Statistics
     from diagnose.domain import Domain
-    from diagnose.jobs import Prediction
     from diagnose.network import Network
     from gensig.dataset.reader import Dataset
 
@@ -55,13 +56,38 @@ class ModelDescription:
     temperature: float = 1.0  # see `diagnose.calibration`; models of before have none
     test_channel_names: tuple[str, ...] | None = None  # of protocol cross_sensor
     adaptation: dict[str, Any] | None = None  # see `diagnose.machine`; None as trained
+    remaining_life: dict[str, Any] | None = None  # see `diagnose.life_io`; None for a classifier
 
     def __post_init__(self) -> None:
         if not 0 < self.temperature < float("inf"):
             raise ValueError(f"temperature must be greater than 0, not {self.temperature!r}")
 
 
-def model_description(task: Task, settings: TrainSettings, prediction: Prediction) -> ModelDescription:
+class Trained(Protocol):
+    """What a description takes of a trained network."""
+
+    @property
+    def protocol(self) -> str:
+        """Split that it was trained on."""
+
+    @property
+    def seed(self) -> int:
+        """Of its training."""
+
+    @property
+    def best_epoch(self) -> int:
+        """Whose weights were kept."""
+
+    @property
+    def domain(self) -> Domain | None:
+        """What it takes for known."""
+
+    @property
+    def temperature(self) -> float:
+        """Of its probabilities."""
+
+
+def model_description(task: Task, settings: TrainSettings, prediction: Trained) -> ModelDescription:
     """Description of the network behind a prediction."""
     trained_on = subset_segments(task, prediction.protocol, "train").record
     channels, tested = (task.part(prediction.protocol, subset).channel_names for subset in ("train", "test"))
@@ -107,29 +133,45 @@ def save_model(folder: Path, weights: Mapping[str, np.ndarray], description: Mod
 
 
 def load_model(folder: str | Path) -> tuple[Network, ModelDescription]:
-    """Network in evaluation mode, and its description.
+    """Classifier in evaluation mode, and its description.
 
     Raises
     ------
-    DatasetError    for a folder without the two files, another schema, or weights that do not belong to the network
+    DatasetError    for a folder without the two files, another schema, a network that says remaining lives, or weights
+        that do not belong to the network
+    """
+    from diagnose.models import build_model
+
+    folder = Path(folder)
+    description = read_description(folder)
+    if description.remaining_life is not None:
+        raise DatasetError(
+            f"{folder} says remaining lives and is no classifier: for diagnose predict, evaluate, export"
+        )
+    model = build_model(
+        description.model, n_channels=len(description.channel_names), n_classes=len(description.class_names)
+    )
+    load_weights(model, folder)
+    return model.eval(), description
+
+
+def load_weights(model: nn.Module, folder: Path) -> None:
+    """Fill a network with the weights of a folder.
+
+    Raises
+    ------
+    DatasetError    for weights that do not belong to the network
     """
     import torch
 
     from diagnose.adaptation import PREFIX
     from diagnose.domain import TENSOR
-    from diagnose.models import build_model
 
-    folder = Path(folder)
-    description = _read_description(folder)
-    model = build_model(
-        description.model, n_channels=len(description.channel_names), n_classes=len(description.class_names)
-    )
-    stored = {k: v for k, v in _tensors(folder).items() if k != TENSOR and not k.startswith(PREFIX)}
+    stored = {k: v for k, v in tensors_of(folder).items() if k != TENSOR and not k.startswith(PREFIX)}
     try:
         model.load_state_dict({name: torch.from_numpy(value) for name, value in stored.items()})
     except (RuntimeError, TypeError) as error:
         raise DatasetError(f"{folder / WEIGHTS} does not fit {DESCRIPTION}: {_one_line(error)}") from None
-    return model.eval(), description
 
 
 def load_domain(folder: str | Path, description: ModelDescription) -> Domain | None:
@@ -144,7 +186,7 @@ def load_domain(folder: str | Path, description: ModelDescription) -> Domain | N
     if description.out_of_distribution is None:
         return None
     try:
-        return domain_from(description.out_of_distribution, _tensors(Path(folder)))
+        return domain_from(description.out_of_distribution, tensors_of(Path(folder)))
     except DatasetError as error:
         raise DatasetError(f"{folder}: {error}") from None
 
@@ -159,12 +201,12 @@ def load_statistics(folder: str | Path) -> Statistics | None:
     from diagnose.adaptation import statistics_from
 
     try:
-        return statistics_from(_tensors(Path(folder)))
+        return statistics_from(tensors_of(Path(folder)))
     except DatasetError as error:
         raise DatasetError(f"{folder}: {error}") from None
 
 
-def _tensors(folder: Path) -> dict[str, np.ndarray]:
+def tensors_of(folder: Path) -> dict[str, np.ndarray]:
     """Everything in the file of weights."""
     from safetensors import SafetensorError
     from safetensors.numpy import load_file
@@ -192,7 +234,14 @@ def data_fingerprint(dataset: Dataset) -> str:
     return digest.hexdigest()
 
 
-def _read_description(folder: Path) -> ModelDescription:
+def read_description(folder: str | Path) -> ModelDescription:
+    """What the network of a folder was trained on.
+
+    Raises
+    ------
+    DatasetError    for a folder without such a file, or another schema
+    """
+    folder = Path(folder)
     path = folder / DESCRIPTION
     try:
         content = json.loads(path.read_text(encoding="utf-8"))
@@ -214,7 +263,7 @@ def _read_description(folder: Path) -> ModelDescription:
         if content.get("n_teeth") is not None:
             driving, driven = content["n_teeth"]
             content["n_teeth"] = (int(driving), int(driven))
-        for name in ("out_of_distribution", "adaptation"):
+        for name in ("out_of_distribution", "adaptation", "remaining_life"):
             if content.get(name) is not None:
                 content[name] = dict(content[name])
         return ModelDescription(**content)

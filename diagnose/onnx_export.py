@@ -8,8 +8,9 @@ import io
 import json
 import logging
 import warnings
+from collections.abc import Mapping
 from pathlib import Path
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 import torch
@@ -39,11 +40,16 @@ class RawWindows(nn.Module):
 
     def forward(self, acceleration: torch.Tensor) -> torch.Tensor:
         """(window, class) of (window, channel, sample), as `diagnose.windows.normalised` and the network."""
-        windows = acceleration - acceleration.mean(dim=-1, keepdim=True)
-        if self.normalise == "rms":
-            level = (windows * windows).mean(dim=-1, keepdim=True).sqrt()
-            windows = windows / torch.where(level > 0, level, torch.ones_like(level))
-        return log_softmax(self.model(windows), dim=1)
+        return log_softmax(self.model(without_level(acceleration, self.normalise)), dim=1)
+
+
+def without_level(acceleration: torch.Tensor, normalise: str) -> torch.Tensor:
+    """`diagnose.windows.normalised` of (window, channel, sample), as a graph."""
+    windows = acceleration - acceleration.mean(dim=-1, keepdim=True)
+    if normalise != "rms":
+        return windows
+    level = (windows * windows).mean(dim=-1, keepdim=True).sqrt()
+    return windows / torch.where(level > 0, level, torch.ones_like(level))
 
 
 class EqualParts(nn.Module):
@@ -86,11 +92,11 @@ def export_onnx(model: nn.Module, description: ModelDescription, file: Path) -> 
     if wants_turns(description.model):
         raise ConfigError("this model looks at turns, which are made before the network: export one that reads windows")
     need_packages()
-    whole = RawWindows(_with_fixed_pooling(model, description), description.normalise).eval()
-    examples = _examples(model, description)
+    whole = RawWindows(with_fixed_pooling(model, description), description.normalise).eval()
+    examples = raw_examples(model, description)
     try:
-        _write(whole, torch.from_numpy(examples[:2]), file)
-        _describe(file, description)
+        write_onnx(whole, {INPUT: torch.from_numpy(examples[:2])}, OUTPUT, file)
+        describe_onnx(file, description, _facts(description))
         difference = largest_difference(model, description, file)
     except BaseException:
         file.unlink(missing_ok=True)
@@ -109,21 +115,33 @@ def largest_difference(model: nn.Module, description: ModelDescription, file: Pa
 
     Torch gets what `diagnose predict` gives it, windows normalised outside the network; the file gets m/s2.
     """
-    import onnxruntime
 
-    examples = _examples(model, description)
+    examples = raw_examples(model, description)
     with torch.inference_mode():
         windows = torch.from_numpy(normalised(examples, description.normalise))
         expected = log_softmax(model.eval()(windows), dim=1).numpy().astype(float)
-    options = onnxruntime.SessionOptions()
-    options.intra_op_num_threads = options.inter_op_num_threads = 1
-    session = onnxruntime.InferenceSession(str(file), options, providers=["CPUExecutionProvider"])
-    blocks = [examples[:1], examples[1:]]  # two numbers of windows
-    found = np.concatenate([session.run([OUTPUT], {INPUT: block})[0] for block in blocks]).astype(float)
+    found = answers_of(file, {INPUT: examples}, OUTPUT)
     return float(np.max(np.abs(found - expected) / np.maximum(np.abs(expected), 1.0)))
 
 
-def _write(whole: nn.Module, example: torch.Tensor, file: Path) -> None:
+def answers_of(file: Path, inputs: Mapping[str, NDArray[np.float32]], output: str) -> NDArray[np.float64]:
+    """What onnxruntime makes of inputs (window, ...), in blocks of two sizes."""
+    import onnxruntime
+
+    options = onnxruntime.SessionOptions()
+    options.intra_op_num_threads = options.inter_op_num_threads = 1
+    session = onnxruntime.InferenceSession(str(file), options, providers=["CPUExecutionProvider"])
+    blocks = [{name: values[part] for name, values in inputs.items()} for part in (slice(0, 1), slice(1, None))]
+    return np.concatenate([session.run([output], block)[0] for block in blocks]).astype(float)
+
+
+def write_onnx(whole: nn.Module, inputs: Mapping[str, torch.Tensor], output: str, file: Path) -> None:
+    """Write a network whose inputs (window, ...) have these names.
+
+    Raises
+    ------
+    GensigError    for a network that cannot be written
+    """
     said = io.StringIO()
     loggers = [logging.getLogger(name) for name in ("torch.onnx", "onnxscript", "onnx_ir")]
     before = [logger.level for logger in loggers]
@@ -134,11 +152,11 @@ def _write(whole: nn.Module, example: torch.Tensor, file: Path) -> None:
             warnings.simplefilter("ignore")
             torch.onnx.export(
                 whole,
-                (example,),
+                tuple(inputs.values()),
                 str(file),
-                input_names=[INPUT],
-                output_names=[OUTPUT],
-                dynamic_shapes={INPUT: {0: torch.export.Dim("window", min=1)}},
+                input_names=list(inputs),
+                output_names=[output],
+                dynamic_shapes={name: {0: torch.export.Dim("window", min=1)} for name in inputs},
                 dynamo=True,
                 external_data=False,
                 verbose=False,
@@ -151,21 +169,28 @@ def _write(whole: nn.Module, example: torch.Tensor, file: Path) -> None:
             logger.setLevel(level)
 
 
-def _describe(file: Path, description: ModelDescription) -> None:
-    """What the numbers mean, as text and JSON in the file's metadata."""
+def _facts(description: ModelDescription) -> dict[str, Any]:
+    """What is told of a classifier's answers."""
+    return {
+        "class_names": list(description.class_names),
+        "temperature": description.temperature,
+        "probability": "softmax over classes of the mean log_probability over the windows of a record / temperature",
+    }
+
+
+def describe_onnx(file: Path, description: ModelDescription, answers: Mapping[str, Any]) -> None:
+    """What the numbers mean, as text and JSON in the file's metadata; ``answers`` what is told of the output."""
     import onnx
 
     facts = {
         "producer": f"gensig {__version__}",
-        "class_names": list(description.class_names),
+        **answers,
         "channel_names": list(description.channel_names),
         "unit": "m/s2",
         "sampling_rate_hz": description.sampling_rate_hz,
         "window_samples": description.window_samples,
         "stride_samples": description.stride_samples,
         "normalise": f"{description.normalise}, inside the graph",
-        "temperature": description.temperature,
-        "probability": "softmax over classes of the mean log_probability over the windows of a record / temperature",
         "n_teeth": description.n_teeth,
         "speed_rpm_range": description.speed_rpm_range,
         "protocol": description.protocol,
@@ -180,7 +205,7 @@ def _describe(file: Path, description: ModelDescription) -> None:
     onnx.save(content, file)
 
 
-def _examples(model: nn.Module, description: ModelDescription) -> NDArray[np.float32]:
+def raw_examples(model: nn.Module, description: ModelDescription) -> NDArray[np.float32]:
     """(window, channel, sample) m/s2: noise and tones beside an offset, and a silent channel.
 
     Levels go from a tenth to ten times what the network divides its input by, the RMS of its training.
@@ -196,7 +221,7 @@ def _examples(model: nn.Module, description: ModelDescription) -> NDArray[np.flo
     return windows.astype(np.float32)
 
 
-def _with_fixed_pooling(model: nn.Module, description: ModelDescription) -> nn.Module:
+def with_fixed_pooling(model: nn.Module, description: ModelDescription) -> nn.Module:
     """A copy whose adaptive poolings are those of the windows' length."""
     fixed = copy.deepcopy(model).eval()
     pools = {

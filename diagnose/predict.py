@@ -106,7 +106,7 @@ def predict_recording(
     overall = probabilities(over_records(log_probability, windows.record)[1], description.temperature)[0]
     distance = None if domain is None else distances(domain, windows)
     beyond = None if domain is None or distance is None else distance > domain.threshold
-    reasons = _reasons(description, source, tracked, beyond)
+    reasons = reasons_unlike(description, source, tracked, beyond)
     names, rate = description.class_names, description.sampling_rate_hz
     said = {name: values[0] for name, values in predict_heads(model, windows).items()}
     return {
@@ -121,7 +121,7 @@ def predict_recording(
         "n_windows": len(windows),
         "n_windows_beyond": None if beyond is None else int(beyond.sum()),
         "distance_threshold": None if domain is None else domain.threshold,
-        "window_duration_s": _window_duration(description, recording),
+        "window_duration_s": window_duration(description, recording),
         "windows": [
             {
                 "start_s": float(start / rate),
@@ -136,7 +136,7 @@ def predict_recording(
         "model_sampling_rate_hz": rate,
         "adaptation": description.adaptation,
         "speed_rpm": source.speed_rpm,
-        "order_tracking": None if tracked is None else _tracking_facts(tracked, source),
+        "order_tracking": None if tracked is None else tracking_facts(tracked, source),
         "trained_n_teeth": None if description.n_teeth is None else list(description.n_teeth),
         "trained_speed_rpm": None if description.speed_rpm_range is None else list(description.speed_rpm_range),
     }
@@ -172,7 +172,7 @@ def summary(result: dict[str, Any]) -> str:
     return f"{said}; like the training data ({beyond} of {n_windows} windows beyond it)"
 
 
-def _reasons(
+def reasons_unlike(
     description: ModelDescription, source: Source, tracked: Tracked | None, beyond: NDArray[np.bool_] | None
 ) -> list[str]:
     """Why a recording is out of distribution; empty if it is not."""
@@ -214,7 +214,8 @@ def _tracked(recording: Recording, tacho: NDArray[np.floating] | None, source: S
     return tracked
 
 
-def _tracking_facts(tracked: Tracked, source: Source) -> dict[str, Any]:
+def tracking_facts(tracked: Tracked, source: Source) -> dict[str, Any]:
+    """How the speed was followed, and what it was."""
     return {
         "by": tracked.by,
         "speed_rpm": tracked.speed_rpm,
@@ -312,7 +313,7 @@ def _windows(
     )
 
 
-def _window_duration(description: ModelDescription, recording: Recording) -> float:
+def window_duration(description: ModelDescription, recording: Recording) -> float:
     """Seconds that one answer is about."""
     if wants_turns(description.model):
         return float(recording.acceleration.shape[-1] / recording.sampling_rate)

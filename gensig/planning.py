@@ -286,14 +286,14 @@ def _row(
 
 
 def _as_plan(config: Mapping[str, Any], rows: list[dict[str, Any]]) -> Plan:
-    """Rows to columns; a parameter that a record has not is NaN."""
+    """Rows to columns; a parameter that a record has not is NaN. The rows are emptied: nothing is held twice."""
     names: dict[str, None] = {}
     for row in rows:
         names.update(dict.fromkeys(row))
     shard, place = shard_places(len(rows), records_per_shard(config))
     columns: dict[str, Any] = {"record_id": record_ids(len(rows)), "shard": shard, "row": place}
     for name in names:
-        columns[name] = np.array([row.get(name, MISSING) for row in rows])
+        columns[name] = np.array([row.pop(name, MISSING) for row in rows])
     return Plan(columns=columns)
 
 

@@ -106,14 +106,14 @@ def read(cls: type[T], values: Mapping[str, Any], where: str, **given: Any) -> T
     ------
     ConfigError    for an unknown or missing key, a wrong suffix or a value of the wrong type
     """
-    fields = {field.name: field for field in dataclasses.fields(cls) if field.name not in given}  # type: ignore[arg-type]
-    names = {_boundary_name(field): field for field in fields.values()}
+    names = {key: field for key, field in _boundary_fields(cls).items() if field.name not in given}  # type: ignore[arg-type]
     hints = _hints(cls)  # type: ignore[arg-type]
     if not isinstance(values, Mapping):
         raise ConfigError(f"{where} = {values!r} must be a group of keys, not one value")
     result = dict(given)
     for key, value in values.items():
         if key not in names:
+            fields = {field.name: field for field in names.values()}
             raise ConfigError(f"{where}: {_unknown(key, fields, list(names))}")
         field = names[key]
         result[field.name] = _convert(f"{where}.{key}", key, value, hints[field.name])
@@ -127,6 +127,12 @@ def read(cls: type[T], values: Mapping[str, Any], where: str, **given: Any) -> T
     if missing:
         raise ConfigError(f"{where}: missing {', '.join(missing)}")
     return cls(**result)
+
+
+@functools.lru_cache(maxsize=64)
+def _boundary_fields(cls: type) -> dict[str, dataclasses.Field[Any]]:
+    """Fields of a dataclass by their boundary names."""
+    return {_boundary_name(field): field for field in dataclasses.fields(cls)}
 
 
 @functools.lru_cache(maxsize=64)
@@ -164,6 +170,9 @@ def _convert(place: str, key: str, value: Any, hint: Any) -> Any:
     if isinstance(value, list | tuple):
         items = {typing.get_args(kind)[0] for kind in kinds if typing.get_origin(kind) is tuple}
         for item in items & {str, int, float}:
+            if item is float and all(type(entry) is float and math.isfinite(entry) for entry in value):
+                suffix = split_unit(key)[1]  # looked up once: profiles are long
+                return tuple(value) if suffix is None else tuple(entry * UNITS[suffix][0] for entry in value)
             if all(_is_a(item, entry) for entry in value):
                 return tuple(to_si(key, float(entry)) if item is float else entry for entry in value)
     for kind in (float, int, bool, str):

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import difflib
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from pathlib import Path
 
 from diagnose.commands.parser import refuse_existing, verb_parser
@@ -14,7 +14,8 @@ Evaluate a trained network on a data set.
 
   data=DIR         data set made by gensig generate
   model_dir=DIR    one of the folders that diagnose train wrote below models/
-  out=DIR          optional: receives metrics.json and confusion.png; must not exist or be empty
+  out=DIR          optional: receives metrics.json and confusion.png, of remaining lives also predictions.csv; must not
+                   exist or be empty
   protocol=NAME    optional: judge on a part of this split of the data set
   subset=NAME      optional: which part (train, validation, test); default test
   channels=A,B     optional: channels in place of those it was trained on, as many, in their order
@@ -22,6 +23,7 @@ Evaluate a trained network on a data set.
 Without protocol: the test part of the network's own split on the data set it was trained on, all records elsewhere."""
 EXAMPLE = """\
 examples:
+  diagnose evaluate data=runs/lives2 model_dir=runs/remaining/models/by_unit-cnn-seed0
   diagnose evaluate data=runs/other model_dir=runs/report/models/by_unit-seed0
   diagnose evaluate data=runs/other model_dir=runs/report/models/by_unit-seed0 channels=wheel_x,wheel_y"""
 KEYS = ("data", "model_dir", "out", "protocol", "subset", "channels")
@@ -37,13 +39,16 @@ def run(words: Sequence[str]) -> int:
     if out is not None:
         refuse_existing(out)
     from diagnose.evaluate import evaluate_model, write_evaluation
-    from diagnose.model_io import load_model
+    from diagnose.model_io import load_model, read_description
     from gensig.dataset.reader import open_dataset
 
+    if read_description(values["model_dir"]).remaining_life is not None:
+        _evaluate_life(values, out)
+        return 0
     model, description = load_model(values["model_dir"])
     dataset = open_dataset(values["data"])
     protocol, subset = values.get("protocol"), values.get("subset")
-    channels = values["channels"].strip("[]").split(",") if "channels" in values else None
+    channels = _channels(values)
     result = evaluate_model(model, description, dataset, protocol=protocol, subset=subset, channels=channels)
     print(f"{result['n_records']} records of {result['n_units']} unit(s): {result['part']}")
     print(f"channels {', '.join(result['channel_names'])}")
@@ -56,6 +61,32 @@ def run(words: Sequence[str]) -> int:
         out.mkdir(parents=True, exist_ok=True)
         write_evaluation(out, result)
     return 0
+
+
+def _evaluate_life(values: Mapping[str, str], out: Path | None) -> None:
+    from diagnose.life_evaluate import evaluate_life, life_lines, write_life_evaluation
+    from diagnose.life_io import load_life_model
+    from gensig.dataset.reader import open_dataset
+
+    model, description, facts = load_life_model(values["model_dir"])
+    protocol, subset = values.get("protocol"), values.get("subset")
+    found = evaluate_life(
+        model,
+        description,
+        facts,
+        open_dataset(values["data"]),
+        protocol=protocol,
+        subset=subset,
+        channels=_channels(values),
+    )
+    print("\n".join(life_lines(found[0])))
+    if out is not None:
+        out.mkdir(parents=True, exist_ok=True)
+        write_life_evaluation(out, *found)
+
+
+def _channels(values: Mapping[str, str]) -> list[str] | None:
+    return values["channels"].strip("[]").split(",") if "channels" in values else None
 
 
 def _key_values(words: Sequence[str]) -> dict[str, str]:

@@ -13,7 +13,7 @@ Write a trained network for other programs, and check the file against torch.
 
 The file takes windows (window, channel, sample) in m/s2 as float32 and gives log-probabilities (window, class); mean
 and RMS of the windows are taken off inside. Names of classes and channels, rate, window and temperature are in its
-metadata."""
+metadata. One of a model of remaining life takes what it is told beside (window, column) too, and gives hours."""
 EXAMPLE = """\
 example:
   diagnose export --to onnx --model runs/report/models/by_unit-seed0 --out gearbox.onnx"""
@@ -33,12 +33,27 @@ def run(words: Sequence[str]) -> int:
         raise DatasetError(f"--out {out} exists; choose another or remove it")
     if not out.parent.is_dir():
         raise DatasetError(f"--out {out}: there is no folder {out.parent}")
-    from diagnose.model_io import load_model
+    from diagnose.model_io import load_model, read_description
     from diagnose.onnx_export import export_onnx, need_packages
 
     need_packages()
+    if read_description(arguments.model).remaining_life is not None:
+        _export_life(arguments.model, out)
+        return 0
     model, description = load_model(arguments.model)
     difference = export_onnx(model, description, out)
     size = out.stat().st_size / 1e3
     print(f"{out}: {size:.0f} kB, log-probabilities within {difference:.1g} of torch's on windows of many levels")
     return 0
+
+
+def _export_life(folder: str, out: Path) -> None:
+    from diagnose.life_io import load_life_model
+    from diagnose.life_onnx import export_life_onnx
+
+    model, description, facts = load_life_model(folder)
+    difference = export_life_onnx(model, description, facts, out)
+    size = out.stat().st_size / 1e3
+    print(
+        f"{out}: {size:.0f} kB, hours within {difference:.1g} of the early level of torch's on windows of many levels"
+    )

@@ -2,17 +2,24 @@
 
 from __future__ import annotations
 
+from argparse import Namespace
 from collections.abc import Sequence
+from typing import TYPE_CHECKING, Any
 
 from diagnose.commands.parser import verb_parser
+from gensig.errors import ConfigError
+
+if TYPE_CHECKING:
+    from diagnose.predict import Source
 
 HELP = """\
-Class probabilities of one recording, with a flag for what is unlike the training data.
+Class probabilities of one recording, or how long the machine still runs, with a flag for what is unlike the training
+data.
 
 A model listens in time: to windows of its length, at its rate, of a speed that does not change within them. The
 recording is resampled to that rate; one with less bandwidth is refused. Where the speed wanders, order tracking plays
 the recording at one speed, its own mean or --to-speed: with --tacho by the pulses of the driving shaft, with --teeth
-and --speed-rpm by the mesh."""
+and --speed-rpm by the mesh. A model of remaining life must know speed and torque too."""
 EXAMPLE = """\
 exit status:
   0    predicted, and like the training data (or the model is too old to tell)
@@ -22,7 +29,8 @@ exit status:
 examples:
   diagnose predict --model runs/report/models/by_unit-seed0 housing.wav --channels channel_1 --speed-rpm 1500
   diagnose predict --model runs/report/models/by_unit-seed0 runup.csv --tacho pulses
-  diagnose predict --model runs/report/models/by_unit-seed0 bench.csv --teeth 23 84 --speed-rpm 1500"""
+  diagnose predict --model runs/report/models/by_unit-seed0 bench.csv --teeth 23 84 --speed-rpm 1500
+  diagnose predict --model runs/remaining/models/by_unit-cnn-seed0 today.csv --speed-rpm 1500 --torque-nm 90"""
 OUT_OF_DISTRIBUTION = 3
 
 
@@ -41,9 +49,11 @@ def run(words: Sequence[str]) -> int:
     parser.add_argument("--channels", nargs="+", metavar="NAME", help="for the model's channels, in their order")
     parser.add_argument("--unit", default="m/s2", help="m/s2 or g, where the column does not say (default: m/s2)")
     parser.add_argument("--array", metavar="NAME", help="array of a .npz, .h5 or .mat file (default: acceleration)")
+    parser.add_argument("--torque-nm", type=float, metavar="NM", help="of the driving shaft, for remaining lives")
+    parser.add_argument("--life-time-h", type=float, metavar="H", help="since new, for remaining lives with the age")
     parser.add_argument("--json", action="store_true", help="print everything, window by window, as JSON")
     arguments = parser.parse_args(words)
-    from diagnose.model_io import load_domain, load_model
+    from diagnose.model_io import load_domain, load_model, read_description
     from diagnose.predict import Source, predict_recording, summary
 
     source = Source(
@@ -59,12 +69,38 @@ def run(words: Sequence[str]) -> int:
         unit=arguments.unit,
         array=arguments.array,
     )
-    model, description = load_model(arguments.model)
-    result = predict_recording(model, description, load_domain(arguments.model, description), source)
+    if read_description(arguments.model).remaining_life is not None:
+        result, line = _predict_life(arguments, source)
+    else:
+        for option in ("torque_nm", "life_time_h"):
+            if getattr(arguments, option) is not None:
+                raise ConfigError(f"--{option.replace('_', '-')} is for models of remaining life; leave it out")
+        model, description = load_model(arguments.model)
+        result = predict_recording(model, description, load_domain(arguments.model, description), source)
+        line = summary(result)
     if arguments.json:
         import json
 
         print(json.dumps({"model": arguments.model, **result}, indent=2, allow_nan=False))
     else:
-        print(summary(result))
+        print(line)
     return OUT_OF_DISTRIBUTION if result["out_of_distribution"] else 0
+
+
+def _predict_life(arguments: Namespace, source: Source) -> tuple[dict[str, Any], str]:
+    """Everything that is said of a remaining life, and the line for people."""
+    from diagnose.life_io import load_life_model
+    from diagnose.life_predict import life_summary, predict_life
+    from diagnose.model_io import load_domain
+
+    model, description, facts = load_life_model(arguments.model)
+    result = predict_life(
+        model,
+        description,
+        facts,
+        load_domain(arguments.model, description),
+        source,
+        torque_nm=arguments.torque_nm,
+        life_time_h=arguments.life_time_h,
+    )
+    return result, life_summary(result)

@@ -101,7 +101,7 @@ def _normalized(name: str, values: np.ndarray) -> np.ndarray:
             f"allowed is one axis of {wanted or 'text, int or float'}"
         )
     if wanted == "str":
-        array = array.astype(str)
+        array = np.asarray(array, dtype=str)
         bad = next((value for value in array.tolist() if _CONTROL.search(value)), None)
         if bad is not None:
             raise DatasetError(f"plan column {name} holds the text {bad!r}; control characters are not allowed")

@@ -6,6 +6,7 @@ paper, read as in ``docs/theory/spur_mesh.md`` (gamma from pi/2 at the root circ
 
 from __future__ import annotations
 
+import functools
 from dataclasses import dataclass
 
 import numpy as np
@@ -84,6 +85,7 @@ def tooth_profile(gear: Gear, *, n_root_cells: int = N_ROOT_CELLS, n_flank_cells
     )
 
 
+@functools.lru_cache(maxsize=64)  # a plan asks for every cracked record
 def root_curve_middle(gear: Gear, where: str) -> float:
     """Parameter gamma of the middle of the root transition curve, rad.
 
@@ -99,6 +101,7 @@ def root_curve_middle(gear: Gear, where: str) -> float:
     return float(np.interp(0.5 * arc[-1], arc, gamma))
 
 
+@functools.lru_cache(maxsize=64)
 def root_curve_point(gear: Gear, where: str) -> tuple[float, float]:
     """Middle of the root transition curve, X and Y in m; ``where`` as in ``root_curve_middle``."""
     x, y = root_curve(gear, np.array([root_curve_middle(gear, where)]))

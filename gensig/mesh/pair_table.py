@@ -168,11 +168,12 @@ def check_teeth(
     FaultError, ExtrapolationError    for what the chosen conventions cannot take
     """
     structure, known = material.in_plane(options.elasticity), set()
+    sides = flank_sides(pair, np.array([pair.pitch_point]), material, options, 1.0) if teeth else {}
     for (name, _), tooth in teeth.items():
         if id(tooth) in known or not tooth.present:
             continue
         known.add(id(tooth))
-        side = flank_sides(pair, np.array([pair.pitch_point]), material, options, 1.0)[name]
+        side = sides[name]
         structural_terms(tooth, np.minimum(side.curvature, tooth.tip_curvature_radius), structure, options)
         if options.law == "paper" and not is_nominal(tooth):
             bearing_width(tooth, side.curvature)
