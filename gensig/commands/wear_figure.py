@@ -100,8 +100,15 @@ def _history(axes: Any, content: Mapping[str, Any]) -> None:
         axes.plot(history["hours"], history[f"{name}_depth_um"], color=colour, label=name)
     axes.set(title="Deepest place over time", xlabel="hours", ylabel="um")
     axes.legend(loc="upper left")
-    error = history["transmission_error_peak_to_peak_um"]
-    if error[0] is not None:
+    error, vibration = history["transmission_error_peak_to_peak_um"], content.get("vibration")
+    if vibration is not None:
+        beside = axes.twinx()
+        loudest = np.array(vibration["rms_m_per_s2"]).max(axis=1)
+        shown = np.array(vibration["hours"]) <= content["life_hours"] * 1.001
+        beside.plot(np.array(vibration["hours"])[shown], loudest[shown], ":o", color=GREY, markersize=3)
+        beside.set_ylabel("RMS of the loudest sensor (dotted), m/s2")
+        beside.set_ylim(bottom=0.0)
+    elif error[0] is not None:
         beside = axes.twinx()
         beside.plot(history["hours"], error, ":", color=GREY)
         beside.set_ylabel("transmission error, peak to peak (dotted), um")
