@@ -188,6 +188,7 @@ def _law_content(law: FittedLaw) -> dict[str, Any]:
         "torque_nm": list(law.torque),
         "speed_rad_per_s": list(law.speed),
         "largest_error": law.largest_error,
+        "no_life_from_torque_nm": law.no_life_from,
     }
 
 
@@ -247,7 +248,11 @@ def _print(content: Mapping[str, Any], lives: LifeMap | None, laws: tuple[Fitted
             print(f"{torque:>6.4g} N m" + "".join(f"{value:>11.4g}" for value in row))
     for law in laws:
         print(f"{law.form:<12} {law.text} h, off by at most {law.largest_error:.1%}; {law.torque[0]:.4g} .. "
-              f"{law.torque[1]:.4g} N m, {law.speed[0]:.4g} .. {law.speed[1]:.4g} rad/s")  # fmt: skip
+              f"{law.torque[1]:.4g} N m, {law.speed[0]:.4g} .. {law.speed[1]:.4g} rad/s" + _refusal(law))  # fmt: skip
+
+
+def _refusal(law: FittedLaw) -> str:
+    return "" if law.no_life_from is None else f"; no life from {law.no_life_from:.4g} N m on"
 
 
 def _print_limits(content: Mapping[str, Any]) -> None:

@@ -74,6 +74,12 @@ class WearOptions:
         _require_positive("wear", self, (*ends, "step_um", "coefficient", "hardness_hbs"))
         for name in SIDES:
             _require_positive(f"wear.{name}", getattr(self, name), ("coefficient", "hardness_hbs"))
+        for place, values in (("wear", self), *((f"wear.{name}", getattr(self, name)) for name in SIDES)):
+            if values.coefficient is not None and values.coefficient > 1.0:
+                raise ConfigError(
+                    f"{place}.coefficient = {values.coefficient:g} must be at most 1: it is the share of the meetings "
+                    "of asperities that wear something off (Archard, J. Appl. Phys. 24, 1953)"
+                )
         follows_mesh = self.geometry == "worn" and self.sharing != "one_pair"
         if self.transmission_error_limit is not None and not follows_mesh:
             raise ConfigError(
