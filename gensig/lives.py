@@ -27,6 +27,7 @@ from gensig.systems.pair_machine import PairMachine
 from gensig.systems.registry import read_system
 from gensig.systems.wear import read_wear_case, wear_fault
 from gensig.units import from_si
+from gensig.vibration_limit import limited_by_vibration
 
 Array = NDArray[np.float64]
 
@@ -158,7 +159,9 @@ class _Laws:
             return pit_growth(pair, material, made, own, first), 0.0
         assert isinstance(own, WearGrowthOptions)
         if self._table is None:
-            self._table = wear_table(read_wear_case({**self._config, "fault": HEALTHY}), *self._torques)
+            sound = {**self._config, "fault": HEALTHY}
+            limited, _ = limited_by_vibration(read_wear_case(sound), sound)
+            self._table = wear_table(limited, *self._torques)
         case = self._table.lives[0].case
         mean = float(np.exp(np.log(history.torque).mean()))
         return WearGrowth(table=self._table, torque=mean, as_fault=lambda depth: wear_fault(case, depth)), 0.0

@@ -7,6 +7,7 @@ import math
 import sys
 from argparse import Namespace
 from collections.abc import Mapping
+from dataclasses import replace
 from pathlib import Path
 from typing import Any
 
@@ -19,12 +20,13 @@ from gensig.config import read_request
 from gensig.errors import ConfigError, SimulationError
 from gensig.life.archard import flank_radii, hunting_turns
 from gensig.life.life_laws import FittedLaw, LifeMap, fitted_laws, life_map, torque_exponent
-from gensig.life.options import SIDES
+from gensig.life.options import SIDES, WearOptions
 from gensig.life.wear_case import WearCase
 from gensig.life.wear_life import WearLife, hours, wear_life
 from gensig.systems.operation import read_operating
 from gensig.systems.registry import section
 from gensig.systems.wear import read_wear_case, wear_fault
+from gensig.vibration_limit import WornVibration, limited_by_vibration
 
 Array = NDArray[np.float64]
 
@@ -43,9 +45,12 @@ def wear_life_verb(arguments: Namespace) -> int:
         speed = read_operating(section(request.config, "operating")).speed
         if case.pair.transverse_contact_ratio < 1.0:
             _warn_of_interruption(case)
+        case, vibration = limited_by_vibration(case, request.config)
         life = wear_life(case)
+        if vibration is not None and vibration.limit_depth is not None:
+            life = replace(life, ended_by="vibration")
         lives, laws = _lives(case, speed, arguments)
-        content = wear_life_content(life, speed, lives, laws)
+        content = wear_life_content(life, speed, lives, laws, vibration)
     _warn_of_pressure(case, content)
     if arguments.json:
         with replaced_file(arguments.json) as path:
@@ -80,7 +85,11 @@ def _lives(case: WearCase, speed: float, arguments: Namespace) -> tuple[LifeMap 
 
 
 def wear_life_content(
-    life: WearLife, speed: float, lives: LifeMap | None = None, laws: tuple[FittedLaw, ...] = ()
+    life: WearLife,
+    speed: float,
+    lives: LifeMap | None = None,
+    laws: tuple[FittedLaw, ...] = (),
+    vibration: WornVibration | None = None,
 ) -> dict[str, Any]:
     """The keys of ``gensig wear-life --json``; where there are several slices, the greatest of them."""
     case = life.case
@@ -102,6 +111,7 @@ def wear_life_content(
         "life_hours": hours(life.life, speed),
         "life_turns": life.life,
         "threshold_um": life.threshold * 1e6,
+        "transmission_error_limit_um": _micrometres(options.transmission_error_limit),
         "ended_by": life.ended_by,
         "deepest": {
             "gear": "both" if options.criterion == "sum" else SIDES[deepest[0]],
@@ -133,6 +143,8 @@ def wear_life_content(
         "wheel_depth_um": _list(life.depth[:, 1].max(axis=(1, 2)) * 1e6),
         "transmission_error_peak_to_peak_um": _list(np.array([case.error_range(one) for one in life.depth]) * 1e6),
     }
+    if vibration is not None:
+        content["vibration"] = _vibration_content(vibration, options, speed)
     if lives is not None:
         content["map"] = {
             "torque_nm": _list(lives.torque),
@@ -155,6 +167,19 @@ def _judged(case: WearCase, depth: Array) -> Array:
     return np.broadcast_to(depth.sum(axis=0), depth.shape) if case.options.criterion == "sum" else depth
 
 
+def _vibration_content(vibration: WornVibration, options: WearOptions, speed: float) -> dict[str, Any]:
+    return {
+        "limit_m_per_s2": options.vibration_limit_m_per_s2,
+        "rise_limit_db": options.vibration_rise,
+        "is_reached": vibration.limit_depth is not None,
+        "sensors": list(vibration.sensors),
+        "hours": _list(np.array([hours(turns, speed) for turns in vibration.turns])),
+        "depth_um": _list(vibration.depth * 1e6),
+        "rms_m_per_s2": vibration.rms.tolist(),
+        "rise_db": vibration.rise.tolist(),
+    }
+
+
 def _law_content(law: FittedLaw) -> dict[str, Any]:
     return {
         "form": law.form,
@@ -163,7 +188,12 @@ def _law_content(law: FittedLaw) -> dict[str, Any]:
         "torque_nm": list(law.torque),
         "speed_rad_per_s": list(law.speed),
         "largest_error": law.largest_error,
+        "no_life_from_torque_nm": law.no_life_from,
     }
+
+
+def _micrometres(length: float | None) -> float | None:
+    return None if length is None else length * 1e6
 
 
 def _list(values: Array) -> list[float | None]:
@@ -209,6 +239,7 @@ def _print(content: Mapping[str, Any], lives: LifeMap | None, laws: tuple[Fitted
     print(f"life                       {content['life_hours']:.5g} h, {content['life_turns']:.5g} turns of the pinion")
     print(f"ended by                   {content['ended_by'].replace('_', ' ')}, {content['threshold_um']:.4g} um "
           f"({where['gear']}, {where['position_mm']:.3f} mm from A)")  # fmt: skip
+    _print_limits(content)
     if content["torque_exponent"] is not None:
         print(f"local law                  life ~ torque^-{content['torque_exponent']:.3f} speed^-1")
     if lives is not None:
@@ -217,7 +248,28 @@ def _print(content: Mapping[str, Any], lives: LifeMap | None, laws: tuple[Fitted
             print(f"{torque:>6.4g} N m" + "".join(f"{value:>11.4g}" for value in row))
     for law in laws:
         print(f"{law.form:<12} {law.text} h, off by at most {law.largest_error:.1%}; {law.torque[0]:.4g} .. "
-              f"{law.torque[1]:.4g} N m, {law.speed[0]:.4g} .. {law.speed[1]:.4g} rad/s")  # fmt: skip
+              f"{law.torque[1]:.4g} N m, {law.speed[0]:.4g} .. {law.speed[1]:.4g} rad/s" + _refusal(law))  # fmt: skip
+
+
+def _refusal(law: FittedLaw) -> str:
+    return "" if law.no_life_from is None else f"; no life from {law.no_life_from:.4g} N m on"
+
+
+def _print_limits(content: Mapping[str, Any]) -> None:
+    """How near the life came to limits that did not end it, and how the machine shakes."""
+    limit, error = content["transmission_error_limit_um"], content["history"]["transmission_error_peak_to_peak_um"]
+    if limit is not None and content["ended_by"] != "transmission_error":
+        print(f"transmission error         {error[-1]:.4g} um from peak to peak at the end; limit of {limit:g} um not "
+              "reached")  # fmt: skip
+    vibration = content.get("vibration")
+    if vibration is not None:
+        rms = np.array(vibration["rms_m_per_s2"])
+        end = int(np.abs(np.array(vibration["depth_um"]) - content["threshold_um"]).argmin())
+        asked = ((vibration["limit_m_per_s2"], "m/s2"), (vibration["rise_limit_db"], "dB"))
+        limits = " and ".join(f"{value:g} {unit}" for value, unit in asked if value is not None)
+        rise, reached = max(vibration["rise_db"][end]), "" if vibration["is_reached"] else "not "
+        print(f"vibration                  {rms[0].max():.4g} m/s2 RMS with new flanks, loudest sensor; at the end "
+              f"{rms[end].max():.4g}, up by {rise:.3g} dB at most; limit of {limits} {reached}reached")  # fmt: skip
 
 
 def _write_option(life: WearLife, speed: float, target: Path) -> None:

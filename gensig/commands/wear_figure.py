@@ -18,6 +18,7 @@ from gensig.life.wear_life import WearLife
 Array = NDArray[np.float64]
 
 TALLEST = 1.6  # times the largest radius of new flanks; flatter and hollow places are left out
+ENDED_BY = {"depth": "", "transmission_error": ", limit of the transmission error", "vibration": ", limit of vibration"}
 SHOWN = (10, 20, 30, 40)  # snapshots: quarters of the life
 
 
@@ -41,8 +42,8 @@ def plot_wear_life(life: WearLife, speed: float, content: Mapping[str, Any], liv
     pair = life.case.pair
     figure.suptitle(
         f"{pair.pinion.n_teeth}/{pair.wheel.n_teeth} teeth, {life.case.torque:g} N m, {content['speed_rpm']:g} r/min: "
-        f"{content['life_hours']:.4g} h to {content['threshold_um']:.4g} um (rule {content['rule']}, sharing "
-        f"{content['sharing']}, geometry {content['geometry']})"
+        f"{content['life_hours']:.4g} h to {content['threshold_um']:.4g} um{ENDED_BY[content['ended_by']]} (rule "
+        f"{content['rule']}, sharing {content['sharing']}, geometry {content['geometry']})"
     )
     save(figure, path)
 
@@ -100,8 +101,15 @@ def _history(axes: Any, content: Mapping[str, Any]) -> None:
         axes.plot(history["hours"], history[f"{name}_depth_um"], color=colour, label=name)
     axes.set(title="Deepest place over time", xlabel="hours", ylabel="um")
     axes.legend(loc="upper left")
-    error = history["transmission_error_peak_to_peak_um"]
-    if error[0] is not None:
+    error, vibration = history["transmission_error_peak_to_peak_um"], content.get("vibration")
+    if vibration is not None:
+        beside = axes.twinx()
+        loudest = np.array(vibration["rms_m_per_s2"]).max(axis=1)
+        shown = np.array(vibration["hours"]) <= content["life_hours"] * 1.001
+        beside.plot(np.array(vibration["hours"])[shown], loudest[shown], ":o", color=GREY, markersize=3)
+        beside.set_ylabel("RMS of the loudest sensor (dotted), m/s2")
+        beside.set_ylim(bottom=0.0)
+    elif error[0] is not None:
         beside = axes.twinx()
         beside.plot(history["hours"], error, ":", color=GREY)
         beside.set_ylabel("transmission error, peak to peak (dotted), um")
@@ -111,7 +119,7 @@ def _history(axes: Any, content: Mapping[str, Any]) -> None:
 def _map(figure: Any, axes: Any, lives: LifeMap, content: Mapping[str, Any]) -> None:
     rpm = lives.speed * 30.0 / math.pi
     image = axes.contourf(rpm, lives.torque, np.log10(lives.hours), levels=14, cmap="cividis")
-    axes.plot(content["speed_rpm"], content["torque_nm"], "o", color=FAULTY)
+    axes.plot(content["speed_rpm"], content["torque_nm"], "o", color=FAULTY, clip_on=False)
     axes.set(title="Life", xlabel="speed of the pinion, r/min", ylabel="torque of the pinion, N m")
     axes.set(xscale="log", yscale="log")
     figure.colorbar(image, ax=axes, label="log$_{10}$ of the hours")

@@ -8,6 +8,7 @@ from __future__ import annotations
 
 import math
 from dataclasses import dataclass
+from functools import cached_property
 
 import numpy as np
 from numpy.typing import NDArray
@@ -23,7 +24,7 @@ Array = NDArray[np.float64]
 LEAST_CURVATURE_SHARE = 0.1
 
 
-@dataclass(frozen=True, slots=True, kw_only=True, eq=False)
+@dataclass(frozen=True, kw_only=True, eq=False)  # no slots: a life asks for the same curves some thousand times
 class FlankPath:
     """Places along the path of contact where wear is followed, ``position`` (node,) m from A to E.
 
@@ -34,38 +35,38 @@ class FlankPath:
     pair: GearPair
     position: Array
 
-    @property
+    @cached_property
     def curvature(self) -> Array:
         """Curvature radii of new flanks in the transverse section, (2, node) m: pinion, wheel."""
         return np.array([self.pair.pinion_curvature(self.position), self.pair.wheel_curvature(self.position)])
 
-    @property
+    @cached_property
     def arc(self) -> Array:
         """Length along the profile of either flank, (2, node) m; the wheel's falls from A to E."""
         return self.curvature**2 / (2.0 * _base_radii(self.pair))
 
-    @property
+    @cached_property
     def pressure_angle(self) -> Array:
         """Transverse pressure angle at the contact point on either gear, (2, node) rad."""
         return np.arctan(self.curvature / _base_radii(self.pair))
 
-    @property
+    @cached_property
     def relative_curvature(self) -> Array:
         """Sum of both flanks' curvatures in the section normal to the contact line, (node,) 1/m."""
         return math.cos(self.pair.base_helix_angle) * np.sum(1.0 / self.curvature, axis=0)
 
-    @property
+    @cached_property
     def rolling(self) -> Array:
         """Speed of either flank across the contact line for a pinion of 1 rad/s, (2, node) m."""
         return self.curvature / np.array([[1.0], [self.pair.ratio]])
 
-    @property
+    @cached_property
     def sliding(self) -> Array:
         """Wheel's less pinion's, so positive at the pinion's root, (node,) m for a pinion of 1 rad/s."""
         pinion, wheel = self.rolling
         return wheel - pinion
 
-    @property
+    @cached_property
     def slide_roll(self) -> Array:
         """Sliding over the speed of either flank itself (specific sliding without its sign), (2, node)."""
         return np.abs(self.sliding) / self.rolling

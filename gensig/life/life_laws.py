@@ -47,8 +47,15 @@ def life_map(case: WearCase, torques: Sequence[float], speeds: Sequence[float]) 
         if len(set(values)) < 2 or not min(values) > 0.0:
             raise ConfigError(f"a map needs two {name} or more, all positive; {len(set(values))} different given")
     torque = np.unique(np.asarray(torques, dtype=np.float64))
-    turns = np.array([wear_life(case.under(float(one))).life for one in torque])
+    turns = np.array([_life_under(case, float(one)) for one in torque])
     return LifeMap(torque=torque, speed=np.unique(np.asarray(speeds, dtype=np.float64)), turns=turns)
+
+
+def _life_under(case: WearCase, torque: float) -> float:
+    try:
+        return wear_life(case.under(torque)).life
+    except (ConfigError, SimulationError) as error:
+        raise type(error)(f"at {torque:g} N m of the map: {error}") from None
 
 
 def torque_exponent(case: WearCase) -> float:
@@ -103,6 +110,11 @@ class FittedLaw:
                 f"the {self.form} law gives a life of {found:.4g} hours at {torque:g} N m: it is a fit, not physics"
             )
         return found
+
+    @property
+    def no_life_from(self) -> float | None:
+        """Torque in N m from which the formula gives no life but a negative one; None where it always gives one."""
+        return math.exp(self.a / self.b) if self.form == "logarithm" else None
 
     @property
     def text(self) -> str:

@@ -7,7 +7,7 @@ from dataclasses import dataclass
 from typing import Any
 
 from gensig.errors import ConfigError
-from gensig.units import from_si, read, unit
+from gensig.units import from_si, read, split_unit, unit
 
 CHOICES = {
     "rule": ("band", "fixed_intervals"),
@@ -36,7 +36,9 @@ class WearOptions:
     rule : ``band``, the contact passes a flank point with its width 2a, or ``fixed_intervals``, the wear-life paper's:
         a point wears for 1 / ``n_intervals`` of the time a pair needs for the path of contact
     threshold : depth normal to the flank at which the life ends
-    transmission_error_limit : from peak to peak, or None; whatever of the two comes first ends the life
+    transmission_error_limit : from peak to peak, or None
+    vibration_limit_m_per_s2, vibration_rise : RMS of a clean record, and its rise over new flanks in dB, or None;
+        whatever of these and the threshold comes first ends the life
     criterion : ``first``, the first flank to the threshold, or ``sum``, both flanks of a contact point together
     coefficient, hardness : k, and H in Pa, of both gears; ``pinion`` and ``wheel`` override them
     sharing : ``mesh`` or ``one_pair``; None is the mesh, and one pair where the contact ratio is below 1
@@ -49,6 +51,8 @@ class WearOptions:
     n_intervals: int
     threshold: float = unit("um")
     transmission_error_limit: float | None = unit("um")
+    vibration_limit_m_per_s2: float | None = None
+    vibration_rise: float | None = unit("db", default=None)
     criterion: str
     coefficient: float
     hardness: float = unit("hbs")
@@ -66,10 +70,16 @@ class WearOptions:
                 raise ConfigError(f"wear.{key} = {value!r}; allowed: {', '.join(allowed)}")
         if not 1 <= self.n_intervals <= 1_000_000:
             raise ConfigError(f"wear.n_intervals = {self.n_intervals} must lie in 1..1000000")
-        lengths = ("threshold_um", "transmission_error_limit_um", "step_um")
-        _require_positive("wear", self, (*lengths, "coefficient", "hardness_hbs"))
+        ends = ("threshold_um", "transmission_error_limit_um", "vibration_limit_m_per_s2", "vibration_rise_db")
+        _require_positive("wear", self, (*ends, "step_um", "coefficient", "hardness_hbs"))
         for name in SIDES:
             _require_positive(f"wear.{name}", getattr(self, name), ("coefficient", "hardness_hbs"))
+        for place, values in (("wear", self), *((f"wear.{name}", getattr(self, name)) for name in SIDES)):
+            if values.coefficient is not None and values.coefficient > 1.0:
+                raise ConfigError(
+                    f"{place}.coefficient = {values.coefficient:g} must be at most 1: it is the share of the meetings "
+                    "of asperities that wear something off (Archard, J. Appl. Phys. 24, 1953)"
+                )
         follows_mesh = self.geometry == "worn" and self.sharing != "one_pair"
         if self.transmission_error_limit is not None and not follows_mesh:
             raise ConfigError(
@@ -91,7 +101,7 @@ class WearOptions:
 
 def _require_positive(place: str, values: Any, keys: tuple[str, ...]) -> None:
     for key in keys:
-        value = getattr(values, key.removesuffix("_um").removesuffix("_hbs"))
+        value = getattr(values, split_unit(key)[0])
         if value is not None and not value > 0.0:
             raise ConfigError(f"{place}.{key} = {from_si(key, value):g} must be positive")
 

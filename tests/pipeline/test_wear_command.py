@@ -84,7 +84,9 @@ def test_a_map_and_its_laws(tmp_path, capsys):
     assert (power["form"], power["coefficients"]["b"]) == ("power", pytest.approx(1.0))
     assert power["torque_nm"] == [50.0, 200.0]
     assert [law["form"] for law in content["laws"]] == ["power", "logarithm", "exponential"]
-    assert "logarithm" in capsys.readouterr().out
+    logarithm = content["laws"][1]
+    assert f"no life from {logarithm['no_life_from_torque_nm']:.4g} N m on" in capsys.readouterr().out
+    assert logarithm["no_life_from_torque_nm"] > 200.0
     assert figure.stat().st_size > 1000
 
 
@@ -122,6 +124,9 @@ def test_what_would_yield_before_it_wears_is_said(capsys):
         (["wear.threshold_um=9000"], "is deeper than the tooth"),
         (["wear.threshold=50"], "unknown key 'wear.threshold'; did you mean 'wear.threshold_um'"),
         (["wear.hardness_hbs=0"], "wear.hardness_hbs = 0 must be positive"),
+        (["wear.coefficient=-1"], "wear.coefficient = -1 must be positive"),
+        (["wear.wheel.coefficient=3"], "wear.wheel.coefficient = 3 must be at most 1"),
+        (["wear.transmission_error_limit_um=1.3", "--map"], "at 30 N m of the map: wear.transmission_error_limit_um"),
         (["wear=rust"], "no option 'rust' of wear; there is archard"),
         (["fault=wear"], "a life begins with sound flanks"),
         (["operating.speed_rpm=0"], "speed"),

@@ -110,6 +110,9 @@ def test_laws_know_their_range_and_refuse_a_negative_life():
     )
     with pytest.raises(SimulationError, match="gives a life of -"):  # inside its range
         printed.life(265.0, 12.0)
+    assert printed.no_life_from == pytest.approx(263.0, abs=0.5)
+    assert printed.formula(0.999 * printed.no_life_from, 12.0) > 0.0
+    assert power.no_life_from is None
     with pytest.raises(ConfigError, match="two torques or more"):
         life_map(case, [50.0], [3.0, 6.0])
     with pytest.raises(ConfigError, match="all positive"):
