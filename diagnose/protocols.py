@@ -5,7 +5,7 @@ from __future__ import annotations
 from collections.abc import Sequence
 from typing import TYPE_CHECKING
 
-from diagnose.windows import CROSS_SENSOR, check_names
+from diagnose.windows import CROSS_SENSOR, check_names, n_samples
 from gensig.errors import ConfigError
 
 if TYPE_CHECKING:
@@ -50,6 +50,7 @@ def choose_protocols(task: Task, wanted: Sequence[str] | None) -> tuple[tuple[st
     if wanted is None:
         wanted = offered
     check_names("protocol", wanted, [*offered, *left_out])
+    left_out |= {name: why for name in wanted if name in offered and (why := _why_no_window(task, name))}
     absent = {name: left_out[name] for name in wanted if name in left_out}
     found = tuple(name for name in wanted if name not in absent)
     if not found:
@@ -86,6 +87,17 @@ def channels_to_cross(
     if both := sorted(set(channels) & set(test_channels)):
         raise ConfigError(f"channel {both[0]} is in channels and in test_channels; a sensor never seen is in one")
     return tuple(channels), tuple(test_channels)
+
+
+def _why_no_window(task: Task, name: str) -> str | None:
+    """Why a protocol that cuts records has no place for a window."""
+    if name == CROSS_SENSOR:
+        return None  # whole records
+    longest = max((stop - start for rows in task.dataset.split(name).values() for _, start, stop in rows), default=1.0)
+    held = int(longest * n_samples(task.dataset) + 1e-6)
+    if longest == 1.0 or held >= task.window_samples:
+        return None
+    return f"its stretches of {held} samples hold no window of {task.window_samples}"
 
 
 def _why_no_cross_sensor(task: Task) -> str | None:

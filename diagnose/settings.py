@@ -49,8 +49,8 @@ class TrainSettings:
     test_channels: tuple[str, ...] | None
     seeds: tuple[int, ...]
     sampling_rate_hz: float | None
-    window_samples: int
-    stride_samples: int
+    window_samples: int | None  # None: see `diagnose.window_choice`
+    stride_samples: int | None  # None: as long as a window
     normalise: str
     epochs: int
     patience: int
@@ -76,8 +76,11 @@ class TrainSettings:
     def __post_init__(self) -> None:
         if self.task not in TASKS:
             raise ConfigError(f"task must be one of {', '.join(TASKS)}, not {self.task!r}")
-        for name in ("window_samples", "stride_samples", "epochs", "patience", "n_seeds_control", "n_bootstrap"):
+        for name in ("epochs", "patience", "n_seeds_control", "n_bootstrap"):
             _check_whole(name, getattr(self, name), least=1)
+        for name in ("window_samples", "stride_samples"):
+            if getattr(self, name) is not None:
+                _check_whole(name, getattr(self, name), least=1)
         _check_whole("batch_size", self.batch_size, least=2)
         _check_whole("minirocket_features", self.minirocket_features, least=LEAST_ROCKET_FEATURES)
         if self.n_threads is not None:

@@ -34,6 +34,7 @@ from diagnose.settings import BOTH, TrainSettings
 from diagnose.tensorboard import need_tensorboard, write_scores
 from diagnose.train import device_of
 from diagnose.turns import check_turns, completed, n_points, wants_turns
+from diagnose.window_choice import chosen_window
 from diagnose.windows import NORMALISATIONS, SUBSETS, Task, check_names, plan_windows, subset_segments, task_of
 from gensig.errors import ConfigError
 from gensig.version import __version__
@@ -93,10 +94,12 @@ def plan_study(task: Task, settings: TrainSettings) -> tuple[tuple[str, ...], li
 def task_from(dataset: Any, settings: TrainSettings) -> Task:
     """Task that the settings describe on an open data set."""
     check_names("normalisation", (settings.normalise,), (*NORMALISATIONS, BOTH))
+    dataset = at_rate(dataset, settings.sampling_rate_hz)
+    window = settings.window_samples or chosen_window(dataset)[0]
     task = task_of(
-        at_rate(dataset, settings.sampling_rate_hz),
-        window_samples=settings.window_samples,
-        stride_samples=settings.stride_samples,
+        dataset,
+        window_samples=window,
+        stride_samples=settings.stride_samples or window,
         normalise="rms" if settings.normalise == BOTH else settings.normalise,
         classes=settings.classes,
         channels=settings.channels,
@@ -107,8 +110,14 @@ def task_from(dataset: Any, settings: TrainSettings) -> Task:
 
 
 def settings_for(dataset: Any, settings: TrainSettings) -> TrainSettings:
-    """The settings with what the network must know of an open data set, see `diagnose.turns.completed`."""
-    return replace(settings, model=completed(settings.model, dataset.attributes, settings.heads))
+    """The settings with what an open data set decides: `diagnose.turns.completed`, `diagnose.window_choice`."""
+    window = settings.window_samples or chosen_window(at_rate(dataset, settings.sampling_rate_hz))[0]
+    return replace(
+        settings,
+        model=completed(settings.model, dataset.attributes, settings.heads),
+        window_samples=window,
+        stride_samples=settings.stride_samples or window,
+    )
 
 
 def run_study(

@@ -216,9 +216,10 @@ def shaken(
 def twin_start(config: Mapping[str, Any], system: PairMachine, row: Mapping[str, Any]) -> Start:
     """Where the healthy twin of a unit at a condition starts."""
     rng = stream(read_seed(config), Stream.TWIN, int(str(row["condition_id"]).rpartition("-")[2]))
+    tooth = int(rng.integers(system.pair.pinion.n_teeth))
     return Start(
-        tooth_pinion=int(rng.integers(system.pair.pinion.n_teeth)),
-        tooth_wheel=int(rng.integers(system.pair.wheel.n_teeth)),
+        tooth_pinion=tooth,
+        tooth_wheel=system.driven_tooth(tooth, int(rng.integers(system.pair.wheel.n_teeth))),
         phase=float(rng.random()),
     )
 

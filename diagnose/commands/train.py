@@ -12,6 +12,7 @@ from gensig.errors import ConfigError
 
 if TYPE_CHECKING:
     from diagnose.settings import TrainSettings
+    from gensig.dataset.reader import Dataset
 
 HELP = """\
 Train a network and its baselines on splits of a data set and write a report. Default protocols: by_unit,
@@ -83,6 +84,7 @@ def _train_one(config: dict[str, Any]) -> None:
     from gensig.dataset.reader import open_dataset
 
     task = task_from(open_dataset(settings.data), settings)
+    _say_window(task.dataset, settings)
     settings = settings_for(task.dataset, settings)
     protocols, jobs = plan_study(task, settings)
     for name, reason in choose_protocols(task, settings.protocols)[1].items():
@@ -95,6 +97,16 @@ def _train_one(config: dict[str, Any]) -> None:
     print(f"report: {page}")
 
 
+def _say_window(dataset: Dataset, settings: TrainSettings) -> None:
+    """One line where the data set asks for another length of windows than usual and nobody gave one."""
+    from diagnose.turns import wants_turns
+    from diagnose.window_choice import chosen_window
+
+    why = None if settings.window_samples or wants_turns(settings.model) else chosen_window(dataset)[1]
+    if why:
+        print(why, file=sys.stderr, flush=True)
+
+
 def _train_life(settings: TrainSettings, out: Path) -> None:
     from diagnose.life_report import life_tables, write_life_report
     from diagnose.life_study import check_life_settings, plan_life_study, run_life_study
@@ -105,6 +117,7 @@ def _train_life(settings: TrainSettings, out: Path) -> None:
 
     check_life_settings(settings)
     task = task_from(open_dataset(settings.data), settings)
+    _say_window(task.dataset, settings)
     settings = settings_for(task.dataset, settings)
     protocols, left_out, jobs = plan_life_study(task, settings)
     for name, reason in left_out.items():

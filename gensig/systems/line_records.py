@@ -134,6 +134,15 @@ class LineMachine(PairMachine):
         check_memory(self.operating.duration, sensing.sampling_rate, len(sensing.channels), self.solver.precision)
         self.mesh_table()
 
+    def driven_tooth(self, tooth_pinion: int, drawn: int) -> int:
+        """Tooth of the driven gear at the start: in a drive that turns once a cycle the marks of its timing say it.
+
+        Where the gears do not come back to each other after every cycle, the drawn one.
+        """
+        pinion, wheel = self.pair.pinion.n_teeth, self.pair.wheel.n_teeth
+        is_timed = round(2.0 * self.ratio) == 1 and pinion % wheel == 0
+        return tooth_pinion % wheel if is_timed else drawn
+
     def draw_discs(self, rng: np.random.Generator) -> tuple[Disc, ...]:
         """The toothed wheels of one gearbox with their errors."""
         return tuple(draw_wheel(rng, wheel) for wheel in self.engine.wheels.values())

@@ -103,6 +103,10 @@ class PairMachine(ABC):
         """The toothed wheels of one gearbox with their errors; a pair has none."""
         return ()
 
+    def driven_tooth(self, tooth_pinion: int, drawn: int) -> int:
+        """Tooth of the driven gear that meets one of the driving gear at the start: the drawn one, put on anew."""
+        return drawn
+
     @property
     def most_pairs(self) -> int:
         """Pairs of teeth that may be followed at once."""
