@@ -1,18 +1,54 @@
 """Shared fixtures: the paper's rig as a configuration and as a machine."""
 
 import copy
-from collections.abc import Callable, Mapping
+import pickle
+from collections.abc import Callable, Iterator, Mapping
 from dataclasses import replace
 from typing import Any
 
 import numpy as np
 import pytest
+from hydra._internal.sources_registry import SourcesRegistry
+from hydra.core.plugins import Plugins
 
 from gensig.config import read_request
 from gensig.dynamics.pair import PairDynamics
 from gensig.geometry.gear import Gear
 from gensig.systems.registry import read_system
 from gensig.systems.spur_pair import SpurPair
+
+# The first file compiles the integrator, which takes a minute; those of the networks, which another process begins
+# with, need none of it and find everything compiled afterwards. Then what takes long, so that no process ends alone.
+FIRST = (
+    "tests/literature/test_validation_document.py",
+    "tests/unit/diagnose/",
+    "tests/pipeline/test_crash_safety.py",
+    "tests/unit/dataset/test_fuzz.py",
+    "tests/pipeline/",
+    "tests/unit/dataset/",
+)
+
+
+@pytest.hookimpl(trylast=True)
+def pytest_collection_modifyitems(items: list[pytest.Item]) -> None:
+    items.sort(key=lambda item: next((k for k, name in enumerate(FIRST) if item.nodeid.startswith(name)), len(FIRST)))
+
+
+@pytest.fixture(scope="session", autouse=True)
+def options_parsed_once() -> Iterator[None]:
+    """Hydra parses some thirty files at every composition; those of the package stay the same in a run of the tests."""
+    Plugins.instance()  # registers the sources
+    source = SourcesRegistry.instance().resolve("pkg")
+    parse, parsed = source._read_config, {}
+
+    def read(self: Any, path: Any) -> Any:
+        if str(path) not in parsed:
+            parsed[str(path)] = pickle.dumps(parse(self, path))
+        return pickle.loads(parsed[str(path)])
+
+    with pytest.MonkeyPatch.context() as patch:
+        patch.setattr(source, "_read_config", read)
+        yield
 
 
 @pytest.fixture(scope="session")

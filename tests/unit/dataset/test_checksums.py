@@ -51,15 +51,14 @@ def test_a_flipped_byte_anywhere_is_found_and_its_file_named(with_log: Path, nam
     path = with_log / name
     content = path.read_bytes()
     n = len(content)
-    for place in sorted({0, 1, n // 7, n // 5, n // 3, n // 2, 2 * n // 3, n - 2, n - 1}):
-        for bit in (0, 5):
-            damaged = bytearray(content)
-            damaged[place] ^= 1 << bit
-            path.write_bytes(damaged)
-            result = verify(with_log)
-            assert not result.complete
-            assert any(Path(name).name in problem for problem in result.problems), (place, bit, result.problems)
-            assert not any("\n" in problem for problem in result.problems)
+    for place, bit in ((0, 5), (n // 7, 0), (n // 3, 5), (n // 2, 0), (n - 1, 5)):
+        damaged = bytearray(content)
+        damaged[place] ^= 1 << bit
+        path.write_bytes(damaged)
+        result = verify(with_log)
+        assert not result.complete
+        assert any(Path(name).name in problem for problem in result.problems), (place, bit, result.problems)
+        assert not any("\n" in problem for problem in result.problems)
     path.write_bytes(content)
     assert verify(with_log).complete
 
