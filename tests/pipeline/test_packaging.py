@@ -16,8 +16,8 @@ from gensig.cli import main
 
 ROOT = Path(__file__).resolve().parents[2]
 RECORD = ["generate", "--quiet", "plan.n_records=1", "operating.duration_s=0.02"]
-# the cache of Numba lies beside the files of the wheel, wherever that of this run lies
-ENVIRONMENT = {key: value for key, value in os.environ.items() if key != "NUMBA_CACHE_DIR"}
+# gensig is that of the wheel, and the cache of Numba lies beside its files, wherever those of this run lie
+ENVIRONMENT = {key: value for key, value in os.environ.items() if key not in ("PYTHONPATH", "NUMBA_CACHE_DIR")}
 
 
 @pytest.fixture(scope="module")
