@@ -1,8 +1,9 @@
 """Shared fixtures: the paper's rig as a configuration and as a machine."""
 
 import copy
+import functools
 import pickle
-from collections.abc import Callable, Iterator, Mapping
+from collections.abc import Callable, Iterator, Mapping, Sequence
 from dataclasses import replace
 from typing import Any
 
@@ -11,6 +12,7 @@ import pytest
 from hydra._internal.sources_registry import SourcesRegistry
 from hydra.core.plugins import Plugins
 
+import gensig.compose
 from gensig.config import read_request
 from gensig.dynamics.pair import PairDynamics
 from gensig.geometry.gear import Gear
@@ -35,20 +37,34 @@ def pytest_collection_modifyitems(items: list[pytest.Item]) -> None:
 
 
 @pytest.fixture(scope="session", autouse=True)
-def options_parsed_once() -> Iterator[None]:
-    """Hydra parses some thirty files at every composition; those of the package stay the same in a run of the tests."""
+def compositions() -> Iterator[Any]:
+    """What the package's options are composed to, remembered; ``cache_clear`` forgets it.
+
+    Hydra parses some thirty files at every composition, which is half of the time of most commands; those of the
+    package stay the same in a run of the tests. A user's own options (``hydra.searchpath``) are always read anew.
+    """
     Plugins.instance()  # registers the sources
     source = SourcesRegistry.instance().resolve("pkg")
-    parse, parsed = source._read_config, {}
+    parse, parsed, compose = source._read_config, {}, gensig.compose.hydra_compose
 
     def read(self: Any, path: Any) -> Any:
         if str(path) not in parsed:
             parsed[str(path)] = pickle.dumps(parse(self, path))
         return pickle.loads(parsed[str(path)])
 
+    @functools.lru_cache(maxsize=32)
+    def remembered(config_name: str, overrides: tuple[str, ...]) -> Any:
+        return compose(config_name=config_name, overrides=list(overrides))
+
+    def composed(config_name: str, overrides: Sequence[str] = ()) -> Any:
+        if any(word.startswith("hydra.") for word in overrides):
+            return compose(config_name=config_name, overrides=list(overrides))
+        return remembered(config_name, tuple(overrides))
+
     with pytest.MonkeyPatch.context() as patch:
         patch.setattr(source, "_read_config", read)
-        yield
+        patch.setattr(gensig.compose, "hydra_compose", composed)
+        yield remembered
 
 
 @pytest.fixture(scope="session")

@@ -38,7 +38,8 @@ class TestDefaults:
         assert composed_config["plan"]["classes"] == ["healthy"]
         assert list(composed_config["classes"]) == ["healthy"]
 
-    def test_composing_twice_gives_the_same(self, composed_config):
+    def test_composing_twice_gives_the_same(self, composed_config, compositions):
+        compositions.cache_clear()
         assert read_request([]).config == composed_config
 
     def test_overrides_are_kept_as_typed(self):
