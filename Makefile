@@ -4,8 +4,8 @@ PYTHON ?= python3
 VENV ?= .venv
 PIP_ARGS ?=
 DEMO ?= demo
-# two test processes: half the time, 2 GB of memory each
-PYTEST_ARGS ?= -n 2 --dist loadfile
+# two test processes of one thread: half the time, 2 GB of memory each; files in the order of tests/conftest.py
+PYTEST_ARGS ?= -n 2 --dist loadfile --no-loadscope-reorder
 BIN := $(VENV)/bin
 
 .PHONY: demo test check clean
@@ -18,7 +18,7 @@ demo: $(VENV)/.installed
 	@echo "Look at $(DEMO)/report/report.html; the data set is $(DEMO)/data, described in its README.md"
 
 test: $(VENV)/.installed-test
-	$(BIN)/python -m pytest $(PYTEST_ARGS)
+	OMP_NUM_THREADS=1 OPENBLAS_NUM_THREADS=1 $(BIN)/python -m pytest $(PYTEST_ARGS)
 
 check: $(VENV)/.installed-test
 	$(BIN)/ruff check . && $(BIN)/ruff format --check . && $(BIN)/mypy && $(BIN)/lint-imports

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import copy
 import difflib
+import functools
 import warnings
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
@@ -66,11 +67,11 @@ def read_request(overrides: Sequence[str], *, config_dir: str | Path | None = No
     def class_fault(name: str | None) -> dict[str, Any]:
         words = [word for word in others if name is None or not word.startswith("fault=")]
         words += [] if name is None else [f"fault={name}"]
-        fault = base["fault"] if name is None else compose(CONFIG_NAME, words, config_dir=config_dir)["fault"]
+        fault = base["fault"] if name is None else _fault_option(words, config_dir)
         mine = {key: word for key, word in fault_words.items() if key.split(".")[1] in fault and key != "fault.vary"}
         unused.difference_update(mine)
         if mine:
-            fault = compose(CONFIG_NAME, [*words, *mine.values()], config_dir=config_dir)["fault"]
+            fault = _fault_option([*words, *mine.values()], config_dir)
         unused.difference_update(f"fault.{key}" for key in fault_vary if key in fault)
         option = {} if clear_fault_vary else fault.get("vary") or {}
         vary = {**option, **{key: spec for key, spec in fault_vary.items() if key in fault}}
@@ -92,6 +93,23 @@ def read_request(overrides: Sequence[str], *, config_dir: str | Path | None = No
     return Request(config=config, overrides=as_typed)
 
 
+def _fault_option(overrides: Sequence[str], config_dir: str | Path | None) -> dict[str, Any]:
+    """The fault of a configuration whose other groups are composed already, which has shown their mistakes.
+
+    No fault of the package refers to a key of another group, so only groups and keys of the fault itself count.
+    """
+    if config_dir is not None or any("${" in word for word in overrides):
+        return dict(compose(CONFIG_NAME, overrides, config_dir=config_dir)["fault"])
+    keys = [(word, word.lstrip("+~").partition("=")[0]) for word in overrides]
+    counting = (word for word, key in keys if "." not in key or key.startswith(("fault.", "hydra.")))
+    return copy.deepcopy(_packaged_fault(tuple(word for word in counting if not word.startswith(PLAIN_WORDS))))
+
+
+@functools.lru_cache(maxsize=64)
+def _packaged_fault(overrides: tuple[str, ...]) -> dict[str, Any]:
+    return dict(compose(CONFIG_NAME, overrides)["fault"])
+
+
 def _with_whole_parts(fault: dict[str, Any], config_dir: str | Path | None) -> dict[str, Any]:
     """A compound fault whose parts have every key: what a part leaves out is its kind's option, ``vary`` included."""
     if fault["kind"] != COMPOUND:
@@ -100,7 +118,7 @@ def _with_whole_parts(fault: dict[str, Any], config_dir: str | Path | None) -> d
     for part in fault_parts(fault):
         if part.get("kind") in (None, COMPOUND, "healthy"):
             raise ConfigError(f"fault.parts: kind = {part.get('kind')!r}; give the kind of one single fault")
-        option = compose(CONFIG_NAME, [f"fault={part['kind']}"], config_dir=config_dir)["fault"]
+        option = _fault_option([f"fault={part['kind']}"], config_dir)
         vary = {key: spec for key, spec in (option.get("vary") or {}).items() if key not in part}
         parts.append({**option, "vary": vary, **part})
     return {**fault, "parts": parts}
@@ -112,6 +130,7 @@ SECTIONS = (
 )  # fmt: skip
 OPTIONAL_SECTIONS = ("excitation",)
 PLAIN_KEYS = ("seed", "out")
+PLAIN_WORDS = tuple(f"{key}=" for key in PLAIN_KEYS)
 
 
 def _check_shape(config: Mapping[str, Any]) -> None:

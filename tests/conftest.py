@@ -1,18 +1,70 @@
 """Shared fixtures: the paper's rig as a configuration and as a machine."""
 
 import copy
-from collections.abc import Callable, Mapping
+import functools
+import pickle
+from collections.abc import Callable, Iterator, Mapping, Sequence
 from dataclasses import replace
 from typing import Any
 
 import numpy as np
 import pytest
+from hydra._internal.sources_registry import SourcesRegistry
+from hydra.core.plugins import Plugins
 
+import gensig.compose
 from gensig.config import read_request
 from gensig.dynamics.pair import PairDynamics
 from gensig.geometry.gear import Gear
 from gensig.systems.registry import read_system
 from gensig.systems.spur_pair import SpurPair
+
+# The first file compiles the integrator, which takes a minute; those of the networks, which another process begins
+# with, need none of it and find everything compiled afterwards. Then what takes long, so that no process ends alone.
+FIRST = (
+    "tests/literature/test_validation_document.py",
+    "tests/unit/diagnose/",
+    "tests/pipeline/test_crash_safety.py",
+    "tests/unit/dataset/test_fuzz.py",
+    "tests/pipeline/",
+    "tests/unit/dataset/",
+)
+
+
+@pytest.hookimpl(trylast=True)
+def pytest_collection_modifyitems(items: list[pytest.Item]) -> None:
+    items.sort(key=lambda item: next((k for k, name in enumerate(FIRST) if item.nodeid.startswith(name)), len(FIRST)))
+
+
+@pytest.fixture(scope="session", autouse=True)
+def compositions() -> Iterator[Any]:
+    """What the package's options are composed to, remembered; ``cache_clear`` forgets it.
+
+    Hydra parses some thirty files at every composition, which is half of the time of most commands; those of the
+    package stay the same in a run of the tests. A user's own options (``hydra.searchpath``) are always read anew.
+    """
+    Plugins.instance()  # registers the sources
+    source = SourcesRegistry.instance().resolve("pkg")
+    parse, parsed, compose = source._read_config, {}, gensig.compose.hydra_compose
+
+    def read(self: Any, path: Any) -> Any:
+        if str(path) not in parsed:
+            parsed[str(path)] = pickle.dumps(parse(self, path))
+        return pickle.loads(parsed[str(path)])
+
+    @functools.lru_cache(maxsize=32)
+    def remembered(config_name: str, overrides: tuple[str, ...]) -> Any:
+        return compose(config_name=config_name, overrides=list(overrides))
+
+    def composed(config_name: str, overrides: Sequence[str] = ()) -> Any:
+        if any(word.startswith("hydra.") for word in overrides):
+            return compose(config_name=config_name, overrides=list(overrides))
+        return remembered(config_name, tuple(overrides))
+
+    with pytest.MonkeyPatch.context() as patch:
+        patch.setattr(source, "_read_config", read)
+        patch.setattr(gensig.compose, "hydra_compose", composed)
+        yield remembered
 
 
 @pytest.fixture(scope="session")

@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+import math
+
 import numpy as np
 
 from gensig.dynamics import _line_layout as layout
@@ -95,3 +97,12 @@ class _Unchecked:
 
     def __init__(self, line: GearedLine, mesh: LineMesh) -> None:
         self.names, self.rotation, self.meshes = line.names, line.rotation, (mesh,)
+
+
+def steps(sampling_rate: float, oversampling: int) -> LineSolver:
+    return LineSolver(sampling_rate=sampling_rate, oversampling=oversampling, max_energy_residual=1e-3)
+
+
+def order_of(errors: list[float], ratio: float = 2.0) -> float:
+    """Measured order over all the halvings."""
+    return math.log(errors[0] / errors[-1], ratio) / (len(errors) - 1)

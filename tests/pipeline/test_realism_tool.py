@@ -200,7 +200,7 @@ def test_from_nothing_to_table_and_figures(tmp_path, monkeypatch, capsys):
     pictures = [tmp_path / "figures" / f"realism_{name}.png" for name in ("yardstick", "recording")]
     assert all(path.stat().st_size > 10_000 for path in pictures)
     plan = (tmp_path / "data" / "yardstick" / "plan.csv").stat().st_mtime_ns
-    assert realism.main(words) == 0  # what is there is read, not made again
+    assert realism.main(words[:5]) == 0  # what is there is read, not made again
     assert (tmp_path / "data" / "yardstick" / "plan.csv").stat().st_mtime_ns == plan
     capsys.readouterr()
     assert realism.main([*words, "--base", " ".join([*BASE, "seed=1"])]) == 1

@@ -51,7 +51,10 @@ def test_the_truth_scores_one_and_one_class_for_all_scores_chance(dataset, tmp_p
 
 def test_predictions_of_a_study_score_as_in_the_study(dataset, tmp_path):
     out = tmp_path / "out"
-    fast = ["epochs=1", "seeds=[0,1]", "batch_size=16", "window_samples=800", "stride_samples=800"]
+    fast = [
+        "epochs=1", "seeds=[0,1]", "batch_size=16", "window_samples=800", "stride_samples=800", "n_threads=1",
+        "n_bootstrap=20", "model.widths=[8,16]", "model.kernels=[32,5]", "model.strides=[8,4]",
+    ]  # fmt: skip
     assert main(["train", "data=x", f"out={out}", *fast, "protocols=[by_unit,random_window_leaky]"]) == 0
     study = json.loads((out / "metrics.json").read_text())["protocols"]["by_unit"]["methods"]
     scores = score_file(dataset, out / "predictions.csv")["scores"]

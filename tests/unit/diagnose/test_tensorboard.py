@@ -14,7 +14,7 @@ from diagnose.cli import main
 accumulator = pytest.importorskip("tensorboard.backend.event_processing.event_accumulator", reason="extra tensorboard")
 
 FAST = [
-    "window_samples=1200", "stride_samples=1000", "epochs=2", "seeds=[0,1]", "n_bootstrap=20", "n_threads=2",
+    "window_samples=1200", "stride_samples=1000", "epochs=2", "seeds=[0,1]", "n_bootstrap=20",
     "model.widths=[8,16]", "model.kernels=[32,5]", "model.strides=[8,4]", "protocols=[by_unit]",
     "baselines=[rms_threshold]",
 ]  # fmt: skip
@@ -22,13 +22,13 @@ FAST = [
 
 @pytest.fixture(scope="module")
 def studies(tmp_path_factory):
-    """The same study in two processes, with and without the log."""
+    """The same study with the log, in two processes, and without it, in this one."""
     folder = tmp_path_factory.mktemp("studies")
-    data = FakeDataset(n_units=12, records_per_unit=8, duration=0.5)
+    data = FakeDataset(n_units=12, records_per_unit=4, duration=0.3)
     with pytest.MonkeyPatch.context() as patch:
         patch.setattr(gensig.dataset.reader, "open_dataset", lambda path: data)
-        for name, option in (("with", "true"), ("without", "false")):
-            assert main(["train", "data=good", f"out={folder / name}", *FAST, f"tensorboard={option}"]) == 0
+        for name, options in (("with", ["n_threads=2", "tensorboard=true"]), ("without", ["n_threads=1"])):
+            assert main(["train", "data=good", f"out={folder / name}", *FAST, *options]) == 0
     return folder
 
 
