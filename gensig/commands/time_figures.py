@@ -113,7 +113,7 @@ def _spectra(axes: Any, line: EngineLine, found: Found, response: TimeResponse) 
         label = _name(line, node)
         axes.plot(frequencies[shown], np.degrees(spectra[row, shown]), color=COLOURS[row], linewidth=0.8, label=label)
     axes.set(
-        title="Angular displacement in time (grey: orders, dotted half ones)",
+        title="Angular displacement in time (dotted: half orders)",
         xlabel="frequency, Hz",
         ylabel="amplitude, degrees",
         yscale="log",
@@ -138,7 +138,8 @@ def _loads(axes: Any, line: EngineLine, linear: Any, response: TimeResponse) -> 
         places, [f"{name}\n{apart:.0%}" for name, apart in zip(line.mesh_names, response.contact_loss, strict=True)]
     )
     axes.set(title="Tooth force of the meshes, least to greatest", xlabel="mesh, share of time apart", ylabel="kN")
-    axes.margins(y=0.2)
+    lowest, highest = (float(end) / 1e3 for end in (min(least.min(), linear.min()), max(greatest.max(), linear.max())))
+    axes.set_ylim(1.1 * lowest, 1.3 * highest)
     axes.legend(fontsize=8)
 
 

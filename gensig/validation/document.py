@@ -206,7 +206,7 @@ TITLES = {
     "tooth_force_in_time": "Forces of the pump drive's teeth in a cycle",
     "root_stress_in_time": "Root stress under the greatest tooth force of a cycle, ISO's load point",
     "root_stress_in_time_over_mesh": "The same over the mesh, largest of a cycle",
-    "stress_drop_in_time": "Root stress less by dampers, in time",
+    "stress_ratio_in_time": "Root stress with dampers over that without, in time",
     "safety_in_time": "Safety under the greatest tooth force of a cycle",
 }
 INTRO = """# Validation

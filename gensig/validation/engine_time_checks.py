@@ -134,7 +134,7 @@ TIMES: dict[str, TimeCheck] = {
     "time.greatest_tooth_force": lambda case, at: case.tooth_force(at)[1],
     "time.root_stress": lambda case, at: float(_wheel(case, at).stress),
     "time.largest_root_stress": _largest,
-    "time.stress_drop": lambda case, at: 1.0 - float(_wheel(case, at).stress / _wheel(case.without, at).stress),
+    "time.stress_ratio": lambda case, at: float(_wheel(case, at).stress / _wheel(case.without, at).stress),
     "time.safety_paper": lambda case, at: float(_wheel(case, at).safety.paper),
     "time.safety_iso": lambda case, at: float(_wheel(case, at).safety.iso),
 }

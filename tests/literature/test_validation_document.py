@@ -55,8 +55,10 @@ def out_of_step(written: str, computed: str) -> list[str]:
 
 def _close(old: re.Match[str], new: re.Match[str]) -> bool:
     a, b = (float(match[0].removesuffix(" %").lstrip("~")) for match in (old, new))
+    if old[1] != new[1]:
+        return False
     if old[1]:
-        return bool(new[1]) and math.isclose(a, b, rel_tol=0.15, abs_tol=15.0 if old[2] else 1e-9)
+        return math.isclose(a, b, rel_tol=0.15, abs_tol=15.0 if old[2] else 1e-9)
     return math.isclose(a, b, rel_tol=2e-3 if old[2] else 1e-3, abs_tol=0.03 if old[2] else 1e-9)
 
 
