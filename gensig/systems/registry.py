@@ -56,7 +56,8 @@ def read_spur_pair(config: Mapping[str, Any]) -> SpurPair:
         raise ConfigError(
             "heat: system=spur_pair has gears as they are drawn; system=helical_pair takes heat, and spur gears too"
         )
-    return SpurPair(pair=read_pair(config), **_read_machine(config, read_pair(config)))
+    pair = read_pair(config)
+    return SpurPair(pair=pair, **_read_machine(config, pair))
 
 
 def read_helical_pair(config: Mapping[str, Any]) -> HelicalPair:
