@@ -30,6 +30,7 @@ from diagnose.oracle import fit_oracle_indicators, oracle_windows
 from diagnose.predictions import Prediction, Rows
 from diagnose.probe import fit_probe
 from diagnose.protocols import HEALTHY_ONLY, OPEN_PROTOCOLS
+from diagnose.reference import Levels, reference_table
 from diagnose.settings import TrainSettings
 from diagnose.sham import sham_method, sham_task
 from diagnose.tensorboard import epoch_log
@@ -204,6 +205,14 @@ def _fit_baseline(task: Task, settings: TrainSettings, protocol: str, method: st
         scale = input_scale(sets[0])
         train, validation, test = (spectrum_table(windows, scale) for windows in sets)
         return nearest_spectrum(train, _with_validation(validation, test), n_classes=n_classes)
+    if method == "reference":
+        levels: Levels = {}
+        train, validation, test = (
+            reference_table(task.part(protocol, subset), subset_segments(task, protocol, subset), levels)
+            for subset in SUBSETS
+        )
+        judged = _with_validation(validation, test)
+        return indicator_model(train, validation, judged, n_classes=n_classes, with_level=True)
     train, validation, test = (
         feature_table(
             task.part(protocol, subset),

@@ -9,7 +9,7 @@ from typing import Any
 
 from gensig.errors import ConfigError
 
-BASELINES = ("indicators", "indicators_without_level", "rms_threshold", "nearest_spectrum", "minirocket")
+BASELINES = ("indicators", "indicators_without_level", "rms_threshold", "nearest_spectrum", "minirocket", "reference")
 DEVICES = ("auto", "cpu", "cuda")
 HEADS = ("severity", "gear")
 TASKS = ("classes", "remaining_life")

@@ -1,0 +1,62 @@
+"""Levels by tooth: the tooth that changed is named, wherever the record starts and however loud the sensor is."""
+
+import numpy as np
+import pytest
+
+from gensig.signals.tooth_levels import changed_teeth, tooth_levels
+
+RATE, ROTATION, TEETH, BAND = 10_000.0, 5.0, 20, (1000.0, 3000.0)
+
+
+def rattle(*, start=0.0, gains=None, seconds=4.0, seed=0):
+    """Noise whose amplitude follows the tooth in mesh; the first sample is `start` teeth after tooth 0 came in."""
+    time = np.arange(round(seconds * RATE)) / RATE
+    tooth = np.floor(time * ROTATION * TEETH + start).astype(int) % TEETH
+    gains = np.ones(TEETH) if gains is None else gains
+    return gains[tooth] * np.random.default_rng(seed).normal(size=time.size)
+
+
+def levels(signal, start=0.0):
+    return tooth_levels(signal, RATE, ROTATION, TEETH, band=BAND, start=start)
+
+
+@pytest.mark.parametrize("start", [0.0, 7.0, 13.4, 59.9])
+def test_a_tooth_twice_as_loud_is_six_decibels_up_under_its_own_number(start):
+    gains = np.ones(TEETH)
+    gains[11] = 2.0
+    found = levels(rattle(start=start, gains=gains), start) - levels(rattle(start=start), start)
+    assert found.argmax() == 11
+    # the filter smears the edges of a passage of 10 ms by less than one
+    np.testing.assert_allclose(found[11], 20 * np.log10(2), atol=0.6)
+    np.testing.assert_allclose(np.delete(found, [10, 11, 12]), 0.0, atol=1e-3)
+
+
+def test_channels_side_by_side_are_each_their_own():
+    both = np.stack([rattle(seed=1), rattle(seed=2)])
+    np.testing.assert_allclose(levels(both), np.stack([levels(both[0]), levels(both[1])]), rtol=1e-12)
+
+
+def test_changes_do_not_see_gain_and_are_none_where_nothing_changed():
+    quiet, other = levels(rattle(seed=3)), levels(rattle(seed=4))
+    np.testing.assert_allclose(changed_teeth(quiet + 12.0, other), changed_teeth(quiet, other), atol=1e-9)
+    np.testing.assert_array_equal(changed_teeth(quiet, quiet), np.zeros(TEETH))
+
+
+def test_a_pattern_of_the_machine_goes_away_and_the_tooth_stays():
+    pattern = 10 ** np.random.default_rng(5).uniform(-0.5, 0.5, TEETH)
+    bad = pattern.copy()
+    loudest = int(pattern.argmax())
+    bad[loudest] *= 0.6
+    found = changed_teeth(levels(rattle(gains=bad, seed=6)), levels(rattle(gains=pattern, seed=7)))
+    assert found.argmin() == loudest
+    assert found[loudest] < -3.0
+    alone = levels(rattle(gains=bad, seed=6))
+    assert alone.argmin() != loudest  # without the reference the pattern hides it
+
+
+def test_a_silent_signal_is_finite_and_a_short_one_refused():
+    assert np.isfinite(levels(np.zeros(40_000))).all()
+    with pytest.raises(ValueError, match="no whole turn"):
+        levels(rattle(seconds=0.15))
+    with pytest.raises(ValueError, match="must lie inside"):
+        tooth_levels(rattle(), RATE, ROTATION, TEETH, band=(4000.0, 6000.0))
