@@ -98,10 +98,10 @@ def _fault_option(overrides: Sequence[str], config_dir: str | Path | None) -> di
 
     No fault of the package refers to a key of another group, so only groups and keys of the fault itself count.
     """
-    if config_dir is not None or any("${" in word for word in overrides):
+    if config_dir is not None or any("${" in word or word.startswith("hydra.") for word in overrides):
         return dict(compose(CONFIG_NAME, overrides, config_dir=config_dir)["fault"])
     keys = [(word, word.lstrip("+~").partition("=")[0]) for word in overrides]
-    counting = (word for word, key in keys if "." not in key or key.startswith(("fault.", "hydra.")))
+    counting = (word for word, key in keys if "." not in key or key.startswith("fault."))
     return copy.deepcopy(_packaged_fault(tuple(word for word in counting if not word.startswith(PLAIN_WORDS))))
 
 

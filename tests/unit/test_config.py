@@ -374,7 +374,7 @@ class TestFaultOptionAlone:
         assert _fault_option(words, None) == compose("generate", words)["fault"]
 
     def test_a_reference_to_another_group_is_followed(self):
-        words = ["gear.normal_module_mm=3", "fault.crack_depth_mm=${gear.normal_module_mm}", "fault=crack"]
+        words = ["operating.torque_nm=3", "fault.crack_depth_mm=${operating.torque_nm}", "fault=crack"]
         request = read_request(["plan.classes=[crack]", *words[:2]])
         assert request.config["classes"]["crack"]["crack_depth_mm"] == 3
         assert _fault_option(words, None)["crack_depth_mm"] == 3
