@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Iterator, Mapping
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from typing import Any
 
 import numpy as np
@@ -15,16 +15,18 @@ from gensig.errors import ConfigError
 from gensig.faults.crack import Crack
 from gensig.faults.pitting import DistributedPitting
 from gensig.faults.registry import fault_parts, read_faults
-from gensig.life.crack_growth import CrackGrowth, CrackGrowthOptions, crack_growth
+from gensig.life.crack_growth import CrackGrowth, CrackGrowthOptions
 from gensig.life.growth import Course, GrowthLaw, grow
 from gensig.life.history import History, draw_history, given_history
 from gensig.life.life_options import LifeOptions, WearGrowthOptions, read_life
-from gensig.life.pit_growth import PitGrowthOptions, pit_growth
+from gensig.life.pit_growth import PitGrowthOptions
 from gensig.life.snapshots import snapshot_times
 from gensig.life.wear_growth import WearGrowth, WearTable, wear_table
 from gensig.rows import Stream, read_seed, replace_key, stream, whole_number
+from gensig.systems.life_laws import crack_law, pit_law
+from gensig.systems.machines import read_machine
 from gensig.systems.pair_machine import PairMachine
-from gensig.systems.registry import read_system
+from gensig.systems.registry import LINE
 from gensig.systems.wear import read_wear_case, wear_fault
 from gensig.units import from_si
 from gensig.vibration_limit import limited_by_vibration
@@ -70,11 +72,12 @@ def snapshots(config: Mapping[str, Any]) -> Iterator[Snapshot]:
     """
     seed, options, names = read_seed(config), read_life(config["life"]), list(config["plan"]["classes"])
     n_units = _checked_units(config, options)
-    machine = read_system(config)
+    machine = read_machine(config)
     points = _setpoints(config, options, n_units)
     n_setpoints = len(points) // n_units
     torque = np.array([one.get(TORQUE, machine.operating.torque) for one in points]).reshape(n_units, n_setpoints)
-    speed = np.array([one.get(SPEED, from_si("speed_rpm", machine.operating.speed)) for one in points])
+    set_speed = from_si("speed_rpm", machine.operating.speed / machine.ratio)
+    speed = np.array([one.get(SPEED, set_speed) for one in points])
     speed = speed.reshape(torque.shape) * (2.0 * np.pi / 60.0)
     faults = {
         name: draw_faults(config, config["classes"][name], np.arange(n_units), stream(seed, Stream.FAULT, index))
@@ -87,7 +90,8 @@ def snapshots(config: Mapping[str, Any]) -> Iterator[Snapshot]:
         fault, rng = faults[names[label]][unit], stream(seed, Stream.LIFE, unit)
         past = stream(seed, Stream.LIFE_HISTORY, unit)
         history = _history(options, speed[unit], torque[unit], past)
-        law, course = laws.live(fault, history, rng)
+        history = replace(history, speed=history.speed * machine.ratio)
+        law, loads, course = laws.live(fault, history, rng)
         drifts = {key: float(np.exp(one.scatter * rng.standard_normal())) for key, one in options.drift.items()}
         times = snapshot_times(course, options.snapshot_spacing, options.snapshot_count, options.snapshot_every)
         for k, running in enumerate(times.tolist()):
@@ -96,7 +100,7 @@ def snapshots(config: Mapping[str, Any]) -> Iterator[Snapshot]:
             values = dict(points[unit * n_setpoints + setpoint])
             for key, drift in options.drift.items():
                 values[key] = _number(config, key, values) * drift.factor(running, drifts[key])
-            told = {} if law is None else law.told(size, float(torque[unit, setpoint]))
+            told = {} if law is None else law.told(size, float(loads[setpoint].max()))
             grown = {} if law is None else law.fault(size)
             clock = course.value("clock", place)
             yield Snapshot(
@@ -129,34 +133,43 @@ class _Laws:
         self._cracks: dict[Crack, CrackGrowth] = {}
         self._table: WearTable | None = None
         self._config, self._torques = config, (least, greatest)
+        self._loads: dict[tuple[float, float], Array] = {}
 
     def live(
         self, fault: Mapping[str, Any], history: History, rng: np.random.Generator
-    ) -> tuple[GrowthLaw | None, Course]:
-        """Law and course of one unit; without a law the unit is sound all its life."""
+    ) -> tuple[GrowthLaw | None, list[Array], Course]:
+        """Law, loads of a tooth at every set-point in N m, and course of one unit; without a law the unit is sound all
+        its life."""
         own = self.options.laws.get(fault["kind"])
         if own is None:  # the same draws for every class
             rng.standard_normal(2)
-            return None, grow(np.array([0.0, 1.0]), np.full((len(history.torque), 1), np.inf), history, 0.0)
+            return None, [], grow(np.array([0.0, 1.0]), np.full((len(history.torque), 1), np.inf), history, 0.0)
         rate, first = own.spread.draw(rng)
         law, start = self._law(fault, history, first)
-        return law, grow(law.sizes, law.turns(history.torque) / rate, history, start)
+        loads = [self._met(*point) for point in zip(history.speed.tolist(), history.torque.tolist(), strict=True)]
+        return law, loads, grow(law.sizes, law.turns(loads) / rate, history, start)
+
+    def _met(self, speed: float, torque: float) -> Array:
+        """Loads that a tooth meets at a set-point, (mesh,) N m."""
+        if (speed, torque) not in self._loads:
+            self._loads[speed, torque] = self.machine.mesh_torques(speed, torque)
+        return self._loads[speed, torque]
 
     def _law(self, fault: Mapping[str, Any], history: History, first: float) -> tuple[GrowthLaw, float]:
         """The law of a fault and the size at which it begins."""
         own, (made,) = self.options.laws[fault["kind"]], read_faults(fault)
-        pair, material = self.machine.pair, self.machine.material
+        pair = self.machine.pair
         if isinstance(own, CrackGrowthOptions):
             assert isinstance(made, Crack)
             shape = _like(made)
             if shape not in self._cracks:
-                self._cracks[shape] = crack_growth(pair, material, shape, own)
+                self._cracks[shape] = crack_law(self.machine, shape, own, self._torques)
             law = self._cracks[shape]
             gear = {"pinion": pair.pinion, "wheel": pair.wheel}[made.gear]
             return law, own.start_share * first * made.root_chord(gear)
         if isinstance(own, PitGrowthOptions):
             assert isinstance(made, DistributedPitting)
-            return pit_growth(pair, material, made, own, first), 0.0
+            return pit_law(self.machine, made, own, first, self._torques), 0.0
         assert isinstance(own, WearGrowthOptions)
         if self._table is None:
             sound = {**self._config, "fault": HEALTHY}
@@ -195,6 +208,10 @@ def _checked_units(config: Mapping[str, Any], options: LifeOptions) -> int:
             grown = ", ".join(("healthy", *options.laws))
             raise ConfigError(
                 f"plan.classes: nothing makes {name} grow; this life has {grown}: take life=mixed, or other classes"
+            )
+        if config["system"]["kind"] == LINE and "wear" in kinds:
+            raise ConfigError(
+                f"plan.classes: {name}: wear is not followed on a drive line; take life=crack_growth or life=pit_growth"
             )
     for key in options.drift:
         replace_key({name: dict(part) if isinstance(part, dict) else part for name, part in config.items()}, key, 0.0)

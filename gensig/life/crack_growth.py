@@ -81,7 +81,8 @@ class CrackGrowth(GrowthLaw):
     ----------
     sizes : (node,) m               depth
     width : (node,) m               along the face that goes with it
-    intensity : (node,) Pa sqrt(m)  stress-intensity range at 1 N m on the pinion
+    torques : (torque,) N m         of the pinion, ascending, at which the next is known; one where it does not matter
+    intensity : (torque, node) Pa sqrt(m)    stress-intensity range at 1 N m on the pinion
     meshes : float                  of the cracked tooth in a turn of the pinion
     """
 
@@ -89,6 +90,7 @@ class CrackGrowth(GrowthLaw):
     crack: Crack
     sizes: Array
     width: Array
+    torques: Array
     intensity: Array
     face_width: float
     meshes: float
@@ -98,7 +100,7 @@ class CrackGrowth(GrowthLaw):
 
         Source: Paris & Erdogan (1963). A tooth is unloaded between two meshes, so that the range is the greatest value.
         """
-        found = np.interp(size, self.sizes, self.intensity) * torque
+        found = np.interp(size, self.sizes, self._intensity(torque)) * torque
         grown = self.options.coefficient * (found / 1e6) ** self.options.exponent
         return np.where(found > self.options.threshold, grown * self.meshes, 0.0)
 
@@ -112,8 +114,16 @@ class CrackGrowth(GrowthLaw):
 
     def told(self, size: float, torque: float) -> dict[str, float]:
         """The stress-intensity range at the record's load."""
-        value = float(np.interp(size, self.sizes, self.intensity)) * torque
+        value = float(np.interp(size, self.sizes, self._intensity(torque))) * torque
         return {"stress_intensity_range_mpa_sqrt_m": value / 1e6}
+
+    def _intensity(self, torque: float) -> Array:
+        """(node,) Pa sqrt(m) at 1 N m: between two torques it goes with the logarithm, beyond them it stays."""
+        if len(self.torques) == 1:
+            return self.intensity[0]
+        place = float(np.interp(np.log(torque), np.log(self.torques), np.arange(len(self.torques))))
+        row = min(int(place), len(self.torques) - 2)
+        return (row + 1 - place) * self.intensity[row] + (place - row) * self.intensity[row + 1]
 
 
 def crack_growth(pair: GearPair, material: Material, crack: Crack, options: CrackGrowthOptions) -> CrackGrowth:
@@ -129,25 +139,24 @@ def crack_growth(pair: GearPair, material: Material, crack: Crack, options: Crac
     ------
     ConfigError    for a crack on the compressed side, and gears of which two pairs always carry
     """
-    if crack.crack_side == "compression":
-        raise ConfigError("life: a crack under compression does not open, so it does not grow; crack_side=tension")
+    require_open(crack)
     if pair.transverse_contact_ratio >= 2.0 or pair.pinion.helix_angle != 0.0:
         raise ConfigError(
-            f"life: crack growth asks for spur gears of which one pair carries everything somewhere; the transverse "
-            f"contact ratio is {pair.transverse_contact_ratio:.3f}"
+            f"life: crack growth of system=spur_pair asks for spur gears of which one pair carries everything "
+            f"somewhere, and the transverse contact ratio is {pair.transverse_contact_ratio:.3f}; take "
+            f"system=helical_pair, whose pairs share the load"
         )
     gear = {"pinion": pair.pinion, "wheel": pair.wheel}[crack.gear]
     zone = np.linspace(pair.path_of_contact - pair.base_pitch, pair.base_pitch, N_PLACES)
     curvature = np.asarray(pair.pinion_curvature(zone) if crack.gear == "pinion" else pair.wheel_curvature(zone))
     chord, strain = crack.root_chord(gear), material.in_plane("plane_strain")
     tooth = healthy_tooth(gear)
+    sizes = crack_depths(options, chord)
 
     def compliance(depth: float, width: float | None) -> Array:
         cut = replace(crack, crack_depth=depth, crack_width=width, crack_front="straight").apply(tooth, 0)
         return crack_compliance(cut, curvature, strain, allow_extrapolation=True)
 
-    least, end = options.start_share / options.most * chord, options.end_share * chord
-    sizes = np.geomspace(least, end, N_DEPTHS)
     if options.width_share == 1.0:
         width = np.full(N_DEPTHS, gear.face_width)
         through = np.array([compliance(float(depth), None) for depth in sizes])
@@ -161,10 +170,22 @@ def crack_growth(pair: GearPair, material: Material, crack: Crack, options: Crac
         crack=crack,
         sizes=sizes,
         width=width,
-        intensity=np.sqrt(np.maximum(greatest, 0.0) * strain.youngs_modulus) * force,
+        torques=np.ones(1),
+        intensity=np.sqrt(np.maximum(greatest, 0.0) * strain.youngs_modulus)[None] * force,
         face_width=gear.face_width,
         meshes=1.0 if crack.gear == "pinion" else 1.0 / pair.ratio,
     )
+
+
+def require_open(crack: Crack) -> None:
+    """Refuse a crack that no load opens."""
+    if crack.crack_side == "compression":
+        raise ConfigError("life: a crack under compression does not open, so it does not grow; crack_side=tension")
+
+
+def crack_depths(options: CrackGrowthOptions, chord: float) -> Array:
+    """Depths at which rates are looked at, from the least first one to the end, (node,) m."""
+    return np.geomspace(options.start_share / options.most * chord, options.end_share * chord, N_DEPTHS)
 
 
 def _slope(depth: Array, values: Array) -> Array:
@@ -178,13 +199,7 @@ def _part_of_face(sizes: Array, face: float, options: CrackGrowthOptions, compli
     """Width that goes with each depth, (node,) m, and the greatest energy release rate at 1 N, (node,) N/m."""
     from scipy.interpolate import RectBivariateSpline
 
-    depths = sizes[::WIDTH_STEP]
-    strips = np.arange(WIDTH_STEP, N_STRIPS + 1, WIDTH_STEP)
-    widths = face * strips / N_STRIPS
-    if options.width_share * face < widths[0]:
-        raise ConfigError(
-            f"life.crack.width_share = {options.width_share:g} must be {WIDTH_STEP / N_STRIPS:g} or more of the face"
-        )
+    depths, widths = sizes[::WIDTH_STEP], crack_widths(face, options)
     table = np.array([[compliance(float(a), float(w)) for w in widths] for a in depths])
     splines = [RectBivariateSpline(np.log(depths), widths, table[:, :, k]) for k in range(table.shape[2])]
 
@@ -203,3 +218,18 @@ def _part_of_face(sizes: Array, face: float, options: CrackGrowthOptions, compli
             ratio = (by_width / by_depth) ** (0.5 * options.exponent) if by_depth > 0.0 else 0.0
             now = min(now + ratio * float(sizes[k + 1] - depth), face)
     return width, greatest
+
+
+def crack_widths(face: float, options: CrackGrowthOptions) -> Array:
+    """Widths that are looked at of a crack over part of the face, (width,) m.
+
+    Raises
+    ------
+    ConfigError    for a first width below the least of them
+    """
+    widths = face * np.arange(WIDTH_STEP, N_STRIPS + 1, WIDTH_STEP) / N_STRIPS
+    if options.width_share * face < widths[0]:
+        raise ConfigError(
+            f"life.crack.width_share = {options.width_share:g} must be {WIDTH_STEP / N_STRIPS:g} or more of the face"
+        )
+    return widths

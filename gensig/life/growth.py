@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import math
 from abc import ABC, abstractmethod
+from collections.abc import Sequence
 from dataclasses import dataclass
 from typing import Any
 
@@ -33,10 +34,17 @@ class GrowthLaw(ABC):
         """What a record may tell of its size besides the fault itself, by name with its unit."""
         return {}
 
-    def turns(self, torque: Array) -> Array:
-        """Turns of the pinion that each cell between two sizes takes, (setpoint, cell); inf where nothing grows."""
+    def turns(self, torque: Array | Sequence[Array]) -> Array:
+        """Turns of the pinion that each cell between two sizes takes, (setpoint, cell); inf where nothing grows.
+
+        Parameters
+        ----------
+        torque : (setpoint,) N m, or for each set-point those of its load spectrum, (mesh,) N m, all equally likely
+        """
         middle, width = 0.5 * (self.sizes[1:] + self.sizes[:-1]), np.diff(self.sizes)
-        rates = np.array([self.rate(middle, float(one)) for one in torque])
+        rates = np.array(
+            [np.mean([self.rate(middle, float(one)) for one in np.atleast_1d(row)], axis=0) for row in torque]
+        )
         return np.divide(width, rates, out=np.full_like(rates, np.inf), where=rates > 0.0)
 
 

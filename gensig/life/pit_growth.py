@@ -63,7 +63,8 @@ class PitGrowth(GrowthLaw):
 
     Parameters
     ----------
-    stress_at_one : float    contact stress in Pa at 1 N m; it goes with the root of the torque
+    torques : (torque,) N m         of the pinion, ascending, at which the next is known; one where it does not matter
+    stress_at_one : (torque,) Pa    contact stress at 1 N m; it goes with the root of the torque
     first_diameter : float   median diameter of the first pits, m
     spread_area : float      mean area of a pit over that of one of median diameter
     area : float             of a flank, m2
@@ -72,14 +73,16 @@ class PitGrowth(GrowthLaw):
     options: PitGrowthOptions
     sizes: Array
     meshes: float
-    stress_at_one: float
+    torques: Array
+    stress_at_one: Array
     first_diameter: float
     spread_area: float
     area: float
 
     def rate(self, size: Array, torque: float) -> Array:
         """Damage a turn of the pinion, (size,): Miner's sum (ISO 6336-6)."""
-        stress = self.stress_at_one * math.sqrt(torque)
+        at_one = float(np.interp(math.log(torque), np.log(self.torques), self.stress_at_one))
+        stress = at_one * math.sqrt(torque)
         lasting = self.options.cycles * (self.options.strength / stress) ** self.options.exponent
         return np.full(np.shape(size), self.meshes / lasting)
 
@@ -117,22 +120,32 @@ def contact_stress(pair: GearPair, material: Material, torque: float) -> float:
 
 
 def pit_growth(
-    pair: GearPair, material: Material, pits: DistributedPitting, options: PitGrowthOptions, first: float = 1.0
+    pair: GearPair,
+    material: Material,
+    pits: DistributedPitting,
+    options: PitGrowthOptions,
+    first: float = 1.0,
+    stresses: tuple[Array, Array] | None = None,
 ) -> PitGrowth:
     """The law of pits like ``pits``, whose diameter is that of the first ones, times ``first``.
 
+    ``stresses`` are torques of the pinion in N m, ascending, and contact stresses there in Pa, (torque,) both; None
+    takes the nominal ones of a spur pair.
+
     Raises
     ------
-    ConfigError    for helical gears, and an end that such pits do not reach
+    ConfigError    for helical gears without stresses, and an end that such pits do not reach
     """
-    if pair.pinion.helix_angle != 0.0:
-        raise ConfigError("life: pit growth asks for spur gears: its contact stress is that of one spur pair")
+    if stresses is None and pair.pinion.helix_angle != 0.0:
+        raise ConfigError("life: the nominal contact stress of pit growth is that of a spur pair; take its slices")
+    torques, stress = (np.ones(1), np.array([contact_stress(pair, material, 1.0)])) if stresses is None else stresses
     gear = {"pinion": pair.pinion, "wheel": pair.wheel}[pits.gear]
     law = PitGrowth(
         options=options,
         sizes=np.array([0.0, 1.0]),
         meshes=1.0 if pits.gear == "pinion" else 1.0 / pair.ratio,
-        stress_at_one=contact_stress(pair, material, 1.0),
+        torques=torques,
+        stress_at_one=stress / np.sqrt(torques),
         first_diameter=pits.pit_diameter * first,
         spread_area=math.exp(2.0 * pits.diameter_scatter**2),
         area=flank_area(gear),

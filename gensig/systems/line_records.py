@@ -147,6 +147,12 @@ class LineMachine(PairMachine):
         """The toothed wheels of one gearbox with their errors."""
         return tuple(draw_wheel(rng, wheel) for wheel in self.engine.wheels.values())
 
+    def mesh_torques(self, speed: float, torque: float) -> Array:
+        """Loads of the record mesh from the running machine, (mesh,) N m; ``torque`` is the brake's."""
+        from gensig.systems.line_loads import mesh_torques  # which runs such machines
+
+        return mesh_torques(self, speed, torque)
+
     def simulate_alone(self, run: Run) -> CleanRecord | SimulationError | None:
         """One record; nothing of a drive line is simulated side by side."""
         try:

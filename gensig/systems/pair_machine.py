@@ -108,6 +108,18 @@ class PairMachine(ABC):
         return drawn
 
     @property
+    def ratio(self) -> float:
+        """Speed of the pinion's shaft over the one that ``operating`` is told for."""
+        return 1.0
+
+    def mesh_torques(self, speed: float, torque: float) -> Array:
+        """Loads that a tooth meets at a set-point, one a mesh, all equally likely, as torques of the pinion in N m.
+
+        ``speed`` rad/s of the pinion, ``torque`` N m of the set-point; (mesh,).
+        """
+        return np.array([torque])
+
+    @property
     def most_pairs(self) -> int:
         """Pairs of teeth that may be followed at once."""
         return N_PAIRS

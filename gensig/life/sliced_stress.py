@@ -1,0 +1,36 @@
+"""Contact stress of a pair in slices, as the pitting line asks it: one number for the whole flank."""
+
+from __future__ import annotations
+
+import numpy as np
+from numpy.typing import NDArray
+
+from gensig.material import Material
+from gensig.mesh.slice_pressure import contact_pressure
+from gensig.mesh.slices import SlicedMesh, loaded_contact
+
+Array = NDArray[np.float64]
+
+
+def sliced_contact_stress(mesh: SlicedMesh, material: Material, torques: Array, exponent: float) -> Array:
+    """Contact stress whose damage is that of the flank's slices on average, (torque,) Pa.
+
+    Parameters
+    ----------
+    torques : (torque,) N m    of the pinion
+    exponent : of the stress in the pitting line
+
+    Hertz's pressure of every slice as it passes the pitch point, where ISO 6336-2 takes it, with its load from the
+    equilibrium of the mesh; s = (mean of p_j^q over the face)^(1 / q), which is Miner's damage averaged over the face:
+    pits come anywhere on it.
+    """
+    pair = mesh.pair
+    roll = pair.pitch_point + mesh.lag
+    own = np.arange(len(roll))
+    found = []
+    for torque in torques:
+        contact = loaded_contact(mesh, roll, float(torque) / pair.pinion.base_radius)
+        pressure = contact_pressure(mesh, contact, material)
+        passing = pressure[own, np.argmax(contact.pair_index == 0, axis=1), own]
+        found.append(np.average(passing**exponent, weights=mesh.slice_width) ** (1.0 / exponent))
+    return np.array(found)

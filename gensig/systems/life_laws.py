@@ -1,0 +1,64 @@
+"""Laws of growth of a machine's gears: of a spur mesh by its one pair in contact, of slices by their own loads."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+from functools import lru_cache
+
+import numpy as np
+from numpy.typing import NDArray
+
+from gensig.faults.crack import Crack
+from gensig.faults.pitting import DistributedPitting
+from gensig.life.crack_growth import CrackGrowth, CrackGrowthOptions, crack_growth
+from gensig.life.pit_growth import PitGrowth, PitGrowthOptions, pit_growth
+from gensig.life.sliced_crack import sliced_crack_growth
+from gensig.life.sliced_stress import sliced_contact_stress
+from gensig.systems.helical_pair import HelicalPair
+from gensig.systems.pair_machine import PairMachine
+from gensig.systems.sliced_pair import SlicedPair
+
+Array = NDArray[np.float64]
+
+N_TORQUES = 3  # how slices share the load hangs little on the torque
+
+
+def crack_law(
+    machine: PairMachine, crack: Crack, options: CrackGrowthOptions, torques: tuple[float, float]
+) -> CrackGrowth:
+    """The law of a crack like ``crack``; ``torques`` in N m are the least and the greatest that it meets."""
+    if not isinstance(machine, HelicalPair):
+        return crack_growth(machine.pair, machine.material, crack, options)
+    flanks = _for_lives(machine.flanks)
+    return sliced_crack_growth(flanks.pair, flanks.material, flanks.sliced_mesh, crack, options, _between(torques))
+
+
+def pit_law(
+    machine: PairMachine,
+    pits: DistributedPitting,
+    options: PitGrowthOptions,
+    first: float,
+    torques: tuple[float, float],
+) -> PitGrowth:
+    """The law of pits like ``pits``, the first ones ``first`` times as large; ``torques`` as in ``crack_law``."""
+    if not isinstance(machine, HelicalPair):
+        return pit_growth(machine.pair, machine.material, pits, options, first)
+    looked = _between(torques)
+    stress = _stresses(_for_lives(machine.flanks), tuple(looked.tolist()), options.exponent)
+    return pit_growth(machine.pair, machine.material, pits, options, first, (looked, stress))
+
+
+def _for_lives(flanks: SlicedPair) -> SlicedPair:
+    """The pair as laws of growth take it: contact on its path only, like the spur laws, and calibrated cracks."""
+    mesh = replace(flanks.mesh, law="paper", crack="calibrated", allow_extrapolation=True)
+    return replace(flanks, mesh=mesh)
+
+
+def _between(torques: tuple[float, float]) -> Array:
+    least, greatest = torques
+    return np.array([least]) if least == greatest else np.geomspace(least, greatest, N_TORQUES)
+
+
+@lru_cache(maxsize=8)
+def _stresses(flanks: SlicedPair, torques: tuple[float, ...], exponent: float) -> Array:
+    return sliced_contact_stress(flanks.sliced_mesh(), flanks.material, np.array(torques), exponent)
