@@ -145,6 +145,12 @@ def _parse(overrides: Sequence[str]) -> list[Any]:
 def _explain(error: Exception, config_name: str, overrides: Sequence[str]) -> str:
     """One line for a failed composition, with the nearest existing names."""
     text = " ".join(str(error).split())
+    if "Config group override must be" in text:
+        groups = set(_groups())
+        for one in _parse(overrides):
+            key, value = str(one.key_or_group), one.value()
+            if key in groups and not isinstance(value, str | list):
+                return f"{one.input_line}: a group takes one of its options: {', '.join(options(key))}"
     if isinstance(error, ValueError) and not isinstance(error, HydraException):
         return text
     for pattern in (r"Could not override '([^']+)'", r"Key '([^']+)' is not in struct"):
