@@ -10,13 +10,11 @@ import numpy as np
 from gensig.dynamics.engine_torques import EngineTorques
 from gensig.errors import ConfigError
 from gensig.life.strength import RELIABILITY, reliability
-from gensig.mesh.options import read_mesh_options
 from gensig.systems.cycle_statistics import fluctuations, order_amplitudes, typical_extremes
 from gensig.systems.engine_dampers import DynamicRootStress, passes_of_a_cycle
 from gensig.systems.engine_line import EngineLine, read_engine_line
 from gensig.systems.line_sweep import Sweep, SweepWay, sweep_response
-from gensig.systems.line_time import TimeResponse, own_meshes, time_response
-from gensig.systems.registry import read_material
+from gensig.systems.line_time import TimeResponse, configured_meshes, time_response
 from gensig.systems.time_root_stress import typical_largest
 from gensig.units import from_si, to_si
 
@@ -32,7 +30,7 @@ def simulate_time(
     if not 0.0 < duration <= LONGEST_TIME:
         raise ConfigError(f"--time {duration:g}: give seconds above 0, at most {LONGEST_TIME:g}")
     speed, torque = torques.speed, torques.brake_torque
-    own = own_meshes(line, read_material(config), read_mesh_options(config["mesh"]), speed, torque)
+    own = configured_meshes(line, config, speed, torque)
     return time_response(line, speed, torque, own=own, nodes=nodes, duration=duration)
 
 
@@ -53,7 +51,7 @@ def simulate_sweep(
             f"--sweep {text}: give low and high speed in r/min and the seconds from one to the other, at most "
             f"{LONGEST_TIME:g}"
         )
-    own = own_meshes(line, read_material(config), read_mesh_options(config["mesh"]), 0.5 * (low + high), torque)
+    own = configured_meshes(line, config, 0.5 * (low + high), torque)
     return sweep_response(line, low, high, seconds, torque, own=own, nodes=nodes, n_orders=n_orders)
 
 

@@ -2,8 +2,9 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
+from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
@@ -11,7 +12,7 @@ from numpy.typing import NDArray
 from gensig.dynamics.newmark import LineSolver
 from gensig.material import Material
 from gensig.mesh.load_distribution import loaded_pair_table
-from gensig.mesh.options import MeshOptions
+from gensig.mesh.options import MeshOptions, read_mesh_options
 from gensig.systems.engine_line import EngineLine
 from gensig.systems.line_machine import (
     Governor,
@@ -22,6 +23,7 @@ from gensig.systems.line_machine import (
     running_line,
     steady_course,
 )
+from gensig.systems.registry import read_material
 
 Array = NDArray[np.float64]
 
@@ -66,6 +68,13 @@ def own_meshes(
             force = reference_force(machine, place, float(forces[place]))
             found[place] = OwnMesh(table=loaded_pair_table(named_by_side(pair), material, options, force=force))
     return found
+
+
+def configured_meshes(
+    machine: EngineLine, config: Mapping[str, Any], speed: float, torque: float
+) -> dict[int, OwnMesh]:
+    """The same with the material and the mesh options of a configuration."""
+    return own_meshes(machine, read_material(config), read_mesh_options(config["mesh"]), speed, torque)
 
 
 def time_response(

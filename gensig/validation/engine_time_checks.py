@@ -16,12 +16,10 @@ import numpy as np
 from numpy.typing import NDArray
 
 from gensig.compose import compose
-from gensig.mesh.options import read_mesh_options
 from gensig.systems.cycle_statistics import fluctuations, order_amplitudes, typical_extremes
 from gensig.systems.engine_dampers import DynamicRootStress, mesh_between, passes_of_a_cycle, read_mesh_strength
 from gensig.systems.engine_line import EngineLine, read_engine_line
-from gensig.systems.line_time import TimeResponse, own_meshes, time_response
-from gensig.systems.registry import read_material
+from gensig.systems.line_time import TimeResponse, configured_meshes, time_response
 from gensig.systems.time_root_stress import root_stress_in_time, typical_largest
 
 Array = NDArray[np.float64]
@@ -51,7 +49,7 @@ class TimeCase:
     def response(self) -> TimeResponse:
         """Its motion over `DURATION`."""
         speed, torque = self.line.engine.reference.speed, self.line.engine.reference.torque
-        own = own_meshes(self.line, read_material(self.config), read_mesh_options(self.config["mesh"]), speed, torque)
+        own = configured_meshes(self.line, self.config, speed, torque)
         return time_response(self.line, speed, torque, own=own, nodes=NODES, duration=DURATION)
 
     @property
