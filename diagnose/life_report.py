@@ -92,6 +92,7 @@ def write_life_report(
                 ("metrics.json", "everything in numbers, with settings and versions."),
                 ("predictions.csv", "what each method said of each test record, with its interval."),
                 ("scores.csv", "the scores as a table."),
+                ("models/", "each network, for diagnose evaluate, predict and export."),
             ],
             folded=True,
         ),
