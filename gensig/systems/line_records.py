@@ -132,8 +132,11 @@ class LineMachine(PairMachine):
 
     def simulate_alone(self, run: Run) -> CleanRecord | SimulationError | None:
         """One record; nothing of a drive line is simulated side by side."""
+        from threadpoolctl import threadpool_limits
+
         try:
-            return self._record(run)
+            with threadpool_limits(1):  # more threads sum in another order, and rattle makes another record of that
+                return self._record(run)
         except SimulationError as error:
             return error
 
