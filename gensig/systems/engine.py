@@ -43,6 +43,8 @@ def read_engine(values: Mapping[str, Any]) -> Engine:
     ConfigError    for unknown or missing keys, and values that make no engine
     """
     check_group(PLACE, values)
+    if values.get("kind", "engine") != "engine":
+        raise ConfigError(f"{PLACE}.kind = {values['kind']!r}; allowed: engine, motor_and_load")
     if "motor" in values:
         raise ConfigError(
             f"{PLACE}.motor is of a motor, {PLACE}.kind = engine of an engine: a line is turned by one of them; take "
@@ -53,8 +55,6 @@ def read_engine(values: Mapping[str, Any]) -> Engine:
             raise ConfigError(f"{PLACE}: unknown key '{key}'; known: {', '.join(KEYS)}")
     if missing := [key for key in KEYS if key not in values]:
         raise ConfigError(f"{PLACE}: missing {', '.join(missing)}")
-    if values["kind"] != "engine":
-        raise ConfigError(f"{PLACE}.kind = {values['kind']!r}; allowed: engine, motor_and_load")
     plunger, plunger_nodes = _read_pump(values["injection_pump"])
     return Engine(
         cylinder=read(Cylinder, values["cylinder"], f"{PLACE}.cylinder"),
