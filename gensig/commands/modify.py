@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import json
 import sys
 from argparse import Namespace
 from collections.abc import Sequence
@@ -11,7 +10,8 @@ from pathlib import Path
 from typing import Any
 
 from gensig.commands.console import one_line_warnings, replaced_file
-from gensig.commands.flanks import FIGURE_TYPES, sound_pair
+from gensig.commands.flanks import sound_pair
+from gensig.commands.output import check_outputs, option_file, write_outputs
 from gensig.config import read_request
 from gensig.errors import ConfigError
 from gensig.mesh.modification import FlankModification, PairModification
@@ -26,11 +26,8 @@ def modify_flank(arguments: Namespace) -> int:
     """Search, print the front, write the chosen modification as an option of the group ``modification``."""
     if arguments.points < 1:
         raise ConfigError(f"--points {arguments.points}: give 1 for the least ripple alone, 3 or more for a front")
-    if arguments.plot is not None and Path(arguments.plot).suffix not in FIGURE_TYPES:
-        raise ConfigError(f"--plot {arguments.plot}: the name must end in {', '.join(FIGURE_TYPES)}")
-    target = Path(arguments.out)
-    if target.suffix != ".yaml" or not target.stem.isidentifier():
-        raise ConfigError(f"--out {arguments.out}: give a file NAME.yaml in a folder {GROUP}, NAME without spaces")
+    check_outputs(arguments)
+    target = option_file(arguments.out, GROUP)
     request = read_request(arguments.overrides, config_dir=arguments.config_dir)
     with one_line_warnings("gensig"):
         system = sound_pair(request.config)
@@ -45,15 +42,14 @@ def modify_flank(arguments: Namespace) -> int:
     chosen = _chosen(front, before)
     with replaced_file(target) as path:
         path.write_text(option_text(chosen, system, cases), encoding="utf-8")
-    if arguments.json:
-        content = {"before": _content(before), "chosen": _content(chosen), "front": [_content(one) for one in front]}
-        with replaced_file(arguments.json) as path:
-            path.write_text(json.dumps(content, indent=1) + "\n", encoding="utf-8")
-    if arguments.plot:
+    content = {"before": _content(before), "chosen": _content(chosen), "front": [_content(one) for one in front]}
+
+    def draw(path: Path) -> None:
         from gensig.commands.flank_figures import plot_front
 
-        with replaced_file(arguments.plot) as path:
-            plot_front(system, before, chosen, front, path)
+        plot_front(system, before, chosen, front, path)
+
+    write_outputs(arguments, content, draw)
     print(f"{'':<12}{'peak to peak':>14}{'line load':>16}   worst of {_cases(cases)}")
     for name, one in (("before", before), *((("chosen" if one is chosen else "front"), one) for one in front)):
         print(f"{name:<12}{one.ripple * 1e6:>11.4f} um{one.line_load * 1e-3:>11.2f} N/mm")

@@ -3,25 +3,41 @@
 from __future__ import annotations
 
 import argparse
-from collections.abc import Callable
-from dataclasses import dataclass
+from collections.abc import Callable, Mapping
+from dataclasses import dataclass, field
 
 OVERRIDES = "OVERRIDES are group=option and key=value, as in Hydra: fault=crack operating.speed_rpm=1200 seed=3."
 
 
 @dataclass(frozen=True)
 class Verb:
-    """One verb: what it does, an example, its own arguments, and ``module:function`` that runs it."""
+    """One verb: what it does, an example, its own arguments, and ``module:function`` that runs it.
+
+    ``one`` says what exit status 1 means, where the verb has it. ``instead`` maps keys that it does not read to the
+    flag that does their work.
+    """
 
     summary: str
     example: str
     runs: str
     arguments: Callable[[argparse.ArgumentParser], None]
+    one: str | None = None
+    instead: Mapping[str, str] = field(default_factory=dict)
 
 
 def _overrides(parser: argparse.ArgumentParser) -> None:
     parser.add_argument("overrides", nargs="*", metavar="OVERRIDES", help=OVERRIDES)
     parser.add_argument("--config-dir", metavar="DIR", help="folder with groups and options of your own")
+
+
+def _options(parser: argparse.ArgumentParser) -> None:
+    parser.add_argument("what", nargs="?", metavar="GROUP[=OPTION]", help="options of a group, or keys of an option")
+    parser.add_argument("--config-dir", metavar="DIR", help="folder with groups and options of your own")
+    parser.add_argument("--json", action="store_true", help="print as JSON")
+
+
+def _completion(parser: argparse.ArgumentParser) -> None:
+    parser.add_argument("shell", choices=("bash", "zsh", "fish"), help="the shell that reads it")
 
 
 def _generate(parser: argparse.ArgumentParser) -> None:
@@ -201,12 +217,19 @@ def _export(parser: argparse.ArgumentParser) -> None:
 
 
 VERBS: dict[str, Verb] = {
+    "options": Verb(
+        "groups, their options, and the keys of an option, a line each",
+        "gensig options\n  gensig options fault\n  gensig options fault=crack --json",
+        "gensig.commands.options:list_options",
+        _options,
+    ),
     "generate": Verb(
         "make a labelled data set",
         "gensig generate experiment=quickstart out=runs/quickstart\n"
         "  gensig generate -m fault=healthy,crack plan.n_records=20 out=runs/two",
         "gensig.commands.datasets:generate",
         _generate,
+        one="records failed and are marked so, or the set is incomplete: gensig resume DIR goes on",
     ),
     "plan": Verb(
         "dry run: records, bytes, predicted time",
@@ -220,24 +243,28 @@ VERBS: dict[str, Verb] = {
         "gensig resume runs/quickstart\n  gensig resume runs/quickstart executor=dask executor.n_workers=4",
         "gensig.commands.datasets:resume",
         _resume,
+        one="records failed and are marked so, or the set is incomplete: gensig resume DIR goes on",
     ),
     "finalize": Verb(
         "close a data set made by array jobs, or accept an edited card",
         "gensig finalize runs/large",
         "gensig.commands.datasets:finalize",
         _folder,
+        one="records failed and are marked so in the closed set",
     ),
     "verify": Verb(
         "is a data set whole and unaltered?",
         "gensig verify runs/quickstart",
         "gensig.commands.datasets:verify",
         _verify,
+        one="damaged, altered or incomplete; every problem is printed",
     ),
     "reproduce": Verb(
         "simulate records of a data set again and compare",
         "gensig reproduce runs/quickstart --records 20",
         "gensig.commands.datasets:reproduce",
         _reproduce,
+        one="records came out otherwise than recorded",
     ),
     "inspect": Verb(
         "what is in a data set or file",
@@ -286,6 +313,7 @@ VERBS: dict[str, Verb] = {
         "  gensig simulate --from runs/quickstart --record 7 --twin --output twin.h5",
         "gensig.commands.physics:simulate",
         _simulate,
+        one="the record did not stay finite, or its solver gave up; nothing is written",
     ),
     "stiffness": Verb(
         "mesh stiffness of sound and faulty teeth",
@@ -306,6 +334,7 @@ VERBS: dict[str, Verb] = {
         "gensig forced-response system=engine_gear_train excitation=engine_v20 --run 650 1750 10 --plot response.png",
         "gensig.commands.forced_response:forced_response",
         _forced_response,
+        instead={"operating.speed_rpm": "--speed", "operating.torque_nm": "--torque"},
     ),
     "tune-damper": Verb(
         "torsional dampers that make the worst tooth force of an engine's mesh least; root stress before and after",
@@ -313,6 +342,7 @@ VERBS: dict[str, Verb] = {
         "--out mine/system/damped.yaml --plot dampers.png",
         "gensig.commands.tune_damper:tune_damper",
         _tune_damper,
+        instead={"operating.speed_rpm": "--run", "operating.torque_nm": "--torque"},
     ),
     "twin": Verb(
         "a configuration like a measured healthy machine",
@@ -321,10 +351,17 @@ VERBS: dict[str, Verb] = {
         "gensig.commands.twin:twin",
         _twin,
     ),
+    "completion": Verb(
+        "what to source so that the tab key completes both commands",
+        'gensig completion bash\n  eval "$(gensig completion zsh)"\n  gensig completion fish',
+        "gensig.completion:completion",
+        _completion,
+    ),
     "validate": Verb(
         "every printed figure of the source papers against ours",
         "gensig validate --markdown docs/validation.md",
         "gensig.commands.validate:validate",
         _validate,
+        one="rows have another verdict than they declare",
     ),
 }
