@@ -103,7 +103,7 @@ class _File:
             return group.value, None if option.value == "null" else option.value, self._comment(group, option)
         return None, node.value, ""
 
-    def keys(self, prefix: str = "") -> Iterator[Key]:
+    def entries(self, prefix: str = "") -> Iterator[Key]:
         """Every key that holds a value; what is nested is dotted."""
         if isinstance(self.tree, yaml.MappingNode):
             yield from self._keys(self.tree, prefix, top=True)
@@ -167,7 +167,7 @@ def sections() -> dict[str, str]:
     """Parts of the primary files that offer no choice, each with its primary file: mesh, solver, quality, ..."""
     found: dict[str, str] = {}
     for primary in PRIMARY:
-        for key in _primary(primary).keys():
+        for key in _primary(primary).entries():
             head, dot, _ = key.name.partition(".")
             found.setdefault(head if dot else primary, primary)
     return found
@@ -175,7 +175,7 @@ def sections() -> dict[str, str]:
 
 def section_keys(name: str) -> list[Key]:
     """Keys of one part of a primary file; of those at its top where ``name`` is that file's."""
-    keys = list(_primary(sections()[name]).keys())
+    keys = list(_primary(sections()[name]).entries())
     return [key for key in keys if (key.name.startswith(f"{name}.") if name not in PRIMARY else "." not in key.name)]
 
 
@@ -208,7 +208,7 @@ def _option_keys(group: str, option: str, package: str, config_dir: str | Path |
         elif name is not None and not name.startswith("override") and other is not None:
             inner, _, place = name.partition("@")
             yield from _option_keys(f"{group}/{inner}", other, f"{package}.{place or inner}", config_dir)
-    yield from file.keys("" if file.is_global else f"{package}.")
+    yield from file.entries("" if file.is_global else f"{package}.")
 
 
 def _find(group: str, option: str, config_dir: str | Path | None) -> _File:

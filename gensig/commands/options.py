@@ -73,8 +73,8 @@ def _one_option(group: str, option: str, folder: str | None) -> tuple[Any, list[
         raise ConfigError(f"no option '{option}' of {group}; {nearest.hint(option, found)}")
     keys, beside = option_keys(group, option, folder), chosen_beside(group, option, folder)
     about = found[option].about
-    content = {"group": group, "option": option, "about": about, "chooses": beside}
-    content["keys"] = [asdict(key) for key in keys]
+    listed = [asdict(key) for key in keys]
+    content = {"group": group, "option": option, "about": about, "chooses": beside, "keys": listed}
     head = [f"{group}={option}: {about}"]
     if beside:
         head.append(f"chooses too: {' '.join(f'{name}={other}' for name, other in beside.items())}")
