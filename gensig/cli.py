@@ -47,7 +47,12 @@ def _run(words: list[str]) -> int:
 
     module, function = verb.runs.split(":")
     with one_line_warnings(PROGRAM):
-        return int(getattr(importlib.import_module(module), function)(arguments))
+        status = int(getattr(importlib.import_module(module), function)(arguments))
+    if verb.instead is not None:
+        from gensig.commands.reading import say_unread
+
+        say_unread(arguments, verb.instead)
+    return status
 
 
 def verb_parser(name: str) -> Parser:

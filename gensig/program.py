@@ -69,6 +69,8 @@ class Parser(argparse.ArgumentParser):
         if not word.startswith("-"):
             return f"'{word}' is one word too many"
         flags = [flag for action in self._actions for flag in action.option_strings if flag.startswith("--")]
+        if "=" in word and not nearest.near(word.partition("=")[0], flags):
+            return f"no flag '{word}'; groups and keys have no dashes: {word.lstrip('-')}"
         return f"no flag '{word}'; {nearest.hint(word.partition('=')[0], flags)}"
 
     def _wanted(self, name: str) -> str:

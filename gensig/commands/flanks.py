@@ -13,7 +13,7 @@ import numpy as np
 from gensig.commands.console import one_line_warnings
 from gensig.commands.heat_report import heat_content, heat_report, print_heat
 from gensig.commands.output import check_outputs, write_outputs
-from gensig.config import read_request
+from gensig.commands.reading import read_watched
 from gensig.errors import ConfigError
 from gensig.faults.registry import read_faults
 from gensig.systems.registry import read_sliced_pair
@@ -26,9 +26,9 @@ LEAST_SHARE = 0.05  # of the highest stiffness of a pair; less is one slice that
 def transmission_error(arguments: Namespace) -> int:
     """Static transmission error under load over one mesh period: JSON, a figure, or a summary."""
     check_outputs(arguments)
-    request = read_request(arguments.overrides, config_dir=arguments.config_dir)
+    config = read_watched(arguments)
     with one_line_warnings("gensig"):
-        system, faults = read_sliced_pair(request.config), read_faults(request.config["fault"])
+        system, faults = read_sliced_pair(config), read_faults(config["fault"])
         sound = system.transmission_error()
         result = system.transmission_error(faults) if faults else sound
         _warn_of_lost_contact(system, sound)

@@ -22,7 +22,7 @@ from gensig.commands.engine_in_time import (
     without_dampers,
 )
 from gensig.commands.output import check_outputs, plain, write_outputs
-from gensig.config import read_request
+from gensig.commands.reading import read_watched
 from gensig.dynamics.engine_torques import EngineTorques
 from gensig.dynamics.forced import SteadyResponse, Waterfall, disturbance_response, over_cycle, run_of_speeds
 from gensig.errors import ConfigError
@@ -66,7 +66,7 @@ class Found:
 def forced_response(arguments: Namespace) -> int:
     """Speed fluctuation, spectra and tooth forces: JSON, a figure, or a summary."""
     check_outputs(arguments)
-    config = read_request(arguments.overrides, config_dir=arguments.config_dir).config
+    config = read_watched(arguments)
     line = read_engine_line(config)
     found = _find(line, arguments, config["seed"])
     if (arguments.time, arguments.sweep) != (None, None) and line.engine.pressure_decides_torque:

@@ -10,7 +10,7 @@ from typing import Any
 import numpy as np
 
 from gensig.commands.output import check_outputs, write_outputs
-from gensig.config import read_request
+from gensig.commands.reading import read_watched
 from gensig.dynamics.modal import Modes
 from gensig.errors import ConfigError
 from gensig.faults.registry import read_faults
@@ -23,7 +23,7 @@ SHOWN = 12  # modes in the summary
 def modes(arguments: Namespace) -> int:
     """Natural frequencies, damping ratios, shapes and energy shares: JSON, a figure, or a summary."""
     check_outputs(arguments)
-    config = read_request(arguments.overrides, config_dir=arguments.config_dir).config
+    config = read_watched(arguments)
     line = read_line(config)
     found = line.modes()
     content = modes_content(line, found)

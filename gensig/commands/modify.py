@@ -9,10 +9,10 @@ from dataclasses import fields, replace
 from pathlib import Path
 from typing import Any
 
-from gensig.commands.console import one_line_warnings, replaced_file
+from gensig.commands.console import one_line_warnings
 from gensig.commands.flanks import sound_pair
-from gensig.commands.output import check_outputs, option_file, write_outputs
-from gensig.config import read_request
+from gensig.commands.output import check_outputs, option_file, write_option, write_outputs
+from gensig.commands.reading import read_watched
 from gensig.errors import ConfigError
 from gensig.mesh.modification import FlankModification, PairModification
 from gensig.systems.flank_optimum import Cases, Optimum, judge, optimise
@@ -28,9 +28,9 @@ def modify_flank(arguments: Namespace) -> int:
         raise ConfigError(f"--points {arguments.points}: give 1 for the least ripple alone, 3 or more for a front")
     check_outputs(arguments)
     target = option_file(arguments.out, GROUP)
-    request = read_request(arguments.overrides, config_dir=arguments.config_dir)
+    config = read_watched(arguments)
     with one_line_warnings("gensig"):
-        system = sound_pair(request.config)
+        system = sound_pair(config)
         given = system.modification.misalignment
         cases = Cases(
             torques=tuple(arguments.torques or (system.torque,)),
@@ -40,8 +40,6 @@ def modify_flank(arguments: Namespace) -> int:
         before = judge(system, plain, cases)
         front = optimise(system, cases, n_front=arguments.points, seed=arguments.seed, on_done=_say)
     chosen = _chosen(front, before)
-    with replaced_file(target) as path:
-        path.write_text(option_text(chosen, system, cases), encoding="utf-8")
     content = {"before": _content(before), "chosen": _content(chosen), "front": [_content(one) for one in front]}
 
     def draw(path: Path) -> None:
@@ -53,7 +51,7 @@ def modify_flank(arguments: Namespace) -> int:
     print(f"{'':<12}{'peak to peak':>14}{'line load':>16}   worst of {_cases(cases)}")
     for name, one in (("before", before), *((("chosen" if one is chosen else "front"), one) for one in front)):
         print(f"{name:<12}{one.ripple * 1e6:>11.4f} um{one.line_load * 1e-3:>11.2f} N/mm")
-    print(f"{target}: take it with {GROUP}={target.stem} --config-dir {target.parent.parent}")
+    write_option(target, option_text(chosen, system, cases))
     return 0
 
 

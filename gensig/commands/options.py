@@ -85,6 +85,9 @@ def _check_group(group: str, folder: str | None) -> None:
     names = [one.name for one in groups(folder)]
     if group not in names:
         known = [*names, *sections()]
+        having = [name for name in names if group in [one.name for one in options(name, folder)]]
+        if having:
+            raise ConfigError(f"'{group}' is an option; type gensig options {having[0]}={group}")
         raise ConfigError(f"no group '{group}'; {nearest.hint(group, known)}; `gensig options` says what each is")
 
 

@@ -41,8 +41,18 @@ def option_file(name: str, group: str) -> Path:
     target = Path(name)
     if target.suffix != ".yaml" or not target.stem.isidentifier():
         raise ConfigError(f"--out {name}: give a file NAME.yaml in a folder {group}, NAME without spaces")
-    check_file("--out", name)
+    if target.parent.name != group or target.parent.exists():  # a new folder of that name is made with the option
+        check_file("--out", name)
     return target
+
+
+def write_option(target: Path, text: str) -> None:
+    """Write an option of a group, with its folder where that is new, and say how to take it."""
+    target.parent.mkdir(parents=True, exist_ok=True)
+    with replaced_file(target) as path:
+        path.write_text(text, encoding="utf-8")
+    folder = target.absolute().parent
+    print(f"{target}: take it with {folder.name}={target.stem} --config-dir {target.parent.parent}")
 
 
 def write_outputs(arguments: Namespace, content: Mapping[str, Any], draw: Callable[[Path], None]) -> None:

@@ -12,6 +12,7 @@ from numpy.typing import NDArray
 
 from gensig.commands.console import replaced_file
 from gensig.commands.output import FIGURE_TYPES, check_file, check_outputs, write_outputs
+from gensig.commands.reading import read_watched
 from gensig.config import read_request
 from gensig.errors import ConfigError
 from gensig.faults.registry import read_faults, without_vary
@@ -31,14 +32,14 @@ RECORD_TYPES = (".h5", ".hdf5", ".csv")
 def stiffness(arguments: Namespace) -> int:
     """Mesh stiffness of a gear pair: curves to JSON, a figure, or a summary."""
     check_outputs(arguments)
-    request = read_request(arguments.overrides, config_dir=arguments.config_dir)
-    if request.config["system"].get("kind") == SLICED:
+    config = read_watched(arguments)
+    if config["system"].get("kind") == SLICED:
         from gensig.commands.flanks import sliced_stiffness
 
-        return sliced_stiffness(request.config, arguments)
-    system = read_system(request.config)
+        return sliced_stiffness(config, arguments)
+    system = read_system(config)
     assert isinstance(system, SpurPair)  # the other kind has gone
-    faults = read_faults(request.config["fault"])
+    faults = read_faults(config["fault"])
     curves = system.stiffness_curves(faults)
     if system.pair.transverse_contact_ratio < 1.0:
         print(

@@ -13,10 +13,9 @@ import numpy as np
 import yaml
 from numpy.typing import NDArray
 
-from gensig.commands.console import replaced_file
 from gensig.commands.forced_response import MOST_SPEEDS
-from gensig.commands.output import check_outputs, option_file, write_outputs
-from gensig.config import read_request
+from gensig.commands.output import check_outputs, option_file, write_option, write_outputs
+from gensig.commands.reading import read_watched
 from gensig.dynamics.damper_tuning import tune_dampers
 from gensig.dynamics.dampers import TorsionalDamper
 from gensig.dynamics.forced import SteadyResponse
@@ -55,7 +54,7 @@ def tune_damper(arguments: Namespace) -> int:
     """Search, write the line with its dampers as an option of the group ``system``, print both states."""
     check_outputs(arguments)
     target = option_file(arguments.out, GROUP)
-    config = read_request(arguments.overrides, config_dir=arguments.config_dir).config
+    config = read_watched(arguments)
     line = read_engine_line(config)
     if line.engine.pressure_decides_torque:
         raise ConfigError("excitation.pressure.file is of one operating point; tune-damper runs over a range of speeds")
@@ -75,8 +74,6 @@ def tune_damper(arguments: Namespace) -> int:
         for name, one, added in (("before", line, ()), ("after", with_own_dampers(line, dampers), dampers))
     }
     content = tuning_content(states, dampers, mesh, speeds, torque)
-    with replaced_file(target) as path:
-        path.write_text(option_text(config[GROUP], dampers, content), encoding="utf-8")
 
     def draw(path: Path) -> None:
         from gensig.commands.damper_figure import plot_dampers
@@ -85,7 +82,7 @@ def tune_damper(arguments: Namespace) -> int:
 
     write_outputs(arguments, content, draw)
     _print(content)
-    print(f"{target}: take it with {GROUP}={target.stem} --config-dir {target.parent.parent}")
+    write_option(target, option_text(config[GROUP], dampers, content))
     return 0
 
 

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import argparse
 from collections.abc import Callable, Mapping
-from dataclasses import dataclass, field
+from dataclasses import dataclass
 
 OVERRIDES = "OVERRIDES are group=option and key=value, as in Hydra: fault=crack operating.speed_rpm=1200 seed=3."
 
@@ -14,7 +14,8 @@ class Verb:
     """One verb: what it does, an example, its own arguments, and ``module:function`` that runs it.
 
     ``one`` says what exit status 1 means, where the verb has it. ``instead`` maps keys that it does not read to the
-    flag that does their work.
+    flag that does their work, or to nothing; it stands where the verb looks at one machine, and what else was typed
+    and not read is named as well.
     """
 
     summary: str
@@ -22,7 +23,7 @@ class Verb:
     runs: str
     arguments: Callable[[argparse.ArgumentParser], None]
     one: str | None = None
-    instead: Mapping[str, str] = field(default_factory=dict)
+    instead: Mapping[str, str] | None = None
 
 
 def _overrides(parser: argparse.ArgumentParser) -> None:
@@ -284,6 +285,7 @@ VERBS: dict[str, Verb] = {
         "  gensig transmission-error gear=xiamen_23_84 operating.torque_nm=20 --json te.json",
         "gensig.commands.flanks:transmission_error",
         _stiffness,
+        instead={"out": "--json or --plot"},
     ),
     "modify-flank": Verb(
         "reliefs and crowning that are best for your torques and misalignments",
@@ -292,6 +294,7 @@ VERBS: dict[str, Verb] = {
         "--out mine/modification/robust.yaml --plot front.png",
         "gensig.commands.modify:modify_flank",
         _modify_flank,
+        instead={"out": "--out, --json or --plot"},
     ),
     "root-stress": Verb(
         "bending stress at the tooth's root over the mesh, and safety factors",
@@ -299,6 +302,7 @@ VERBS: dict[str, Verb] = {
         "  gensig root-stress system=helical_pair strength.mean_stress_factor=0.7",
         "gensig.commands.strength:root_stress",
         _root_stress,
+        instead={"out": "--json or --plot"},
     ),
     "wear-life": Verb(
         "how long flanks last until they are worn, and what their wear looks like",
@@ -306,6 +310,7 @@ VERBS: dict[str, Verb] = {
         "  gensig wear-life operating.torque_nm=40 --map --out mine/fault/worn.yaml",
         "gensig.commands.wear:wear_life_verb",
         _wear_life,
+        instead={"out": "--out, --json or --plot"},
     ),
     "simulate": Verb(
         "one record: signal, spectrum, figure",
@@ -314,6 +319,7 @@ VERBS: dict[str, Verb] = {
         "gensig.commands.physics:simulate",
         _simulate,
         one="the record did not stay finite, or its solver gave up; nothing is written",
+        instead={"plan": "", "executor": "", "out": "--output"},
     ),
     "stiffness": Verb(
         "mesh stiffness of sound and faulty teeth",
@@ -321,6 +327,7 @@ VERBS: dict[str, Verb] = {
         "  gensig stiffness system=helical_pair gear=chongqing_40_162 heat=chongqing_rated --plot hot.png",
         "gensig.commands.physics:stiffness",
         _stiffness,
+        instead={"out": "--json or --plot"},
     ),
     "modes": Verb(
         "natural frequencies, damping, shapes of a pair or of a drive line from tables",
@@ -328,13 +335,14 @@ VERBS: dict[str, Verb] = {
         "  gensig modes system=shaft_line system.shafting_csv=mine.csv system.gears_csv=my_gears.csv",
         "gensig.commands.modes:modes",
         _modes,
+        instead={"out": "--json or --plot"},
     ),
     "forced-response": Verb(
         "steady vibration of a drive line under its engine: speed fluctuation, spectra, waterfalls, tooth forces",
         "gensig forced-response system=engine_gear_train excitation=engine_v20 --run 650 1750 10 --plot response.png",
         "gensig.commands.forced_response:forced_response",
         _forced_response,
-        instead={"operating.speed_rpm": "--speed", "operating.torque_nm": "--torque"},
+        instead={"operating.speed_rpm": "--speed", "operating.torque_nm": "--torque", "out": "--json or --plot"},
     ),
     "tune-damper": Verb(
         "torsional dampers that make the worst tooth force of an engine's mesh least; root stress before and after",

@@ -14,9 +14,9 @@ import numpy as np
 import yaml
 from numpy.typing import NDArray
 
-from gensig.commands.console import one_line_warnings, replaced_file
-from gensig.commands.output import check_outputs, option_file, write_outputs
-from gensig.config import read_request
+from gensig.commands.console import one_line_warnings
+from gensig.commands.output import check_outputs, option_file, write_option, write_outputs
+from gensig.commands.reading import read_watched
 from gensig.errors import ConfigError, SimulationError
 from gensig.life.archard import flank_radii, hunting_turns
 from gensig.life.life_laws import FittedLaw, LifeMap, fitted_laws, life_map, torque_exponent
@@ -39,13 +39,13 @@ def wear_life_verb(arguments: Namespace) -> int:
     """Life and wear to JSON, a figure, an option for records, or a summary."""
     check_outputs(arguments)
     target = None if arguments.out is None else option_file(arguments.out, GROUP)
-    request = read_request(arguments.overrides, config_dir=arguments.config_dir)
+    config = read_watched(arguments)
     with one_line_warnings("gensig"):
-        case = read_wear_case(request.config)
-        speed = read_operating(section(request.config, "operating")).speed
+        case = read_wear_case(config)
+        speed = read_operating(section(config, "operating")).speed
         if case.pair.transverse_contact_ratio < 1.0:
             _warn_of_interruption(case)
-        case, vibration = limited_by_vibration(case, request.config)
+        case, vibration = limited_by_vibration(case, config)
         life = wear_life(case)
         if vibration is not None and vibration.limit_depth is not None:
             life = replace(life, ended_by="vibration")
@@ -266,10 +266,8 @@ def _write_option(life: WearLife, speed: float, target: Path) -> None:
     """The worn flanks as an option of the group ``fault``."""
     pair = life.case.pair
     option = yaml.safe_dump(wear_fault(life.case, life.depth[-1]), sort_keys=False, width=110)
-    with replaced_file(target) as path:
-        path.write_text(
-            f"# Flanks of {pair.pinion.n_teeth}/{pair.wheel.n_teeth} teeth after {hours(life.life, speed):.4g} h at "
-            f"{life.case.torque:g} N m (gensig wear-life).\n{option}",
-            encoding="utf-8",
-        )
-    print(f"{target}: take it with {GROUP}={target.stem} --config-dir {target.parent.parent}")
+    write_option(
+        target,
+        f"# Flanks of {pair.pinion.n_teeth}/{pair.wheel.n_teeth} teeth after {hours(life.life, speed):.4g} h at "
+        f"{life.case.torque:g} N m (gensig wear-life).\n{option}",
+    )
