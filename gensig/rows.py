@@ -252,7 +252,7 @@ def replace_key(config: dict[str, Any], key: str, value: float) -> None:
     for name in parents:
         node = node.get(name) if isinstance(node, dict) else None
     if not isinstance(node, dict) or leaf not in node or isinstance(node[leaf], dict | list | str | bool):
-        near = nearest.near(key, _numeric_keys(config))
+        near = nearest.near(key, [one for one in _numeric_keys(config) if not one.startswith(FIXED_KEYS)])
         hint = f"; did you mean {' or '.join(map(repr, near))}?" if near else ""
         raise ConfigError(f"plan.vary: '{key}' is no key of the configuration that holds a number{hint}")
     node[leaf] = int(value) if isinstance(node[leaf], int) and float(value).is_integer() else value
