@@ -25,10 +25,12 @@ TAG = re.compile(r"\\tag\{([^}]*)\}")
 
 
 def on_config(config: Any) -> Any:
-    """Set what YAML cannot say plainly: the formatter of equations, and anchors as code forges make them."""
+    """Set what YAML cannot say plainly: formatter of equations, anchors as code forges make them, pages beside README."""
     config.mdx_configs["pymdownx.superfences"] = {
         "custom_fences": [{"name": "math", "class": "equation", "format": equation}]
     }
+    beside = [name.lower() for name in AT_ROOT if (ROOT / name).is_file()]
+    config.nav = [*config.nav, {"Project": beside}] if beside else config.nav
     config.mdx_configs["toc"] = {**config.mdx_configs.get("toc", {}), "slugify": slugify(case="lower")}
     return config
 
