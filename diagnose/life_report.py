@@ -14,7 +14,7 @@ from diagnose.figures import COLORS, save, subplots
 from diagnose.life_scores import BAND, MEASURES
 from diagnose.life_study import AGE_ONLY, AND_AGE, LifePrediction
 from diagnose.lives import Lives
-from diagnose.page import Card, Section, Table, write_page
+from gensig.page import Card, Section, Table, write_page
 from diagnose.protocols import MEANING
 
 FEW_LIVES = 10
