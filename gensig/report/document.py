@@ -10,6 +10,7 @@ import numpy as np
 
 from gensig.dataset.atomic import write_bytes
 from gensig.dataset.card import plain
+from gensig.dataset.class_figures import FIRST_CHOICE
 from gensig.dataset.reader import Dataset, open_dataset
 from gensig.errors import ConfigError
 from gensig.page import Charts, Section, Select, Switch, interactive_page
@@ -57,25 +58,22 @@ def write_report(folder: Path, out: Path | None = None, *, per_class: int | None
     ConfigError     for a file that is there already, a folder that is not, or a number of records below 1
     DatasetError    for a folder that is no data set, incomplete or damaged
     """
-    path = _free(folder / REPORT if out is None else out)
+    path = folder / REPORT if out is None else out
+    if path.exists() or path.is_symlink():
+        raise ConfigError(f"{path} exists already; remove it, or choose another --out FILE")
+    if out is not None and not path.parent.is_dir():
+        raise ConfigError(f"{path}: there is no folder {path.parent}; give an existing one")
     if per_class is not None and per_class < 1:
         raise ConfigError(f"--records {per_class} must be at least 1")
     with open_dataset(folder) as data:
         text, said = report_text(data, per_class)
     content = text.encode("utf-8")
     if len(content) > MOST_BYTES:
-        raise ConfigError(f"the page would have {len(content) / 1e6:.1f} MB, at most 15 are meant; give fewer --records")
+        raise ConfigError(
+            f"the page would have {len(content) / 1e6:.1f} MB, at most 15 are meant; give fewer --records"
+        )
     write_bytes(path, content)
     return path, f"{said}, {len(content) / 1e6:.1f} MB"
-
-
-def _free(path: Path) -> Path:
-    """The path, if a file can be made there."""
-    if path.exists() or path.is_symlink():
-        raise ConfigError(f"{path} exists already; remove it, or choose another --out FILE")
-    if not path.parent.is_dir():
-        raise ConfigError(f"{path}: there is no folder {path.parent}; give an existing one")
-    return path
 
 
 def report_text(data: Dataset, per_class: int | None) -> tuple[str, str]:
@@ -151,33 +149,37 @@ def _signals(data: Dataset, chosen: Choice, rotation: Rotation, examples: list[d
         severity = "unknown" if one["severity"] is None else f"{one['severity']:.2f}"
         text = plain(f"{one['class']}, severity {severity}, {one['unit']}, {one['record']}")
         groups.setdefault(plain(one["class"]), []).append((str(number), text))
-    classes = list(groups)
-    first = groups[classes[-1] if len(classes) > 1 else classes[0]][-1][0]
+    last = groups[list(groups)[-1]]
+    first = last[-1 if has_lives(data) else len(last) // 2][0]
     orders = [("hz", "Hz and ms")] + [(name, f"orders: {words}") for name, words in rotation.references]
-    zooms = [("all", "usable band")] + [(f"{k}", f"around mesh harmonic {k}") for k in (1, 2, 3)]
+    zooms = [("all", "usable band")]
+    if any(name == "mesh" for name, _ in orders):
+        zooms += [(f"{k}", f"around mesh harmonic {k}") for k in (1, 2, 3)]
     low, high = envelope_band(data.sampling_rate)
-    text = [
-        f"{len(examples)} of {data.n_records} records: of each class from the least to the greatest severity; sound ones "
-        "at the conditions of the middle one of the other classes, so that both can be compared."
-        + f" Shown are {chosen.remark}." * bool(chosen.remark),
-        "Orders are multiples of the chosen shaft's mean speed. Amplitudes of spectra are rounded to 0.4 dB; waveform and "
-        "spectrogram are those of the first samples, up to 8192.",
+    sound = "of each class those of one life, from" if has_lives(data) else "of each class from"
+    lines = [
+        f"{len(examples)} of {data.n_records} records: {sound} the least to the greatest severity; sound ones at the "
+        "conditions of the middle one of another class, so that both can be compared.",
+        "Orders are multiples of the chosen shaft's mean speed. Amplitudes of spectra are rounded to 0.4 dB; waveform "
+        "and spectrogram are those of the first samples, up to 8192.",
     ]
+    if chosen.remark:
+        lines.insert(1, f"Shown are {chosen.remark}.")
     return Section(
         title="Signals",
-        text=text,
+        text=lines,
         charts=Charts(
             name="signals",
             label="Choice of signal",
             selects=[
                 Select(name="record", label="Record", groups=list(groups.items()), chosen=first),
                 Select(name="other", label="Compare with", chosen="same",
-                       groups=[("", [("", "nothing"), ("same", "a sound record of its machine")]), *groups.items()]),
+                       groups=[("", [("", "nothing"), ("same", "its machine, least damaged")]), *groups.items()]),
                 Select(name="channel", label="Channel",
                        groups=[("", [(str(i), plain(name)) for i, name in enumerate(chosen.channels)])],
-                       chosen=str(chosen.channels.index("pinion_y")) if "pinion_y" in chosen.channels else "0"),
+                       chosen=_first_channel(chosen)),
                 Select(name="axis", label="Axis", groups=[("", orders)], chosen="hz"),
-                Select(name="zoom", label="Spectrum", groups=[("", zooms if len(orders) > 2 else zooms[:1])], chosen="all"),
+                Select(name="zoom", label="Spectrum", groups=[("", zooms)], chosen="all"),
             ],
             switches=[Switch(name="decibel", label="logarithmic", on=True),
                       *(Switch(name=name, label=label, on=on) for name, label, on in MARKS)],
@@ -191,12 +193,19 @@ def _signals(data: Dataset, chosen: Choice, rotation: Rotation, examples: list[d
     )  # fmt: skip
 
 
+def _first_channel(chosen: Choice) -> str:
+    """Number of the channel shown first: that of the data card's figures, where there is one."""
+    return str(chosen.channels.index(FIRST_CHOICE)) if FIRST_CHOICE in chosen.channels else "0"
+
+
 def _parameters(data: Dataset, table: dict[str, Any]) -> Section:
     names = list(table["columns"])
     drawn = [(name, column_label(name)) for name in names if name.startswith("params/")]
     other = [(name, column_label(name)) for name in names if not name.startswith("params/")]
     n_rows = table["rows"]
-    text = [f"{_of(n_rows, data)}. A parameter is in the records to which it applies; those that never differ are left out."]
+    text = [
+        f"{_of(n_rows, data)}. A parameter is in the records to which it applies; those that never differ are left out."
+    ]
     if not names:
         return Section(title="Parameters", text=["No parameter differs between the records."])
     return Section(
@@ -206,7 +215,8 @@ def _parameters(data: Dataset, table: dict[str, Any]) -> Section:
             name="parameters",
             label="Choice of parameter",
             selects=[
-                Select(name="column", label="Parameter", groups=[("drawn", drawn), ("of the record", other)]),
+                Select(name="column", label="Parameter", groups=[("drawn", drawn), ("of the record", other)],
+                       chosen=next((name for name in names if "/operating." in name), "")),
                 Select(name="form", label="Shown as",
                        groups=[("", [("histogram", "histogram"), ("boxes", "boxes and points by class")])]),
             ],
@@ -232,7 +242,8 @@ def _indicators(data: Dataset, chosen: Choice, measured: Measured, table: dict[s
                 Select(name="indicator", label="Indicator", groups=[("", known)]),
                 Select(name="along", label="Over", groups=[("", along)], chosen="severity"),
                 Select(name="channel", label="Channel",
-                       groups=[("", [(str(i), plain(name)) for i, name in enumerate(chosen.channels)])]),
+                       groups=[("", [(str(i), plain(name)) for i, name in enumerate(chosen.channels)])],
+                       chosen=_first_channel(chosen)),
             ],
             switches=[Switch(name="decibel", label="logarithmic", on=False)],
             plots=[("indicators", "Indicator by class"), ("levels", "Spread by class")],

@@ -13,6 +13,7 @@ from gensig.dataset.reader import Dataset
 from gensig.errors import DatasetError
 from gensig.report.packing import pack_amplitude, pack_signal
 from gensig.report.rotation import Rotation
+from gensig.report.values import has_lives
 from gensig.signals.envelope import envelope_spectrum
 from gensig.signals.spectrum import amplitude_spectrum
 
@@ -73,9 +74,11 @@ def choose(data: Dataset, per_class: int | None) -> Choice:
 
 
 def _spread(data: Dataset, name: str, n_shown: int) -> list[int]:
-    """Records of a class at even steps of the rank of their severity."""
+    """Records of a class at even steps of the rank of their severity; those of one life where there are lives."""
     mine = np.flatnonzero((data.column("label_name") == name) & data.usable)
     mine = mine[np.argsort(data.column("severity")[mine], kind="stable")]
+    if has_lives(data):  # the machine that gets worst, from its beginning
+        mine = mine[data.column("life_id")[mine] == data.column("life_id")[mine[-1]]]
     places = np.linspace(0, mine.size - 1, n_shown) if n_shown > 1 else np.array([mine.size // 2])
     return list(dict.fromkeys(mine[np.rint(places).astype(int)].tolist()))
 

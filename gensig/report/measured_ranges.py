@@ -56,6 +56,8 @@ def beside_measurements(data: Dataset, measured: Measured, units: list[str]) -> 
 def _ratios(data: Dataset, measured: Measured, values: dict[str, FloatArray]) -> dict[Place, FloatArray]:
     """Faulty record over sound one of another set of gears, in one gearbox at one set-point."""
     records = measured.records
+    if "speed_set_rpm" not in data.column_names:
+        return {}
     keys = [data.column(name)[records].tolist() for name in ("gearbox_id", "speed_set_rpm", "torque_nm")]
     place = list(zip(*keys, strict=True))
     specimen, label = data.column("specimen_id")[records], data.column("label_name")[records]

@@ -51,7 +51,9 @@ class Rotation:
         if not np.any(np.isfinite(self.mesh) & (self.mesh > 0.0)):
             return [("drive", "turns of the driving shaft")] if np.any(self.drive > 0.0) else []
         found = [(gear, f"turns of the {gear}") for gear in self.n_teeth]
-        if all(np.nanmax(np.abs(self.turns(gear) / self.drive - 1.0)) > SAME for gear in self.n_teeth):
+        turning = (self.mesh > 0.0) & (self.drive > 0.0)
+        ratios = [self.turns(gear)[turning] / self.drive[turning] for gear in self.n_teeth]
+        if np.any(turning) and all(np.abs(ratio - 1.0).max() > SAME for ratio in ratios):
             found.append(("drive", "turns of the driving shaft"))
         return [*found, ("mesh", "meshes of a tooth")]
 

@@ -17,6 +17,14 @@ from gensig.page import Section, Table
 from gensig.validation.realism import Comparison, shown_range
 
 MANY_SHARDS = 200
+IN_WORDS = {
+    "n_teeth_pinion": "teeth of the pinion",
+    "n_teeth_wheel": "teeth of the wheel",
+    "normal_module_mm": "normal module, mm",
+    "pressure_angle_deg": "pressure angle, degrees",
+    "helix_angle_deg": "helix angle, degrees",
+    "usable_band_hz": "usable band, Hz",
+}
 
 
 def channel_units(data: Dataset) -> list[str]:
@@ -31,11 +39,14 @@ def contents(data: Dataset) -> list[Section]:
     channels = zip(data.channel_names, channel_units(data), strict=True)
     rows = [
         ("records", f"{data.n_records}" + (f", of which {n_failed} failed and are left out here" if n_failed else "")),
-        ("a record", f"{data.n_samples / data.sampling_rate:g} s, {data.n_samples} samples at {data.sampling_rate:g} Hz"),
+        (
+            "a record",
+            f"{data.n_samples / data.sampling_rate:g} s, {data.n_samples} samples at {data.sampling_rate:g} Hz",
+        ),
         ("channels", ", ".join(f"{plain(name)} ({plain(unit)})" for name, unit in channels)),
         ("further signals", ", ".join(name for name in data.signal_names if name != "acceleration") or "none"),
     ]
-    rows += [(name.replace("_", " "), _shown(data.attributes[name])) for name in GEOMETRY if name in data.attributes]
+    rows += [(IN_WORDS.get(name, name), _shown(data.attributes[name])) for name in GEOMETRY if name in data.attributes]
     rows += [
         (name, f"{len(np.unique(data.column(column)))}")
         for name, column in (("units", "unit_id"), ("sets of gears", "specimen_id"), ("gearboxes", "gearbox_id"))
@@ -69,13 +80,13 @@ def _classes(data: Dataset) -> Table:
 def splits(data: Dataset) -> Section:
     """Records and units of every subset of every protocol."""
     unit = data.column("unit_id")
-    rows, leaky = [], []
+    rows: list[tuple[str, ...]] = []
+    leaky: list[int] = []
     for protocol in data.protocols:
         parts = data.split(protocol)
         units = {name: set(unit[[row[0] for row in part]].tolist()) for name, part in parts.items()}
         cells = [
-            f"{sum(stop - start for _, start, stop in part):.5g} of {len(units[name])} unit{'s' * (len(units[name]) != 1)}"
-            for name, part in parts.items()
+            f"{sum(stop - start for _, start, stop in part):.5g} ({len(units[name])})" for name, part in parts.items()
         ]
         apart = PROTOCOLS[protocol].apart if protocol in PROTOCOLS else ()
         if not apart:
@@ -84,10 +95,13 @@ def splits(data: Dataset) -> Section:
         kept = ", ".join(name.removesuffix("_id") for name in apart) or "nothing: leaks on purpose"
         rows.append((plain(protocol), *cells, f"{shared}", kept))
     head = ("protocol", "train", "validation", "test", "units on both sides", "keeps apart")
-    text = ["Records and units of each subset. A score is only worth what its protocol keeps apart."]
+    text = [
+        "Records of each subset, and in brackets the units that they are from.",
+        "A score is only worth what its protocol keeps apart.",
+    ]
     left_out = [(name, plain(reason)) for name, reason in data.left_out.items()]
     if left_out:
-        text.append("Not written for this set, and why:")
+        text.append("Below: protocols that this set cannot have, and why.")
     table = Table(head=head, rows=rows, quiet=leaky) if rows else None
     return Section(title="Splits", text=text, table=table, notes=left_out)
 
@@ -97,7 +111,7 @@ def measured_table(found: Sequence[Comparison], units: Sequence[str]) -> Section
     text = [
         "Central 90 % of this set's values beside ranges of published recordings of a two-stage parallel spur gearbox "
         "(5 kHz, one specimen a class), which is another machine: a miss says that they differ, not which is wrong. "
-        "RMS and kurtosis are those of the band up to 2.5 kHz."
+        'RMS and kurtosis are those of the band up to 2.5 kHz; "elsewhere" is not slow and light, here all records.'
     ]
     if not found:
         reason = "no channel is an acceleration in m/s^2" if "m/s^2" not in units else "it has none of their quantities"

@@ -69,7 +69,11 @@ def value_table(data: Dataset, records: NDArray[np.intp], names: list[str]) -> d
     if label.size and (label.min() < 0 or label.max() >= min(len(data.class_names), 255)):
         raise DatasetError(f"{data.folder} has labels beyond its class names; run gensig verify {data.folder}")
     values = {name: data.column(name)[records].astype(float) for name in names}
-    return {"rows": int(records.size), "class": packed(label, "u1"), "columns": {n: pack_floats(v) for n, v in values.items()}}
+    return {
+        "rows": int(records.size),
+        "class": packed(label, "u1"),
+        "columns": {n: pack_floats(v) for n, v in values.items()},
+    }
 
 
 def drawn_columns(data: Dataset, records: NDArray[np.intp]) -> list[str]:

@@ -37,12 +37,12 @@
 
   function draw(name, traces, layout, what) {
     const node = document.getElementById("plot-" + name), ink = dark.matches ? "#e6edf3" : "#1b1f24", grid = dark.matches ? "#333b44" : "#e3e8ed";
-    const axis = { gridcolor: grid, zerolinecolor: grid, linecolor: grid, automargin: true, exponentformat: "power" };
+    const axis = { gridcolor: grid, zerolinecolor: grid, linecolor: grid, automargin: true, exponentformat: "none" };
     const full = {
       margin: { l: 60, r: 12, t: 8, b: 44 }, paper_bgcolor: "rgba(0,0,0,0)", plot_bgcolor: "rgba(0,0,0,0)",
       font: { color: ink, size: 12 }, legend: { orientation: "h", y: 1.02, yanchor: "bottom", x: 0 }, hovermode: "closest",
       dragmode: coarse.matches ? false : "zoom", ...layout,
-      xaxis: { ...axis, ...layout.xaxis }, yaxis: { ...axis, ...layout.yaxis },
+      xaxis: { ...axis, ...layout.xaxis }, yaxis: { ...axis, exponentformat: layout.yaxis.type === "log" ? "power" : "none", ...layout.yaxis },
     };
     node.setAttribute("aria-label", what);
     Plotly.react(node, traces, full, { responsive: true, displaylogo: false, displayModeBar: coarse.matches ? false : "hover", scrollZoom: false });
@@ -50,7 +50,9 @@
 
   // ---- signals -------------------------------------------------------------------------------------------------
   function machine(record) {
-    return DATA.examples.find((one) => one.class === "healthy" && one.unit === record.unit && one.condition === record.condition && one !== record);
+    const mine = DATA.examples.filter((one) => one.unit === record.unit && one !== record);
+    const sound = mine.find((one) => one.class === "healthy" && one.condition === record.condition);
+    return sound || mine.filter((one) => one.severity < record.severity).sort((a, b) => a.severity - b.severity)[0];
   }
 
   function name_of(record) {
@@ -113,7 +115,7 @@
     const frequency_title = reference ? orders : "frequency, Hz", factor = reference ? 1 / reference : 1;
     const time_title = reference ? (values.axis === "mesh" ? "meshes" : "turns") + (values.axis === "mesh" ? "" : " of the " + (values.axis === "drive" ? "driving shaft" : values.axis)) : "time, ms";
     const of = DATA.channels[channel], amplitude_title = "amplitude, " + unit(of.unit);
-    say("signals", of.name + ": " + name_of(record) + (beside && beside !== record ? ". Grey: " + name_of(beside) : values.other === "same" ? ". No sound record of this machine is shown" : "") + ".");
+    say("signals", of.name + ": " + name_of(record) + (beside && beside !== record ? ". Grey: " + name_of(beside) : values.other === "same" ? ". This page has no less damaged record of this machine" : "") + ".");
 
     const own = (one) => (values.axis === "hz" ? 1e3 : one.record.frequencies[values.axis] || 1e3); // each over its own turns
     draw("wave", shown.map((one) => {
@@ -222,7 +224,6 @@
     const form = document.getElementById(name + "-controls");
     form.addEventListener("change", drawer);
     form.addEventListener("submit", (event) => event.preventDefault());
-    form.hidden = !form.elements.length;
     drawer();
   }
   dark.addEventListener("change", () => present.forEach(([, drawer]) => drawer()));
