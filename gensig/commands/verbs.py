@@ -217,6 +217,12 @@ def _export(parser: argparse.ArgumentParser) -> None:
     parser.add_argument("--one-channel", action="store_true", help="wav: one file a channel, not one a record")
 
 
+def _report(parser: argparse.ArgumentParser) -> None:
+    parser.add_argument("folder", metavar="DIR", help="folder of a complete data set")
+    parser.add_argument("--out", metavar="FILE", help="page to write, a new file (default: DIR/report.html)")
+    parser.add_argument("--records", type=int, metavar="N", help="records shown of each class (default: up to 3)")
+
+
 VERBS: dict[str, Verb] = {
     "options": Verb(
         "groups, their options, and the keys of an option, a line each",
@@ -272,6 +278,12 @@ VERBS: dict[str, Verb] = {
         "gensig inspect runs/quickstart/shards/shard-00000.h5",
         "gensig.commands.datasets:inspect",
         _inspect,
+    ),
+    "report": Verb(
+        "a data set as one HTML page: signals, spectra, parameters, indicators, splits",
+        "gensig report runs/quickstart\n  gensig report runs/quickstart --out quickstart.html --records 5",
+        "gensig.commands.dataset_report:report",
+        _report,
     ),
     "export": Verb(
         "a data set as one HDF5 file, Parquet, npz or wav",
