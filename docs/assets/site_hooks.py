@@ -25,7 +25,7 @@ TAG = re.compile(r"\\tag\{([^}]*)\}")
 
 
 def on_config(config: Any) -> Any:
-    """Set what YAML cannot say plainly: formatter of equations, anchors as code forges make them, pages beside README."""
+    """Set what YAML cannot say plainly: formatter of equations, anchors as code forges make them, README's pages."""
     config.mdx_configs["pymdownx.superfences"] = {
         "custom_fences": [{"name": "math", "class": "equation", "format": equation}]
     }

@@ -113,10 +113,9 @@ def _main_unknown() -> Iterator[None]:
 
     A script that calls ``gensig.generate`` needs no ``if __name__ == "__main__"`` then: jobs are importable without it.
     """
-    main, hidden = sys.modules["__main__"], {}
-    for name in ("__spec__", "__file__"):  # what multiprocessing.spawn.get_preparation_data looks at
-        if name in vars(main):
-            hidden[name] = vars(main)[name]
+    main = sys.modules["__main__"]
+    looked_at = ("__spec__", "__file__")  # by multiprocessing.spawn.get_preparation_data
+    hidden: dict[str, Any] = {name: vars(main)[name] for name in looked_at if name in vars(main)}
     main.__spec__ = None
     vars(main).pop("__file__", None)
     try:
