@@ -16,7 +16,7 @@ from gensig.systems.mesh_phase import start_rolls
 from gensig.systems.pair_machine import Run, Start
 
 RPM = np.pi / 30.0
-SPEED, TORQUE = 1746.0 * RPM, 30.0
+SPEED, TORQUE = 1746.0 * RPM, 60.0
 GOVERNOR = Governor(frequency=1.0, damping_ratio=0.7)
 SOLVER = LineSolver(sampling_rate=10240.0, oversampling=12, max_energy_residual=1e-3)
 MOTOR = ("system=two_stage_gearbox", "excitation=motor_and_load")
@@ -153,7 +153,7 @@ def test_the_other_stage_stands_where_the_teeth_allow():
 @pytest.mark.parametrize(("law", "exponent"), [("constant", 0), ("linear", 1), ("quadratic", 2)])
 def test_a_run_up_follows_its_course_and_its_load_the_law(law, exponent):
     words = (f"excitation.load.law={law}", "operating=ramp", "operating.speed_profile.first_factor=0.5")
-    record = machine(*words, "operating.speed_rpm=1746", "operating.torque_nm=30", "operating.duration_s=0.4")
+    record = machine(*words, "operating.speed_rpm=1746", "operating.torque_nm=60", "operating.duration_s=0.4")
     line = record.line(Run(system=record, faults=()))
     channels = [("angle", line.dof(8)), ("mesh_force", 0)]
     motion = line.run(SOLVER, duration=0.4, channels=channels, settling=0.3)
@@ -172,7 +172,7 @@ def test_a_run_up_follows_its_course_and_its_load_the_law(law, exponent):
 def test_slip_damps_the_rigid_motion_and_ripple_shakes_at_its_order():
     line = driven(RIPPLE)
     slope = line.engine.dampers(line.ratios)
-    assert_allclose(slope[1], 30.0 * 0.97 / (0.03 * SPEED), rtol=1e-12)
+    assert_allclose(slope[1], 60.0 * 0.97 / (0.03 * SPEED), rtol=1e-12)
     assert line.matrices().damping[0, 0] - line.drive.matrices().damping[0, 0] == pytest.approx(slope[1])
     response = line.response(SPEED, TORQUE)
     lines = np.abs(response.angle[0])

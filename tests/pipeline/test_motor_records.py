@@ -125,8 +125,8 @@ def test_what_turns_no_line_is_refused_in_one_line(words, told, capsys):
 def test_forced_response_says_torque_and_meshes_and_draws(tmp_path, capsys):
     assert main(["forced-response", *MOTOR, "--plot", str(tmp_path / "found.png")]) == 0
     told = capsys.readouterr().out
-    assert "30 N m of the load at the motor" in told
-    assert "mean 998 N" in told
+    assert "60 N m of the load at the motor" in told
+    assert "mean 1995 N" in told
     assert (tmp_path / "found.png").stat().st_size > 10000
     assert main(["forced-response", *MOTOR, "--run", "500", "1000", "100"]) != 0
     assert "turns evenly without excitation.motor.torque_ripple" in capsys.readouterr().err
