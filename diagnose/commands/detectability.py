@@ -2,11 +2,12 @@
 
 from __future__ import annotations
 
+from argparse import ArgumentParser
 from collections.abc import Sequence
 from functools import partial
 from pathlib import Path
 
-from diagnose.commands.parser import verb_parser
+from diagnose.commands.parser import Parser, verb_parser
 from gensig.errors import ConfigError
 
 HELP = """\
@@ -24,9 +25,15 @@ examples:
 FIGURE_TYPES = (".png", ".svg", ".pdf")
 
 
-def run(words: Sequence[str]) -> int:
-    """Make the maps, write them, print the best test and the worst."""
+def parser() -> Parser:
+    """The verb's parser, with its help."""
     parser = verb_parser("detectability", HELP, EXAMPLE)
+    add_arguments(parser)
+    return parser
+
+
+def add_arguments(parser: ArgumentParser) -> None:
+    """What can be typed behind the verb."""
     parser.add_argument("overrides", nargs="*", metavar="OVERRIDES", help="see above")
     parser.add_argument("--config-dir", metavar="DIR", help="folder with groups and options of your own")
     shares = "of the driving pinion (default: shares of the set-point,"
@@ -39,7 +46,11 @@ def run(words: Sequence[str]) -> int:
     parser.add_argument("--workers", type=int, metavar="N", help="processes (default: one a core)")
     parser.add_argument("--json", metavar="FILE", help="write every number")
     parser.add_argument("--plot", metavar="FILE", help="write a figure (PNG, SVG or PDF)")
-    arguments = parser.parse_intermixed_args(words)
+
+
+def run(words: Sequence[str]) -> int:
+    """Make the maps, write them, print the best test and the worst."""
+    arguments = parser().parse_intermixed_args(words)
     figure, table = _file("--plot", arguments.plot, FIGURE_TYPES), _file("--json", arguments.json, (".json",))
     if arguments.workers is not None and arguments.workers < 1:
         raise ConfigError(f"--workers {arguments.workers} must be at least 1")

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import json
 from argparse import Namespace
 from collections.abc import Mapping
 from dataclasses import dataclass, field, replace
@@ -11,7 +10,6 @@ from typing import Any
 
 import numpy as np
 
-from gensig.commands.console import replaced_file
 from gensig.commands.engine_in_time import (
     print_in_time,
     print_roots,
@@ -23,7 +21,8 @@ from gensig.commands.engine_in_time import (
     time_content,
     without_dampers,
 )
-from gensig.config import read_request
+from gensig.commands.output import check_outputs, plain, write_outputs
+from gensig.commands.reading import read_watched
 from gensig.dynamics.engine_torques import EngineTorques
 from gensig.dynamics.forced import SteadyResponse, Waterfall, disturbance_response, over_cycle, run_of_speeds
 from gensig.dynamics.line_torques import LineTorques
@@ -42,7 +41,6 @@ from gensig.systems.line_time import TimeResponse
 from gensig.systems.time_root_stress import root_stress_in_time
 from gensig.units import from_si, to_si
 
-FIGURE_TYPES = (".png", ".svg", ".pdf")
 CYCLE_POINTS = 5760
 MOST_SPEEDS = 2000
 RUN_ORDERS = 80  # half orders of a run: up to order 40
@@ -69,9 +67,8 @@ class Found:
 
 def forced_response(arguments: Namespace) -> int:
     """Speed fluctuation, spectra and tooth forces: JSON, a figure, or a summary."""
-    if arguments.plot is not None and Path(arguments.plot).suffix not in FIGURE_TYPES:
-        raise ConfigError(f"--plot {arguments.plot}: the name must end in {', '.join(FIGURE_TYPES)}")
-    config = read_request(arguments.overrides, config_dir=arguments.config_dir).config
+    check_outputs(arguments)
+    config = read_watched(arguments)
     line = read_engine_line(config)
     found = _find(line, arguments, config["seed"])
     if (arguments.time, arguments.sweep) != (None, None) and line.engine.pressure_decides_torque:
@@ -85,14 +82,13 @@ def forced_response(arguments: Namespace) -> int:
         sweep = simulate_sweep(line, config, found.nodes, arguments.sweep, arguments.run_torque, RUN_ORDERS)
         found = replace(found, sweep=sweep)
     content = response_content(line, found)
-    if arguments.json:
-        with replaced_file(arguments.json) as path:
-            path.write_text(json.dumps(content, indent=1) + "\n", encoding="utf-8")
-    if arguments.plot:
+
+    def draw(path: Path) -> None:
         from gensig.commands.engine_figures import plot_response
 
-        with replaced_file(arguments.plot) as path:
-            plot_response(line, found, path)
+        plot_response(line, found, path)
+
+    write_outputs(arguments, content, draw)
     _print(content)
     return 0
 
@@ -142,7 +138,7 @@ def response_content(line: EngineLine, found: Found) -> dict[str, Any]:
         content["run_speeds_rpm"] = from_si("speed_rpm", 1.0) * found.run[0].speeds
         content["run_speed_fluctuation_rpm"] = [from_si("speed_rpm", 1.0) * one.fluctuation for one in found.run]
         content["run_angle_deg"] = [np.degrees(one.angle) for one in found.run]
-    return {key: _plain(value) for key, value in content.items()}
+    return {key: plain(value) for key, value in content.items()}
 
 
 def _roots(
@@ -237,10 +233,3 @@ def _print(content: dict[str, Any]) -> None:
         print_roots(content)
     if "sweep_energy_residual" in content:
         print_sweep(content)
-
-
-def _plain(value: Any) -> Any:
-    """Arrays as lists."""
-    if isinstance(value, list):
-        return [_plain(one) for one in value]
-    return value.tolist() if isinstance(value, np.ndarray) else value

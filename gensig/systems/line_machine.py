@@ -11,6 +11,7 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 from numpy.typing import NDArray
+from threadpoolctl import threadpool_limits
 
 from gensig.dynamics.engine_cycle import CYCLE
 from gensig.dynamics.forced import SteadyResponse, closed_line, steady_response
@@ -37,6 +38,9 @@ TABLE_SHARE = 0.1  # of the largest torque between them
 MOST_TABLES = 24
 LEAD_SAMPLES = 256  # before time 0: more than the low-pass looks back
 ROUNDED = 1e-12  # of the largest torque, below which a course of it over the cycle is constant
+
+# More threads of the linear algebra sum in another order; a line that rattles makes another motion of the last digit.
+one_thread = threadpool_limits.wrap(limits=1)
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -101,6 +105,7 @@ class RunningLine:
         """Place of the degree of freedom that a node, by its number, turns with."""
         return int(np.argmax(self.matrices.expand[self.machine.drive.numbers.index(node)]))
 
+    @one_thread
     def run(
         self, solver: LineSolver, *, duration: float, channels: Sequence[tuple[str, int]], settling: float
     ) -> LineMotion:
@@ -126,6 +131,7 @@ class RunningLine:
         )
 
 
+@one_thread
 def running_line(
     machine: EngineLine,
     course: EngineCourse,

@@ -35,6 +35,7 @@ from gensig.systems.line_machine import (
     RunningLine,
     mesh_forces,
     named_by_side,
+    one_thread,
     reference_force,
     running_line,
     steady_course,
@@ -166,6 +167,7 @@ class LineMachine(PairMachine):
         except SimulationError as error:
             return error
 
+    @one_thread
     def _record(self, run: Run) -> CleanRecord:
         sensing, rate = self.sensing, self.sensing.sampling_rate
         line = self.line(run)

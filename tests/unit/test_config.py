@@ -58,6 +58,8 @@ class TestMistakes:
             (["faul=crack"], ["faul", "fault"]),
             (["fault=crak"], ["crak", "crack", "healthy", "missing_tooth", "pitting"]),
             (["gear=foo"], ["foo", "xiamen_23_84"]),
+            (["excitation=null"], ["excitation=null: a group takes one of its options", "engine_v20"]),
+            (["gear=3"], ["gear=3: a group", "xiamen_23_84"]),
             (["experiment=quik"], ["quik", "quickstart", "paper"]),
             (["plan.classes=[healthy,crak]"], ["crak", "crack"]),
             (["fault=crack", "fault.crack_dept_mm=1"], ["fault.crack_dept_mm", "fault.crack_depth_mm"]),

@@ -280,7 +280,7 @@ def test_censored_lives_are_told_and_never_scored(study):
 def test_the_report_is_whole(study):
     out, metrics, _ = study
     assert {path.name for path in out.iterdir()} == {
-        "metrics.json", "predictions.csv", "scores.csv", "report.html", "remaining_life_by_unit.png",
+        "metrics.json", "predictions.csv", "scores.csv", "report.html", "remaining_life_by_unit.png", "models",
     }  # fmt: skip
     page = (out / "report.html").read_text()
     for text in ("How long the machines still run", "age only", "PHM score", "random_window_leaky is left out"):
