@@ -23,6 +23,7 @@ RECORDS_PER_CLASS = 3
 SIGNALS_BY_DEFAULT = 48  # records times channels: about 3 MB
 SIGNALS_AT_MOST = 140  # about 9 MB, plotly.js 5 MB: the page stays below 15 MB
 WAVEFORM_SAMPLES = 8192
+SPECTRUM_SAMPLES = 2**20  # of longer records the spectra are those of the beginning: what is read stays small
 SPECTRUM_BINS = 20_000
 ENVELOPE_BINS = 4000
 ENVELOPE_MESHES = 3.2  # the envelope spectrum ends above the third harmonic of the mesh
@@ -104,7 +105,8 @@ def example(data: Dataset, index: int, channels: Sequence[str], rotation: Rotati
     DatasetError    for a record with values that are not finite
     """
     values = {name: data.column(name)[index] for name in ("record_id", "label_name", "severity", "unit_id")}
-    signals = data.signals(index, channels=list(channels)).astype(float)
+    n_read = min(data.n_samples, SPECTRUM_SAMPLES)
+    signals = data.signals(index, stop=n_read, channels=list(channels)).astype(float)
     if not np.isfinite(signals).all():
         raise DatasetError(f"record {values['record_id']} holds values that are not finite; run gensig verify")
     return {
