@@ -216,7 +216,7 @@ def _parameters(data: Dataset, table: dict[str, Any]) -> Section:
             label="Choice of parameter",
             selects=[
                 Select(name="column", label="Parameter", groups=[("drawn", drawn), ("of the record", other)],
-                       chosen=next((name for name in names if "/operating." in name), "")),
+                       chosen=next((name for name in names if "/operating.speed" in name), "")),
                 Select(name="form", label="Shown as",
                        groups=[("", [("histogram", "histogram"), ("boxes", "boxes and points by class")])]),
             ],

@@ -64,7 +64,7 @@ def choose(data: Dataset, per_class: int | None) -> Choice:
     n_shown = max(min(wanted, limit // (len(classes) * n_channels)), 1)
     faulty = {name: _spread(data, name, n_shown) for name in classes if name != "healthy"}
     chosen = {
-        name: faulty[name] if name in faulty else _sound(data, list(faulty.values()), n_shown) for name in classes
+        name: faulty[name] if name in faulty else _sound(data, list(faulty.values())[::-1], n_shown) for name in classes
     }
     remarks = []
     if n_shown < wanted:
@@ -85,7 +85,7 @@ def _spread(data: Dataset, name: str, n_shown: int) -> list[int]:
 
 
 def _sound(data: Dataset, faulty: Sequence[Sequence[int]], n_shown: int) -> list[int]:
-    """Healthy records at the conditions of the middle records of the other classes; others where there are too few."""
+    """Healthy records at the conditions of the middle records of other classes, the first named first; then any."""
     condition, unit = data.column("condition_id"), data.column("unit_id")
     sound = np.flatnonzero((data.column("label_name") == "healthy") & data.usable)
     found: list[int] = []
