@@ -156,10 +156,10 @@ def _signals(data: Dataset, chosen: Choice, rotation: Rotation, examples: list[d
     if any(name == "mesh" for name, _ in orders):
         zooms += [(f"{k}", f"around mesh harmonic {k}") for k in (1, 2, 3)]
     low, high = envelope_band(data.sampling_rate)
-    sound = "of each class those of one life, from" if has_lives(data) else "of each class from"
+    which = "of each class, those of one life from" if has_lives(data) else "of each class, from"
+    sound = "; sound ones at the conditions of the middle one of another class" if "healthy" in groups else ""
     lines = [
-        f"{len(examples)} of {data.n_records} records: {sound} the least to the greatest severity; sound ones at the "
-        "conditions of the middle one of another class, so that both can be compared.",
+        f"{len(examples)} of {data.n_records} records: {which} the least to the greatest severity{sound}.",
         "Orders are multiples of the chosen shaft's mean speed. Amplitudes of spectra are rounded to 0.4 dB; waveform "
         "and spectrogram are those of the first samples, up to 8192.",
     ]
@@ -216,7 +216,7 @@ def _parameters(data: Dataset, table: dict[str, Any]) -> Section:
             label="Choice of parameter",
             selects=[
                 Select(name="column", label="Parameter", groups=[("drawn", drawn), ("of the record", other)],
-                       chosen=next((name for name in names if "/operating." in name), "")),
+                       chosen=next((name for name in names if "/operating.speed" in name), "")),
                 Select(name="form", label="Shown as",
                        groups=[("", [("histogram", "histogram"), ("boxes", "boxes and points by class")])]),
             ],

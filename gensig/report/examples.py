@@ -23,6 +23,7 @@ RECORDS_PER_CLASS = 3
 SIGNALS_BY_DEFAULT = 48  # records times channels: about 3 MB
 SIGNALS_AT_MOST = 140  # about 9 MB, plotly.js 5 MB: the page stays below 15 MB
 WAVEFORM_SAMPLES = 8192
+SPECTRUM_SAMPLES = 2**20  # of longer records the spectra are those of the beginning: what is read stays small
 SPECTRUM_BINS = 20_000
 ENVELOPE_BINS = 4000
 ENVELOPE_MESHES = 3.2  # the envelope spectrum ends above the third harmonic of the mesh
@@ -63,7 +64,7 @@ def choose(data: Dataset, per_class: int | None) -> Choice:
     n_shown = max(min(wanted, limit // (len(classes) * n_channels)), 1)
     faulty = {name: _spread(data, name, n_shown) for name in classes if name != "healthy"}
     chosen = {
-        name: faulty[name] if name in faulty else _sound(data, list(faulty.values()), n_shown) for name in classes
+        name: faulty[name] if name in faulty else _sound(data, list(faulty.values())[::-1], n_shown) for name in classes
     }
     remarks = []
     if n_shown < wanted:
@@ -84,7 +85,7 @@ def _spread(data: Dataset, name: str, n_shown: int) -> list[int]:
 
 
 def _sound(data: Dataset, faulty: Sequence[Sequence[int]], n_shown: int) -> list[int]:
-    """Healthy records at the conditions of the middle records of the other classes; others where there are too few."""
+    """Healthy records at the conditions of the middle records of other classes, the first named first; then any."""
     condition, unit = data.column("condition_id"), data.column("unit_id")
     sound = np.flatnonzero((data.column("label_name") == "healthy") & data.usable)
     found: list[int] = []
@@ -104,7 +105,8 @@ def example(data: Dataset, index: int, channels: Sequence[str], rotation: Rotati
     DatasetError    for a record with values that are not finite
     """
     values = {name: data.column(name)[index] for name in ("record_id", "label_name", "severity", "unit_id")}
-    signals = data.signals(index, channels=list(channels)).astype(float)
+    n_read = min(data.n_samples, SPECTRUM_SAMPLES)
+    signals = data.signals(index, stop=n_read, channels=list(channels)).astype(float)
     if not np.isfinite(signals).all():
         raise DatasetError(f"record {values['record_id']} holds values that are not finite; run gensig verify")
     return {

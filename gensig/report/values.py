@@ -90,11 +90,13 @@ def drawn_columns(data: Dataset, records: NDArray[np.intp]) -> list[str]:
 
 
 def column_label(name: str) -> str:
-    """A column in words with its unit, such as 'crack_depth_mm' of a parameter, 'torque_nm, N m'."""
+    """A column in words with its unit, such as 'fault.crack_depth_mm' of a parameter, 'torque, N m'."""
     if name.startswith(f"{PARAMS}/"):
         return name.removeprefix(f"{PARAMS}/")
     unit = COLUMNS[name].unit if name in COLUMNS else ""
-    return name.replace("_", " ") + (f", {unit}" if unit not in ("", "1") else "")
+    if unit in ("", "1"):
+        return name.replace("_", " ")
+    return f"{name.rpartition('_')[0].replace('_', ' ')}, {unit}"  # the last part of such a name is its unit
 
 
 def measure(

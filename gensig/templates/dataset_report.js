@@ -2,8 +2,9 @@
 // Draws the charts of `gensig report` from the block of data in the page. Text of the data set is never taken as markup.
 (() => {
   const DATA = JSON.parse(document.getElementById("data").textContent);
-  // Okabe & Ito (2008), "Color universal design", without yellow and black; symbols and dashes tell more classes apart
+  // Okabe & Ito (2008), "Color universal design", without black, yellow on dark ground only; symbols and dashes tell more classes apart
   const COLORS = ["#0072B2", "#D55E00", "#009E73", "#CC79A7", "#56B4E9", "#E69F00", "#7F7F7F"];
+  const ON_DARK = ["#56B4E9", "#E69F00", "#009E73", "#CC79A7", "#F0E442", "#D55E00", "#AAAAAA"];
   const SYMBOLS = ["circle", "square", "triangle-up", "diamond", "cross", "x", "star", "triangle-down"];
   const DASHES = ["solid", "dash", "dot", "dashdot"];
   const MARKS = {
@@ -33,7 +34,7 @@
     return values;
   };
   const say = (name, text) => { document.getElementById(name + "-said").textContent = text; };
-  const style = (i) => ({ color: COLORS[i % COLORS.length], symbol: SYMBOLS[i % SYMBOLS.length], dash: DASHES[Math.floor(i / COLORS.length) % DASHES.length] });
+  const style = (i) => ({ color: (dark.matches ? ON_DARK : COLORS)[i % COLORS.length], symbol: SYMBOLS[i % SYMBOLS.length], dash: DASHES[Math.floor(i / COLORS.length) % DASHES.length] });
 
   function draw(name, traces, layout, what) {
     const node = document.getElementById("plot-" + name), ink = dark.matches ? "#e6edf3" : "#1b1f24", grid = dark.matches ? "#333b44" : "#e3e8ed";
@@ -207,7 +208,7 @@
   }
 
   function draw_beside() {
-    const rows = [...DATA.beside].reverse(), names = rows.map((one) => safe(one.name)), x = [], y = [];
+    const rows = [...DATA.beside].reverse(), names = rows.map((one) => safe(one.name).replace(".", "<br>").replace(", ", "<br>")), x = [], y = [];
     const highest = 1.3 * Math.max(...rows.flatMap((one) => [one.p95, one.high || 0, one.low || 0]));
     rows.forEach((one, i) => { x.push(one.low || 0, one.high === null ? highest : one.high, null); y.push(i + 0.15, i + 0.15, null); });
     say("beside", rows.map((one) => one.name + ": " + one.verdict).reverse().join("; "));

@@ -126,7 +126,7 @@ def test_parameters_and_indicators(page: Any) -> None:
     assert page.evaluate("document.getElementById('plot-parameters').data[0].type") == "box"
     page.select_option("#indicators-controls [name=indicator]", "kurtosis")
     page.select_option("#indicators-controls [name=along]", "speed_rpm")
-    assert page.evaluate(AXIS, "indicators") == "speed rpm, r/min"
+    assert page.evaluate(AXIS, "indicators") == "speed, r/min"
     first = page.evaluate("document.getElementById('plot-indicators').data[0].y[0]")
     page.select_option("#indicators-controls [name=channel]", "1")
     assert page.evaluate("document.getElementById('plot-indicators').data[0].y[0]") != first
