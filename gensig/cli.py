@@ -6,7 +6,8 @@ import importlib
 import sys
 from collections.abc import Sequence
 
-from gensig.commands.verbs import OVERRIDES, VERBS
+from gensig.commands.arguments import OVERRIDES
+from gensig.commands.verbs import VERBS
 from gensig.program import HELP_FLAGS, Parser, exit_text, guarded, refuse_verb
 from gensig.version import __version__
 

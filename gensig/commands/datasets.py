@@ -17,6 +17,7 @@ from gensig.config import Request, read_request
 from gensig.dataset.atomic import read_text
 from gensig.dataset.beginning import refuse_used
 from gensig.dataset.inspection import inspect as inspect_path
+from gensig.dataset.joining import joined_folder
 from gensig.dataset.layout import CONFIG_BYTES_LIMIT, MANIFEST, OVERRIDES
 from gensig.dataset.manifest import read_manifest
 from gensig.dataset.verify import verify as verify_folder
@@ -132,6 +133,8 @@ def resume(arguments: Namespace) -> int:
         executor = LocalExecutor(n_workers=read_n_workers(arguments.workers))
     asked = _asked(out, arguments.overrides)
     if manifest.is_complete:
+        if asked is not None:
+            joined_folder(out, asked=asked)
         print(f"{out} is complete: {manifest.n_records} records")
         return 0
     begin = time.monotonic()
