@@ -138,7 +138,8 @@ def _parse(overrides: Sequence[str]) -> list[Any]:
         if not isinstance(word, str):
             raise ConfigError(f"an override is a text such as 'seed=1', not {word!r}; give each as its own argument")
         if "=" not in word and not word.startswith("~"):
-            raise ConfigError(f"'{word}' is neither group=option nor key=value, such as fault=crack or seed=1")
+            text = "is neither group=option nor key=value, such as fault=crack or seed=1"
+            raise ConfigError(f"cannot read the override: '{word}' {text}")
     try:
         return list(OverridesParser.create().parse_overrides(overrides=list(overrides)))
     except HydraException as error:

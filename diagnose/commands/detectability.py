@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import sys
 from argparse import ArgumentParser
 from collections.abc import Sequence
 from functools import partial
@@ -23,6 +24,8 @@ examples:
   diagnose detectability fault=crack --plot crack.png --json crack.json
   diagnose detectability fault=pitting sensing=housing --speeds 600 1200 2400 --torques 10 40 --n-units 12"""
 FIGURE_TYPES = (".png", ".svg", ".pdf")
+NOT_READ = {"out": "--json and --plot", "plan": "--n-units, --speeds, --torques", "executor": "--workers"}
+READ_OF_PLAN = ("plan.n_gearboxes", "plan.sham", "plan.vary")
 
 
 def parser() -> Parser:
@@ -58,6 +61,7 @@ def run(words: Sequence[str]) -> int:
     speeds, torques, bandwidths = (
         _numbers(f"--{name}", getattr(arguments, name), overrides) for name in ("speeds", "torques", "bandwidths")
     )
+    _say_unread(overrides)
     import gensig
     from diagnose.detectability import confirm_best, make_maps, read_bandwidths
     from diagnose.detectability_report import content, summary
@@ -89,6 +93,16 @@ def run(words: Sequence[str]) -> int:
 
         detectability_figure(figure, maps)
     return 0
+
+
+def _say_unread(overrides: Sequence[str]) -> None:
+    """One line on stderr for every typed key of which a map makes nothing."""
+    from gensig.compose import override_keys
+
+    for key in override_keys(overrides):
+        flag = next((flag for name, flag in NOT_READ.items() if key == name or key.startswith(f"{name}.")), None)
+        if flag is not None and key not in READ_OF_PLAN:
+            print(f"diagnose: note: {key} is not read by detectability; use {flag}", file=sys.stderr)
 
 
 def _numbers(flag: str, given: Sequence[str] | None, overrides: list[str]) -> list[float] | None:

@@ -182,6 +182,27 @@ def _twin(parser: argparse.ArgumentParser) -> None:
     parser.add_argument("--check", metavar="FILE", help="healthy recording held out (default: the second half)")
 
 
+def _new(parser: argparse.ArgumentParser) -> None:
+    parser.add_argument("what", choices=("gearbox",), help="what to make")
+    parser.add_argument("name", metavar="NAME", help="of the options that are written")
+    two = ("PINION", "WHEEL")
+    parser.add_argument("--teeth", type=int, nargs=2, metavar=two, help="needed; teeth of both gears")
+    parser.add_argument("--module", type=float, metavar="MM", help="needed; normal module")
+    parser.add_argument("--speed", type=float, metavar="RPM", help="needed; rated speed of the pinion")
+    parser.add_argument("--torque", type=float, metavar="NM", help="needed; rated torque of the pinion")
+    parser.add_argument(
+        "--widths", type=float, nargs="+", metavar="MM", help="face width of both or each (default: 10 modules)"
+    )
+    parser.add_argument("--bores", type=float, nargs="+", metavar="MM", help="bore diameters (default: by the torque)")
+    parser.add_argument("--helix", type=float, metavar="DEG", help="helix angle of the pinion (default: 0, spur)")
+    parser.add_argument("--pressure-angle", type=float, metavar="DEG", help="of the basic rack (default: 20)")
+    parser.add_argument("--profile-shifts", type=float, nargs="+", metavar="X", help="profile shifts (default: 0)")
+    stiffness = "radial stiffness of what holds each gear (default: of ball bearings and shafts)"
+    parser.add_argument("--supports", type=float, nargs="+", metavar="N_PER_M", help=stiffness)
+    parser.add_argument("--dir", default="configs", help="folder of your options (default: configs)")
+    parser.add_argument("--json", action="store_true", help="print what was derived as JSON")
+
+
 def _resume(parser: argparse.ArgumentParser) -> None:
     _folder(parser)
     parser.add_argument(
@@ -244,6 +265,12 @@ VERBS: dict[str, Verb] = {
         "  gensig plan experiment=quickstart out=runs/large --freeze",
         "gensig.commands.datasets:plan",
         _plan,
+    ),
+    "new": Verb(
+        "options of a gearbox of your own, from its data sheet",
+        "gensig new gearbox mine --teeth 20 45 --module 3 --speed 1500 --torque 60",
+        "gensig.commands.new:new",
+        _new,
     ),
     "resume": Verb(
         "finish an interrupted data set",
