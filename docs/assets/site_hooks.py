@@ -18,54 +18,49 @@ from mkdocs.structure.files import File, Files
 from pymdownx.slugs import slugify
 
 ROOT = Path(__file__).resolve().parents[2]
-AT_ROOT = ("CHANGELOG.md", "CONTRIBUTING.md")  # pages of the site that lie beside README.md
+BESIDE = {name.lower(): name for name in ("CHANGELOG.md", "CONTRIBUTING.md", "THIRD-PARTY.md")}  # beside README.md
 SOURCE = "source"  # folder of the site for linked files that are no pages
 LINK = re.compile(r"(?<!!)\[([^\]]*)\]\(([^)\s#]+)(#[^)\s]*)?\)")
 TAG = re.compile(r"\\tag\{([^}]*)\}")
 
 
 def on_config(config: Any) -> Any:
-    """Set what YAML cannot say plainly: formatter of equations, anchors as code forges make them, README's pages."""
+    """Set what YAML cannot say plainly: how equations are written, anchors as code forges make them, more pages."""
     config.mdx_configs["pymdownx.superfences"] = {
         "custom_fences": [{"name": "math", "class": "equation", "format": equation}]
     }
-    beside = [name.lower() for name in AT_ROOT if (ROOT / name).is_file()]
-    config.nav = [*config.nav, {"Project": beside}] if beside else config.nav
     config.mdx_configs["toc"] = {**config.mdx_configs.get("toc", {}), "slugify": slugify(case="lower")}
+    if pages := [page for page, name in BESIDE.items() if (ROOT / name).is_file()]:
+        config.nav = [*config.nav, {"Project": pages}]
     return config
 
 
 def on_files(files: Files, config: Any) -> Files:
     """Add the pages beside README.md, and every file outside ``docs`` that a page links to."""
-    for name in AT_ROOT:
+    for page, name in BESIDE.items():
         if (ROOT / name).is_file():
-            files.append(File.generated(config, name.lower(), content=(ROOT / name).read_text("utf-8")))
+            files.append(File.generated(config, page, content=(ROOT / name).read_text("utf-8")))
     linked = set()
     for page in files.documentation_pages():
-        for _, target, _ in LINK.findall(page.content_string):
-            if (path := _outside(page.src_uri, target)) and (ROOT / path).is_file():
-                linked.add(path)
-    for path in sorted(linked):
-        files.append(File.generated(config, f"{SOURCE}/{path}.txt", content=(ROOT / path).read_text("utf-8")))
+        linked |= {_path(page.src_uri, target) for _, target, _ in LINK.findall(page.content_string)}
+    for path in sorted(filter(None, linked)):
+        if (place := _place(path)) and place.startswith(f"{SOURCE}/"):
+            files.append(File.generated(config, place, content=(ROOT / path).read_text("utf-8")))
     return files
 
 
 def on_page_markdown(markdown: str, page: Any, **_: Any) -> str:
-    """Point links that leave ``docs`` to what the site has of them."""
+    """Point links that leave ``docs`` to what the site has of them; a folder's name is left as text."""
 
     def renewed(found: re.Match[str]) -> str:
         text, target, anchor = found.groups(default="")
         here = page.file.src_uri
-        if here.upper().startswith(AT_ROOT):
-            place = target.removeprefix("docs/") if target.startswith("docs/") else None
-            return f"[{text}]({place}{anchor})" if place else (found[0] if "://" in target else text)
-        if (path := _outside(here, target)) is None:
+        path = _path(here, target)
+        if path is None or (path.startswith("docs/") and here not in BESIDE):
             return found[0]
-        if not (ROOT / path).is_file():
-            return f"{text} (`{path}`)" if path not in text else text
-        if path in AT_ROOT:
-            return f"[{text}]({_relative(here, path.lower())}{anchor})"
-        return f"[{text}]({_relative(here, f'{SOURCE}/{path}.txt')})"
+        if (place := _place(path)) is None:
+            return text if path in text else f"{text} (`{path}`)"
+        return f"[{text}]({posixpath.relpath(place, posixpath.dirname(here) or '.')}{anchor})"
 
     return LINK.sub(renewed, markdown)
 
@@ -82,13 +77,18 @@ def equation(source: str, *_: Any, **__: Any) -> str:
     return f'<div class="equation" id="eq-{tag[1].lower()}">{mathml}<span>({tag[1]})</span></div>'
 
 
-def _outside(page: str, target: str) -> str | None:
-    """Path from the repository's root, where a link leaves ``docs``."""
+def _path(page: str, target: str) -> str | None:
+    """Path from the repository's root that a page's link leads to; None where it leaves the repository."""
     if "://" in target or target.startswith(("mailto:", "/")):
         return None
-    path = posixpath.normpath(posixpath.join("docs", posixpath.dirname(page), target))
-    return None if path.startswith("docs/") else path
+    folder = "" if page in BESIDE else posixpath.join("docs", posixpath.dirname(page))
+    return posixpath.normpath(posixpath.join(folder, target))
 
 
-def _relative(page: str, target: str) -> str:
-    return posixpath.relpath(target, posixpath.dirname(page) or ".")
+def _place(path: str) -> str | None:
+    """Where the site has a file of the repository, if it is one."""
+    if path.startswith("docs/"):
+        return path.removeprefix("docs/")
+    if path.lower() in BESIDE:
+        return path.lower()
+    return f"{SOURCE}/{path}.txt" if (ROOT / path).is_file() else None
