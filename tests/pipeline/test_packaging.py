@@ -106,7 +106,6 @@ def test_wheel_runs_from_another_folder(python: Path, tmp_path: Path) -> None:
     paths = run(python, "-W", "error", "-c", code).split()
     assert all(path.startswith(str(python.parents[1])) for path in paths)
     gensig = python.parent / "gensig"
-    assert "215.97" in run(gensig, "modes", "system=engine_gear_train")
     run(gensig, *RECORD, "out=data")
     run(gensig, "verify", "data")
     run(python.parent / "diagnose", "--help")
