@@ -83,16 +83,16 @@ def python(wheel: Path, folder: Path) -> Path:
 
 def test_source_distribution_holds_the_whole_tree(source: Path) -> None:
     assert {name for name in files_of_the_tree() if not (source / name).is_file()} == set()
-    license_text = (source / "LICENSE").read_text(encoding="utf-8")
-    assert "Apache License" in license_text
 
 
 def test_wheel_holds_the_packages_and_nothing_else(wheel: Path) -> None:
     parts = [name.split("/", 1) for name in files_of_the_tree()]
     expected = {f"{PACKAGES[part[0]]}/{part[1]}" for part in parts if part[0] in PACKAGES}
     with zipfile.ZipFile(wheel) as archive:
+        notes = {name.split("/", 1)[1] for name in archive.namelist() if ".dist-info/" in name}
         files = {name for name in archive.namelist() if ".dist-info/" not in name}
     assert files == expected
+    assert {"licenses/LICENSE", "licenses/THIRD-PARTY.md", "entry_points.txt"} < notes
     assert {"gensig/py.typed", "diagnose/py.typed", "gensig/configs/generate.yaml"} < files
 
 
@@ -106,7 +106,6 @@ def test_wheel_runs_from_another_folder(python: Path, tmp_path: Path) -> None:
     paths = run(python, "-W", "error", "-c", code).split()
     assert all(path.startswith(str(python.parents[1])) for path in paths)
     gensig = python.parent / "gensig"
-    assert "215.97" in run(gensig, "modes", "system=engine_gear_train")
     run(gensig, *RECORD, "out=data")
     run(gensig, "verify", "data")
     run(python.parent / "diagnose", "--help")
@@ -131,11 +130,13 @@ def test_types_reach_those_who_use_the_wheel(python: Path, tmp_path: Path) -> No
 
 def test_all_is_every_extra_that_a_command_asks_for() -> None:
     extras = PROJECT["optional-dependencies"]
+    of_commands = set(extras) - NOT_FOR_COMMANDS
+    assert {line for name in of_commands for line in extras[name]} <= {*extras["test"], "torch>=2.6"}  # tests try them
     assert extras["all"] == [f"gensig[{','.join(name for name in extras if name not in NOT_FOR_COMMANDS)}]"]
     files = [path for name in ("gensig", "diagnose", "configs", "docs") for path in (ROOT / name).rglob("*")]
     texts = [path.read_text(encoding="utf-8") for path in files if path.suffix in (".py", ".yaml", ".md")]
     named = {name for text in texts for part in re.findall(r"gensig\[([\w, ]+)\]", text) for name in part.split(",")}
-    assert set(extras) - NOT_FOR_COMMANDS <= named  # whoever lacks a package is told the extra that brings it
+    assert of_commands <= named  # whoever lacks a package is told the extra that brings it
     assert named <= set(extras)
 
 
