@@ -151,7 +151,7 @@ def running_line(
     ------
     ConfigError    for courses that the engine cannot run
     """
-    matrices = with_viscous_losses(machine.drive.matrices(merge_rigid=True))
+    matrices = with_viscous_losses(machine.matrices(merge_rigid=True))
     first = _tables(machine, matrices, float(course.speed[0]), float(course.torque[0]))
     closed, elements = closed_line(matrices)
     linear = steady_response(closed, first, float(course.speed[0]))
@@ -278,12 +278,12 @@ def _torques(
                     factor=share,
                 )
             )
-    if len(course.time) > 1:  # what speeds the whole line up comes from the throws
+    if len(course.time) > 1:  # what speeds the whole line up comes from the throws, or the motor
         rise = float(rotation @ matrices.mass @ rotation) / crank * np.gradient(course.speed / crank, course.time)
-        throws = machine.engine.throw_nodes
-        for node in throws:
+        driving = machine.engine.driving_nodes
+        for node in driving:
             throw = int(np.argmax(matrices.expand[machine.drive.numbers.index(node)]))
-            found.append(ShaftTorque(dof=throw, table=np.array([1.0 / len(throws)]), factor=rise))
+            found.append(ShaftTorque(dof=throw, table=np.array([1.0 / len(driving)]), factor=rise))
     return tuple(found)
 
 
@@ -302,7 +302,7 @@ def _table_times(course: EngineCourse) -> Array:
 
 
 def _crank(machine: EngineLine, matrices: LineMatrices) -> int:
-    return int(np.argmax(matrices.expand[machine.drive.numbers.index(machine.engine.throw_nodes[0])]))
+    return int(np.argmax(matrices.expand[machine.drive.numbers.index(machine.engine.driving_nodes[0])]))
 
 
 def with_supports(machine: EngineLine, place: int, supports: Sequence[object]) -> EngineLine:

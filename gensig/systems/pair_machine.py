@@ -5,6 +5,7 @@ from __future__ import annotations
 from abc import ABC, abstractmethod
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
+from typing import TYPE_CHECKING
 
 import numpy as np
 from numpy.typing import NDArray
@@ -24,7 +25,7 @@ from gensig.dynamics.integrator import (
 )
 from gensig.dynamics.mesh_state import MeshState, mesh_state
 from gensig.dynamics.pair import Body, PairDynamics, Rotor
-from gensig.errors import FaultError, SimulationError
+from gensig.errors import ConfigError, FaultError, SimulationError
 from gensig.faults.base import Fault, faulty_teeth
 from gensig.geometry.contact import GearPair
 from gensig.material import Material
@@ -38,6 +39,9 @@ from gensig.sensing.encoder import Disc
 from gensig.sensing.manufacturing import Gearbox, Quality, Specimen, nominal_gearbox, perfect_specimen
 from gensig.systems.supports import in_gearbox
 from gensig.units import from_si
+
+if TYPE_CHECKING:
+    from gensig.systems.spur_pair import StiffnessCurves
 
 Array = NDArray[np.float64]
 
@@ -95,6 +99,15 @@ class PairMachine(ABC):
     def mesh_table(self, faults: Sequence[Fault] = ()) -> PairTable | SlicedTable:
         """Compliance and gap tables with the given faults."""
 
+    def stiffness_curves(
+        self, faults: Sequence[Fault] = (), *, n_positions: int = 201, points_per_tooth: int = 100
+    ) -> StiffnessCurves:
+        """Single-pair and mesh stiffness with their parts, of spur teeth; ConfigError for teeth in slices."""
+        raise ConfigError(
+            "stiffness_curves are those of system=spur_pair; a helical pair has its stiffness slice by slice: "
+            "flanks.transmission_error(), or gensig stiffness system=helical_pair"
+        )
+
     def simulate_alone(self, run: Run) -> CleanRecord | SimulationError | None:
         """The record of a machine that is not simulated side by side with others; None for one that is."""
         return None
@@ -118,6 +131,11 @@ class PairMachine(ABC):
         ``speed`` rad/s of the pinion, ``torque`` N m of the set-point; (mesh,).
         """
         return np.array([torque])
+
+    @property
+    def load_exponent(self) -> int:
+        """Power of the speed that the set torque follows along a course, beyond its own profile."""
+        return 0
 
     @property
     def most_pairs(self) -> int:

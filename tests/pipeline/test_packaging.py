@@ -1,67 +1,99 @@
-"""A wheel carries configuration and data, and runs from any folder."""
+"""What is given away: a source distribution and a wheel hold what they should, and the wheel works in any folder."""
 
-import os
-import shutil
+import re
 import subprocess
 import sys
-import sysconfig
-import venv
+import tomllib
+import zipfile
 from pathlib import Path
 
 import pytest
 
-import gensig.dynamics._kernels
-import gensig.mesh._kernels
-from gensig.cli import main
+from tests.wheel import (
+    ENVIRONMENT,
+    PACKAGES,
+    ROOT,
+    build_sdist,
+    build_wheel,
+    environment_with,
+    files_of_the_tree,
+    lend_compiled,
+    run_tests,
+    take_packages_out,
+    unpack,
+)
 
-ROOT = Path(__file__).resolve().parents[2]
 RECORD = ["generate", "--quiet", "plan.n_records=1", "operating.duration_s=0.02"]
-# gensig is that of the wheel, and the cache of Numba lies beside its files, wherever those of this run lie
-ENVIRONMENT = {key: value for key, value in os.environ.items() if key not in ("PYTHONPATH", "NUMBA_CACHE_DIR")}
+PROJECT = tomllib.loads((ROOT / "pyproject.toml").read_text(encoding="utf-8"))["project"]
+NOT_FOR_COMMANDS = {"all", "test", "docs", "fem"}  # extras that serve the project itself
+
+TYPED = """
+from typing import assert_type
+
+import gensig
+from gensig.dataset.reader import Dataset
+from gensig.streaming import RecordStream
+
+with gensig.open_dataset("runs/quick") as data:
+    assert_type(data, Dataset)
+    names: list[str] = data.class_names
+    n_channels: int = data.signals(0).shape[0]
+    parts = data.split("by_unit")
+    assert_type(parts["train"][0], tuple[int, float, float])
+made: Dataset = gensig.generate("fault=crack", out="runs/own")
+stream = gensig.stream("experiment=quickstart", epoch=1)
+assert_type(stream, RecordStream)
+labels = [record.values["label_name"] for record in stream]
+system = gensig.load_system("fault=healthy", "operating.torque_nm=40")
+mean: float = float(system.stiffness_curves().mesh_stiffness.mean())
+ratio: float = system.pair.transverse_contact_ratio
+"""
+MISTYPED = """
+import gensig
+
+gensig.open_dataset(3)
+gensig.load_system("fault=healthy").pear
+"""
 
 
 @pytest.fixture(scope="module")
-def python(tmp_path_factory: pytest.TempPathFactory) -> Path:
+def folder(tmp_path_factory: pytest.TempPathFactory) -> Path:
+    return tmp_path_factory.mktemp("packages")
+
+
+@pytest.fixture(scope="module")
+def source(folder: Path) -> Path:
+    """An unpacked source distribution of this tree."""
+    return unpack(build_sdist(folder), folder)
+
+
+@pytest.fixture(scope="module")
+def wheel(source: Path, folder: Path) -> Path:
+    """The wheel that the source distribution makes."""
+    return build_wheel(source, folder)
+
+
+@pytest.fixture(scope="module")
+def python(wheel: Path, folder: Path) -> Path:
     """Interpreter of a fresh environment: our wheel, everything else from the test environment."""
-    folder = tmp_path_factory.mktemp("wheel")
-    build = [sys.executable, "-m", "pip", "wheel", "--quiet", "--no-deps", "--no-build-isolation", "-w", str(folder)]
-    source = folder / "source"
-    source.mkdir()
-    tracked = subprocess.run(
-        ["git", "ls-files", "--cached", "--others", "--exclude-standard"],
-        cwd=ROOT,
-        capture_output=True,
-        text=True,
-        check=True,
-    ).stdout.split("\n")
-    for name in filter(None, tracked):
-        if (ROOT / name).is_file() and not name.startswith("docs/figures"):
-            (source / name).parent.mkdir(parents=True, exist_ok=True)
-            (source / name).write_bytes((ROOT / name).read_bytes())
-    subprocess.run([*build, str(source)], check=True, capture_output=True)
-    venv.create(folder / "env")
-    own = folder / "env" / "bin" / "python"
-    install = [sys.executable, "-m", "pip", "--python", str(own), "install", "--quiet", "--no-deps"]
-    subprocess.run([*install, str(next(folder.glob("gensig-*.whl")))], check=True, capture_output=True)
-    code = "import sysconfig; print(sysconfig.get_paths()['purelib'])"
-    site = subprocess.run([own, "-c", code], capture_output=True, text=True, check=True).stdout.strip()
-    # a path line appends the folder without reading its own .pth files, so the editable gensig there stays unseen
-    (Path(site) / "test_environment.pth").write_text(sysconfig.get_paths()["purelib"] + "\n")
-    lend_compiled(Path(site), folder / "compiled")
-    return own
+    python = environment_with(wheel, folder)
+    lend_compiled(python)
+    return python
 
 
-def lend_compiled(site: Path, out: Path) -> None:
-    """What this environment has compiled serves the wheel, whose files are the same: compiling anew takes a minute."""
-    assert main([*RECORD, "executor.n_workers=1", f"out={out}"]) == 0
-    for part, one in (("dynamics", gensig.dynamics._kernels.integrate), ("mesh", gensig.mesh._kernels.lower_envelope)):
-        package = site / "gensig" / part
-        for source in (ROOT / "gensig" / part).glob("*.py"):
-            assert (package / source.name).read_bytes() == source.read_bytes()
-            shutil.copystat(source, package / source.name)  # the cache knows a file by its time and size
-        (package / "__pycache__").mkdir(exist_ok=True)
-        for compiled in Path(one.stats.cache_path).glob("*.nb[ci]"):
-            shutil.copy(compiled, package / "__pycache__")
+def test_source_distribution_holds_the_whole_tree(source: Path) -> None:
+    assert {name for name in files_of_the_tree() if not (source / name).is_file()} == set()
+    license_text = (source / "LICENSE").read_text(encoding="utf-8")
+    assert "Apache License" in license_text
+
+
+def test_wheel_holds_the_packages_and_nothing_else(wheel: Path) -> None:
+    parts = [name.split("/", 1) for name in files_of_the_tree()]
+    expected = {f"{PACKAGES[part[0]]}/{part[1]}" for part in parts if part[0] in PACKAGES}
+    with zipfile.ZipFile(wheel) as archive:
+        files = {name for name in archive.namelist() if ".dist-info/" not in name}
+    assert files == expected
+    assert {"gensig/py.typed", "diagnose/py.typed", "gensig/configs/generate.yaml"} < files
 
 
 def test_wheel_runs_from_another_folder(python: Path, tmp_path: Path) -> None:
@@ -71,14 +103,40 @@ def test_wheel_runs_from_another_folder(python: Path, tmp_path: Path) -> None:
         return done.stdout
 
     code = "import gensig, gensig.configs, diagnose; print(gensig.__file__, gensig.configs.__file__, diagnose.__file__)"
-    assert all(str(python.parents[1]) in path for path in run(python, "-c", code).split())
+    paths = run(python, "-W", "error", "-c", code).split()
+    assert all(path.startswith(str(python.parents[1])) for path in paths)
     gensig = python.parent / "gensig"
-    assert "1.71178" in run(gensig, "stiffness", "fault=crack")
     assert "215.97" in run(gensig, "modes", "system=engine_gear_train")
     run(gensig, *RECORD, "out=data")
     run(gensig, "verify", "data")
     run(python.parent / "diagnose", "--help")
     assert sorted(path.name for path in tmp_path.iterdir()) == ["data"]
+
+
+def test_tests_run_from_the_wheel(source: Path, python: Path) -> None:
+    """A file of them; `make wheel-test` runs all."""
+    take_packages_out(source, python)
+    assert run_tests(source, python, ["-q", "-p", "no:cacheprovider", "tests/unit/test_units.py"], ENVIRONMENT) == 0
+
+
+def test_types_reach_those_who_use_the_wheel(python: Path, tmp_path: Path) -> None:
+    (tmp_path / "typed.py").write_text(TYPED)
+    (tmp_path / "mistyped.py").write_text(MISTYPED)
+    options = ["--python-executable", str(python), "--follow-imports=silent", "--cache-dir", str(tmp_path / "cache")]
+    command = [sys.executable, "-m", "mypy", *options, "typed.py", "mistyped.py"]
+    shown = subprocess.run(command, cwd=tmp_path, env=ENVIRONMENT, capture_output=True, text=True, check=False).stdout
+    errors = [line.split(" error: ")[0] for line in shown.splitlines() if " error: " in line]
+    assert errors == ["mistyped.py:4:", "mistyped.py:5:"], shown
+
+
+def test_all_is_every_extra_that_a_command_asks_for() -> None:
+    extras = PROJECT["optional-dependencies"]
+    assert extras["all"] == [f"gensig[{','.join(name for name in extras if name not in NOT_FOR_COMMANDS)}]"]
+    files = [path for name in ("gensig", "diagnose", "configs", "docs") for path in (ROOT / name).rglob("*")]
+    texts = [path.read_text(encoding="utf-8") for path in files if path.suffix in (".py", ".yaml", ".md")]
+    named = {name for text in texts for part in re.findall(r"gensig\[([\w, ]+)\]", text) for name in part.split(",")}
+    assert set(extras) - NOT_FOR_COMMANDS <= named  # whoever lacks a package is told the extra that brings it
+    assert named <= set(extras)
 
 
 def test_this_environment_finds_its_configuration(tmp_path: Path) -> None:
