@@ -11,7 +11,7 @@ from gensig.config import read_request
 from gensig.dynamics.bearing_sizes import BearingSize, bearing_for
 from gensig.errors import ConfigError
 from gensig.geometry.contact import GearPair
-from gensig.option_file import option_lines
+from gensig.option_writing import option_lines
 from gensig.systems.pair_machine import PairMachine
 from gensig.systems.registry import SIDES, read_pair, read_system
 
@@ -40,6 +40,7 @@ class DataSheet:
     helix_angle: float = 0.0
     pressure_angle: float | None = None
     profile_shifts: tuple[float, float] | None = None
+    addendum: float | None = None
     supports: tuple[float, float] | None = None
 
     def __post_init__(self) -> None:
@@ -107,6 +108,7 @@ def gear_option(sheet: DataSheet) -> GearOption:
     ConfigError, GeometryError    for gears that cannot be made or cannot mesh
     """
     pressure_angle = 20.0 if sheet.pressure_angle is None else sheet.pressure_angle
+    addendum = ADDENDUM if sheet.addendum is None else sheet.addendum
     gear: dict[str, Any] = {
         "name": sheet.name,
         "rated_speed_rpm": sheet.speed,
@@ -114,9 +116,9 @@ def gear_option(sheet: DataSheet) -> GearOption:
         "normal_module_mm": sheet.module,
         "pressure_angle_deg": pressure_angle,
         "helix_angle_deg": sheet.helix_angle,
-        "addendum_coefficient": ADDENDUM,
+        "addendum_coefficient": addendum,
         "clearance_coefficient": CLEARANCE,
-        "cutter_tip_radius_coefficient": tip_rounding(pressure_angle),
+        "cutter_tip_radius_coefficient": tip_rounding(pressure_angle, addendum),
         "backlash_um": 0.0,
     }
     widths = sheet.widths or (WIDTH_IN_MODULES * sheet.module,) * 2
@@ -164,17 +166,17 @@ def least_backlash(center_distance_mm: float, module_mm: float) -> float:
     return round(2e3 / 3.0 * (0.06 + 0.0005 * center_distance_mm + 0.03 * module_mm), 1)
 
 
-def tip_rounding(pressure_angle_deg: float) -> float:
+def tip_rounding(pressure_angle_deg: float, addendum: float = ADDENDUM) -> float:
     """Rounding of the rack's tip over the module: that of ISO 53-A, or what its tip has room for at other angles.
 
     The circle may reach neither the working flank, c / (1 - sin(alpha)), nor over the middle of the rack's tip,
-    (pi / 4 - (1 + c) tan(alpha)) cos(alpha) / (1 - sin(alpha)).
+    (pi / 4 - (h_a + c) tan(alpha)) cos(alpha) / (1 - sin(alpha)).
     """
     alpha = math.radians(pressure_angle_deg)
     if not 10.0 <= pressure_angle_deg <= 35.0:  # the geometry says so
         return LARGEST_ROUNDING
     room = 1.0 - math.sin(alpha)
-    middle = (math.pi / 4.0 - (ADDENDUM + CLEARANCE) * math.tan(alpha)) * math.cos(alpha) / room
+    middle = (math.pi / 4.0 - (addendum + CLEARANCE) * math.tan(alpha)) * math.cos(alpha) / room
     return max(0.01, min(LARGEST_ROUNDING, math.floor(100.1 * min(CLEARANCE / room, middle)) / 100.0))
 
 
@@ -230,7 +232,7 @@ def _remarks(sheet: DataSheet, machine: PairMachine, bearings: Sequence[BearingS
         "helix_angle_deg": "given; of the pinion, right-handed; the wheel's is the opposite"
         if sheet.is_helical
         else "spur",
-        "addendum_coefficient": "assumed, basic rack of ISO 53-A",
+        "addendum_coefficient": "assumed, basic rack of ISO 53-A" if sheet.addendum is None else GIVEN,
         "clearance_coefficient": "assumed, basic rack of ISO 53-A",
         "cutter_tip_radius_coefficient": "assumed, basic rack of ISO 53-A, or what its tip has room for",
         "backlash_um": "assumed, along the line of action: ISO/TR 10064-2, 2/3 (0.06 + 0.0005 a + 0.03 m) mm",

@@ -194,6 +194,7 @@ def new(parser: argparse.ArgumentParser) -> None:
     parser.add_argument("--helix", type=float, metavar="DEG", help="helix angle of the pinion (default: 0, spur)")
     parser.add_argument("--pressure-angle", type=float, metavar="DEG", help="of the basic rack (default: 20)")
     parser.add_argument("--profile-shifts", type=float, nargs="+", metavar="X", help="profile shifts (default: 0)")
+    parser.add_argument("--addendum", type=float, metavar="X", help="of the teeth, over the module (default: 1)")
     stiffness = "radial stiffness of what holds each gear (default: of ball bearings and shafts)"
     parser.add_argument("--supports", type=float, nargs="+", metavar="N_PER_M", help=stiffness)
     parser.add_argument("--dir", default="configs", help="folder of your options (default: configs)")

@@ -15,7 +15,7 @@ from typing import Any
 from gensig.compose import options
 from gensig.errors import ConfigError
 from gensig.gearbox import DataSheet, GearOption, gear_option
-from gensig.option_file import is_option_name
+from gensig.option_writing import is_option_name
 
 LEAST_TURNS = 10  # of the pinion in a record at the slowest speed
 SPEED_SHARES, TORQUE_SHARES = (0.5, 1.2), (0.3, 1.2)  # of the rated ones, over which a plan draws
@@ -118,6 +118,7 @@ def _sheet(arguments: Namespace) -> DataSheet:
         bores=both(arguments.bores),
         helix_angle=arguments.helix or 0.0,
         pressure_angle=arguments.pressure_angle,
+        addendum=arguments.addendum,
         profile_shifts=both(arguments.profile_shifts),
         supports=both(arguments.supports),
     )

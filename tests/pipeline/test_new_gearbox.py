@@ -1,0 +1,129 @@
+"""The verb new: what it derives, what it writes, that the commands it prints work, and what it refuses."""
+
+import io
+import json
+import math
+import shlex
+import sys
+
+import pytest
+import yaml
+from numpy.testing import assert_allclose
+
+from gensig.cli import main
+from gensig.gearbox import DataSheet, gear_option, least_backlash
+from gensig.option_writing import is_option_name
+
+SHEET = ("--teeth", "20", "45", "--module", "3", "--speed", "1500", "--torque", "60")
+
+
+def sheet(**changes) -> DataSheet:
+    return DataSheet(**{"name": "a", "teeth": (20, 45), "module": 3.0, "speed": 1500.0, "torque": 60.0, **changes})
+
+
+def test_masses_are_those_of_steel_discs_with_bores():
+    option = gear_option(sheet(widths=(30.0, 28.0), bores=(24.0, 40.0)))
+    for body, radius, bore, width in (
+        (option.machine.pinion, 0.030, 0.012, 0.030),
+        (option.machine.wheel, 0.0675, 0.020, 0.028),
+    ):
+        mass = option.machine.material.density_kg_per_m3 * math.pi * (radius**2 - bore**2) * width
+        assert_allclose(body.mass, mass, rtol=1e-12, atol=0.0)
+        assert_allclose(body.inertia, 0.5 * mass * (radius**2 + bore**2), rtol=1e-12, atol=0.0)
+
+
+def test_a_gearbox_twice_as_large_scales_as_it_should():
+    one, two = gear_option(sheet()), gear_option(sheet(module=6.0, torque=480.0))
+    assert_allclose(two.derived()["center_distance_mm"], 2.0 * one.derived()["center_distance_mm"], rtol=1e-12, atol=0)
+    assert_allclose(two.machine.pinion.mass, 8.0 * one.machine.pinion.mass, rtol=1e-9, atol=0.0)
+    assert_allclose(two.pair.transverse_contact_ratio, one.pair.transverse_contact_ratio, rtol=1e-12, atol=0.0)
+    assert two.machine.pinion.support.stiffness_y > one.machine.pinion.support.stiffness_y
+
+
+def test_backlash_is_that_of_the_printed_rule():
+    assert least_backlash(100.0, 5.0) == pytest.approx(173.3, abs=0.05)  # 2/3 (0.06 + 0.05 + 0.15) mm
+
+
+def test_every_value_of_the_option_has_a_remark_and_the_given_ones_are_kept(tmp_path, capsys):
+    more = ("--widths", "25", "--bores", "22", "40", "--supports", "1e8", "--profile-shifts", "0.2", "-0.1")
+    assert main(["new", "gearbox", "mine", *SHEET, *more, "--dir", str(tmp_path), "--json"]) == 0
+    text = (tmp_path / "gear" / "mine.yaml").read_text()
+    gear = yaml.safe_load(text)
+    assert [gear[side]["face_width_mm"] for side in ("pinion", "wheel")] == [25.0, 25.0]
+    assert [gear[side]["bore_radius_mm"] for side in ("pinion", "wheel")] == [11.0, 20.0]
+    assert [gear[side]["profile_shift"] for side in ("pinion", "wheel")] == [0.2, -0.1]
+    assert gear["wheel"]["support"]["stiffness_x_n_per_m"] == 1e8
+    bare = [line for line in text.splitlines() if ": " in line and "#" not in line and "name:" not in line]
+    assert bare == []
+    derived = json.loads(capsys.readouterr().out)["derived"]
+    assert derived["mesh_frequency_hz"] == 500.0
+    assert 1.2 < derived["transverse_contact_ratio"] < 2.0
+
+
+@pytest.mark.parametrize("helix", [(), ("--helix", "20")], ids=["spur", "helical"])
+def test_the_printed_commands_work_as_printed(helix, tmp_path, monkeypatch, capsys):
+    monkeypatch.chdir(tmp_path)
+    assert main(["new", "gearbox", "mine", *SHEET, *helix]) == 0
+    printed = capsys.readouterr().out.partition("next:\n")[2].splitlines()
+    simulate, generate, report = (shlex.split(line)[1:] for line in printed)
+    cheap = ["operating.duration_s=0.1", "mesh.n_slices=8"]
+    assert main([*simulate, *cheap]) == 0
+    assert "mesh frequency 500.00 Hz" in capsys.readouterr().out
+    assert (tmp_path / "mine.png").stat().st_size > 10_000
+    assert main([*generate, *cheap, "plan.n_records=10", "plan.n_units=2", "executor.n_workers=1"]) == 0
+    assert main(report) == 0
+    assert main(["verify", "runs/mine"]) == 0
+
+
+@pytest.mark.parametrize(
+    ("words", "message"),
+    [
+        (("mine",), "missing --teeth, --module, --speed, --torque"),
+        (("../mine", *SHEET), "cannot be the name of a gearbox"),
+        (("null", *SHEET), "cannot be the name of a gearbox"),
+        (("xiamen_23_84", *SHEET), "comes with gensig"),
+        (("mine", *SHEET, "--teeth", "9", "40"), "undercut; use at least"),
+        (("mine", *SHEET, "--bores", "60", "60"), "bore_radius_mm = 30 must lie between 0 and the root radius"),
+        (("mine", *SHEET, "--bores", "2"), "thinner than any bearing"),
+        (("mine", *SHEET, "--module", "-1"), "--module -1 must be positive"),
+        (("mine", *SHEET, "--widths", "1", "2", "3"), "--widths takes one number for both gears, or two"),
+        (("mine", *SHEET, "--helix", "60"), "helix_angle_deg"),
+    ],
+)
+def test_what_makes_no_gearbox_is_refused_in_one_line(words, message, tmp_path, monkeypatch, capsys):
+    monkeypatch.setattr(sys, "stdin", io.StringIO(""))
+    assert main(["new", "gearbox", *words, "--dir", str(tmp_path)]) == 2
+    assert message in capsys.readouterr().err.strip().splitlines()[-1]
+    assert not list(tmp_path.rglob("*.yaml"))
+
+
+def test_nothing_is_overwritten(tmp_path, capsys):
+    words = ["new", "gearbox", "mine", *SHEET, "--dir", str(tmp_path)]
+    assert main(words) == 0
+    before = (tmp_path / "gear" / "mine.yaml").read_bytes()
+    assert main([*words, "--torque", "90"]) == 2
+    assert "is there already" in capsys.readouterr().err
+    assert (tmp_path / "gear" / "mine.yaml").read_bytes() == before
+
+
+def test_an_interrupted_drive_is_said_loudly(tmp_path, capsys):
+    stub = ("--teeth", "38", "55", "--addendum", "0.5")
+    assert main(["new", "gearbox", "mine", *SHEET, *stub, "--dir", str(tmp_path)]) == 0
+    assert "contact ratio 0.9" in capsys.readouterr().err
+    assert (tmp_path / "gear" / "mine.yaml").exists()
+
+
+def test_on_a_terminal_it_asks(tmp_path, monkeypatch):
+    answers = iter(["20", "20, 45", "3", "1500", "60", "", "30 28", "", ""])  # the first is one number too few
+    monkeypatch.setattr("builtins.input", lambda question: next(answers))
+    monkeypatch.setattr(sys, "stdin", type("Terminal", (), {"isatty": lambda self: True})())
+    assert main(["new", "gearbox", "mine", "--dir", str(tmp_path)]) == 0
+    gear = yaml.safe_load((tmp_path / "gear" / "mine.yaml").read_text())
+    assert [gear[side]["face_width_mm"] for side in ("pinion", "wheel")] == [30.0, 28.0]
+    assert gear["rated_torque_nm"] == 60.0
+
+
+@pytest.mark.parametrize("name", ["", "1a", "a/b", "a b", "None", "true", "é", "a" * 65, "-a", "a.b"])
+def test_unsafe_names(name):
+    assert not is_option_name(name)
+    assert is_option_name("FZG-C_1")
