@@ -1,4 +1,5 @@
 # make demo: everything from nothing to a report.   make test: everything from nothing to a green test run.
+# make docs: the documentation as a site in build/site, which opens from the disk.
 # PIP_ARGS passes options to pip, for instance PIP_ARGS="--index-url https://..." for another build of torch.
 PYTHON ?= python3
 VENV ?= .venv
@@ -8,7 +9,7 @@ DEMO ?= demo
 PYTEST_ARGS ?= -n 2 --dist loadfile --no-loadscope-reorder
 BIN := $(VENV)/bin
 
-.PHONY: demo test check wheel-test clean
+.PHONY: demo test check wheel-test docs clean
 
 demo: $(VENV)/.installed
 	@test ! -e $(DEMO) || { echo "$(DEMO) exists: remove it, or choose another folder with DEMO=..."; exit 2; }
@@ -27,12 +28,20 @@ wheel-test: $(VENV)/.installed-test
 check: $(VENV)/.installed-test
 	$(BIN)/ruff check . && $(BIN)/ruff format --check . && $(BIN)/mypy && $(BIN)/lint-imports
 
+docs: $(VENV)/.installed-docs
+	$(BIN)/mkdocs build --strict
+	@echo "Open build/site/index.html; with the search: $(BIN)/python -m http.server --directory build/site"
+
 $(VENV)/.installed: pyproject.toml constraints.txt | $(VENV)/bin/python
 	$(BIN)/python -m pip install --quiet $(PIP_ARGS) --constraint constraints.txt --editable .
 	@touch $@
 
 $(VENV)/.installed-test: pyproject.toml constraints.txt | $(VENV)/bin/python
 	$(BIN)/python -m pip install --quiet $(PIP_ARGS) --constraint constraints.txt --editable ".[test]"
+	@touch $@ $(VENV)/.installed
+
+$(VENV)/.installed-docs: pyproject.toml constraints.txt | $(VENV)/bin/python
+	$(BIN)/python -m pip install --quiet $(PIP_ARGS) --constraint constraints.txt --editable ".[docs]"
 	@touch $@ $(VENV)/.installed
 
 $(VENV)/bin/python:

@@ -8,7 +8,7 @@ from typing import Any
 
 from diagnose.answer_figures import conditions_figure, detection_figure, graded_classes, window_length_figure
 from diagnose.judged import interval_text
-from diagnose.page import Section, Table
+from gensig.page import Section, Table
 
 
 def answer_sections(folder: Path, clean: Mapping[str, Any]) -> list[Section]:

@@ -5,9 +5,10 @@ from __future__ import annotations
 import importlib
 import sys
 from collections.abc import Sequence
+from typing import Any
 
-from diagnose.commands.parser import Parser
-from gensig.errors import ConfigError, GensigError
+from gensig.program import HELP_FLAGS, Parser, exit_text, guarded, refuse_verb
+from gensig.version import __version__
 
 # Verb -> what it does; ``diagnose.commands.VERB`` has ``run(words) -> exit status``.
 VERBS = {
@@ -21,41 +22,59 @@ VERBS = {
 }
 
 
+OF_GENSIG = ("generate", "plan", "resume", "inspect", "verify", "simulate", "options", "completion", "reproduce")
+PROGRAM = "diagnose"
+
+
 def main(argv: Sequence[str] | None = None) -> int:
     """Run the command; exit status 0, 2 for a mistake, 3 for the flag of predict, 130 when interrupted."""
+    from gensig.completion import answer, is_asked
+
+    if is_asked():
+        verbs = {name: (summary, _module(name).add_arguments) for name, summary in VERBS.items()}
+        answer(PROGRAM, verbs, primary="train")
     words = list(sys.argv[1:] if argv is None else argv)
-    try:
-        return _dispatch(words)
-    except GensigError as error:
-        print(f"diagnose: {' '.join(str(error).split())}", file=sys.stderr)
-        return 2
-    except OSError as error:
-        where = f"{error.filename}: " if error.filename else ""
-        print(f"diagnose: {where}{error.strerror or error}", file=sys.stderr)
-        return 2
-    except KeyboardInterrupt:
-        print("diagnose: interrupted", file=sys.stderr)
-        return 130
+    return guarded(PROGRAM, lambda: _dispatch(words), interrupted="interrupted")
 
 
 def _dispatch(words: list[str]) -> int:
-    top = Parser(
-        prog="diagnose",
-        description="Train and judge fault classifiers on gensig data sets.",
-        epilog="Each command has its own --help with an example.",
-    )
-    verbs = top.add_subparsers(dest="verb", metavar=" | ".join(VERBS), parser_class=Parser)
-    for name, summary in VERBS.items():
-        verbs.add_parser(name, help=summary, add_help=False)
-    if not words:
-        top.print_help(sys.stderr)
-        return 2
-    if words[0] in ("-h", "--help"):
-        top.print_help()
+    if words[:1] == ["help"]:
+        words = [*words[1:2], HELP_FLAGS[1]]
+    if not words or words[0] in HELP_FLAGS:
+        print(_help(), file=sys.stdout if words else sys.stderr)
+        return 0 if words else 2
+    if words[0] in ("-V", "--version"):
+        print(f"diagnose {__version__}")
         return 0
     if words[0] not in VERBS:
-        raise ConfigError(f"no command '{words[0]}'; there is {', '.join(VERBS)}")
-    return int(importlib.import_module(f"diagnose.commands.{words[0]}").run(words[1:]))
+        refuse_verb(PROGRAM, words[0], VERBS, "gensig", OF_GENSIG)
+    try:
+        return int(_module(words[0]).run(words[1:]))
+    except SystemExit as leaving:  # --help
+        return int(leaving.code or 0)
+
+
+def verb_parser(name: str) -> Parser:
+    """The parser of a verb, with its help."""
+    parser: Parser = _module(name).parser()
+    return parser
+
+
+def _module(verb: str) -> Any:
+    return importlib.import_module(f"diagnose.commands.{verb}")
+
+
+def _help() -> str:
+    width = max(map(len, VERBS))
+    verbs = "\n".join(f"  {name:<{width}}  {summary}" for name, summary in VERBS.items())
+    statuses = exit_text({3: "predict: the recording is unlike the training data"})
+    return (
+        "usage: diagnose COMMAND [ARGUMENTS]\n\n"
+        "Train and judge fault classifiers on gensig data sets.\n\n"
+        f"commands:\n{verbs}\n\n"
+        "gensig options train lists the keys of diagnose train, gensig options model its networks.\n"
+        f"diagnose COMMAND --help explains each, with an example.\n\n{statuses}"
+    )
 
 
 if __name__ == "__main__":

@@ -5,8 +5,8 @@ from __future__ import annotations
 from collections.abc import Mapping
 from typing import Any
 
-from diagnose.page import Section, Table
 from diagnose.report_text import METHODS, score_cell
+from gensig.page import Section, Table
 
 # In the order of the rows; of these chance must lie in the interval.
 AT_CHANCE = {

@@ -14,8 +14,8 @@ from diagnose.figures import COLORS, save, subplots
 from diagnose.life_scores import BAND, MEASURES
 from diagnose.life_study import AGE_ONLY, AND_AGE, LifePrediction
 from diagnose.lives import Lives
-from diagnose.page import Card, Section, Table, write_page
 from diagnose.protocols import MEANING
+from gensig.page import Card, Section, Table, write_page
 
 FEW_LIVES = 10
 MOST_LINES = 12  # lives in one panel; more cannot be told apart

@@ -6,7 +6,7 @@ from collections.abc import Mapping
 from typing import Any
 
 from diagnose.novelty_metrics import FALSE_ALARMS, LEAST_VALIDATION, TRUE_POSITIVES
-from diagnose.page import Section, Table
+from gensig.page import Section, Table
 
 METHODS = {
     "nearest_indicators": "5th neighbour, indicators",

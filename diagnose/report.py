@@ -13,7 +13,6 @@ from diagnose.controls_text import controls_section
 from diagnose.figures import confusion_figure, reliability_figure, scores_figure
 from diagnose.heads import heads_notes
 from diagnose.novelty_report import novelty_sections
-from diagnose.page import Section, Table, write_page
 from diagnose.protocols import MEANING
 from diagnose.report_text import (
     METHOD_MEANING,
@@ -25,6 +24,7 @@ from diagnose.report_text import (
     score_cell,
     trust_table,
 )
+from gensig.page import Section, Table, write_page
 
 LEAKY_MEANING = (
     "windows of one record on both sides of the split, as in many papers. It shows how much a careless split flatters; "

@@ -8,7 +8,7 @@ from typing import Any
 import numpy as np
 
 from diagnose.novelty_report import novelty_caveats
-from diagnose.page import Card, Table
+from gensig.page import Card, Table
 
 FEW_UNITS = 10
 CONFUSED = 0.1

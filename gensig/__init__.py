@@ -20,11 +20,12 @@ from gensig.version import __version__
 
 if TYPE_CHECKING:
     from gensig.dataset.reader import Dataset
+    from gensig.faults.base import Fault
     from gensig.pairs import FaultPairs
     from gensig.streaming import RecordStream
     from gensig.systems.pair_machine import PairMachine
 
-__all__ = ["__version__", "fault_pairs", "generate", "load_system", "open_dataset", "stream"]
+__all__ = ["__version__", "fault_pairs", "generate", "load_faults", "load_system", "open_dataset", "stream"]
 
 
 def open_dataset(path: str | Path, *, allow_incomplete: bool = False) -> Dataset:
@@ -35,11 +36,30 @@ def open_dataset(path: str | Path, *, allow_incomplete: bool = False) -> Dataset
 
 
 def load_system(*overrides: str, config_dir: str | Path | None = None) -> PairMachine:
-    """The machine that overrides describe, as the commands would build it."""
+    """The sound machine that overrides describe, as the commands would build it; for its faults see `load_faults`."""
     from gensig.config import read_request
     from gensig.systems.registry import read_system
 
     return read_system(read_request(overrides, config_dir=config_dir).config)
+
+
+def load_faults(*overrides: str, config_dir: str | Path | None = None) -> tuple[Fault, ...]:
+    """The faults that overrides describe, for the methods of a machine; none for ``fault=healthy``.
+
+    >>> import gensig
+    >>> faults = gensig.load_faults("fault=crack", "fault.crack_depth_mm=1.5")
+    >>> curves = gensig.load_system().stiffness_curves(faults)
+    >>> bool((curves.faulty_pair_stiffness <= curves.single_pair_stiffness).all())
+    True
+
+    Raises
+    ------
+    gensig.errors.GensigError    for anything that cannot be used
+    """
+    from gensig.config import read_request
+    from gensig.faults.registry import read_faults
+
+    return read_faults(read_request(overrides, config_dir=config_dir).config["fault"])
 
 
 def generate(*overrides: str, out: str | Path, config_dir: str | Path | None = None) -> Dataset:

@@ -2,47 +2,34 @@
 
 from __future__ import annotations
 
-import argparse
-import difflib
 import importlib
 import sys
 from collections.abc import Sequence
-from typing import NoReturn
 
 from gensig.commands.verbs import OVERRIDES, VERBS
-from gensig.errors import ConfigError, GensigError
+from gensig.program import HELP_FLAGS, Parser, exit_text, guarded, refuse_verb
 from gensig.version import __version__
 
-
-class _Parser(argparse.ArgumentParser):
-    """Parser whose complaints are the one line of ``main``."""
-
-    def error(self, message: str) -> NoReturn:
-        raise ConfigError(f"{message}; see {self.prog} --help")
+PROGRAM = "gensig"
+OF_DIAGNOSE = ("train", "evaluate", "predict", "adapt", "detectability", "score")
 
 
 def main(argv: Sequence[str] | None = None) -> int:
     """Run the command; exit status 0, 1 for partial or damaged results, 2 for a mistake, 130 when interrupted."""
+    from gensig.completion import answer, is_asked
+
+    if is_asked():
+        verbs = {name: (verb.summary, verb.arguments) for name, verb in VERBS.items()}
+        answer(PROGRAM, verbs, primary="generate")
     words = list(sys.argv[1:] if argv is None else argv)
-    try:
-        return _run(words)
-    except GensigError as error:
-        return _complain(str(error))
-    except OSError as error:
-        where = f"{error.filename}: " if error.filename else ""
-        return _complain(f"{where}{error.strerror or error}")
-    except KeyboardInterrupt:
-        _complain("interrupted; a data set begun is incomplete, and gensig resume DIR finishes it")
-        return 130
-
-
-def _complain(message: str) -> int:
-    print(f"gensig: {' '.join(message.split())}", file=sys.stderr)
-    return 2
+    interrupted = "interrupted; a data set begun is incomplete, and gensig resume DIR finishes it"
+    return guarded(PROGRAM, lambda: _run(words), interrupted=interrupted)
 
 
 def _run(words: list[str]) -> int:
-    if not words or words[0] in ("-h", "--help"):
+    if words[:1] == ["help"]:
+        words = [*words[1:2], HELP_FLAGS[1]]
+    if not words or words[0] in HELP_FLAGS:
         print(_help(), file=sys.stdout if words else sys.stderr)
         return 0 if words else 2
     if words[0] in ("-V", "--version"):
@@ -50,17 +37,8 @@ def _run(words: list[str]) -> int:
         return 0
     name = words[0]
     if name not in VERBS:
-        close = difflib.get_close_matches(name, VERBS, n=1)
-        hint = f"did you mean '{close[0]}'?" if close else f"there is {', '.join(VERBS)}"
-        raise ConfigError(f"no command '{name}'; {hint}")
-    verb = VERBS[name]
-    parser = _Parser(
-        prog=f"gensig {name}",
-        description=f"{verb.summary[0].upper()}{verb.summary[1:]}.",
-        epilog=f"example:\n  {verb.example}",
-        formatter_class=argparse.RawDescriptionHelpFormatter,
-    )
-    verb.arguments(parser)
+        refuse_verb(PROGRAM, name, VERBS, "diagnose", OF_DIAGNOSE)
+    verb, parser = VERBS[name], verb_parser(name)
     try:
         arguments = parser.parse_intermixed_args(words[1:])
     except SystemExit as leaving:
@@ -68,18 +46,38 @@ def _run(words: list[str]) -> int:
     from gensig.commands.console import one_line_warnings
 
     module, function = verb.runs.split(":")
-    with one_line_warnings("gensig"):
-        return int(getattr(importlib.import_module(module), function)(arguments))
+    with one_line_warnings(PROGRAM):
+        status = int(getattr(importlib.import_module(module), function)(arguments))
+    if verb.instead is not None:
+        from gensig.commands.reading import say_unread
+
+        say_unread(arguments, verb.instead)
+    return status
+
+
+def verb_parser(name: str) -> Parser:
+    """The parser of a verb, with its help."""
+    verb = VERBS[name]
+    exits = {} if verb.one is None else {1: verb.one}
+    summary = f"{verb.summary[0].upper()}{verb.summary[1:]}".rstrip(".") + ("" if verb.summary.endswith("?") else ".")
+    heading = "examples" if "\n" in verb.example else "example"
+    parser = Parser(f"{PROGRAM} {name}", summary, f"{heading}:\n  {verb.example}", exits)
+    verb.arguments(parser)
+    parser.set_defaults(verb=name)
+    return parser
 
 
 def _help() -> str:
-    verbs = "\n".join(f"  {name:<10} {verb.summary}" for name, verb in VERBS.items())
+    width = max(map(len, VERBS))
+    statuses = exit_text({1: "partial, damaged or other results: each COMMAND --help says which"})
+    verbs = "\n".join(f"  {name:<{width}}  {verb.summary}" for name, verb in VERBS.items())
     return (
         "usage: gensig COMMAND [ARGUMENTS]\n\n"
         "Labelled gear-fault vibration data sets from physics.\n\n"
         f"commands:\n{verbs}\n\n"
         f"{OVERRIDES}\n"
-        "gensig COMMAND --help explains each, with an example."
+        "gensig options lists the groups, their options and their keys.\n"
+        f"gensig COMMAND --help explains each, with an example.\n\n{statuses}"
     )
 
 

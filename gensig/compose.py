@@ -20,6 +20,7 @@ from hydra.errors import HydraException
 from omegaconf import OmegaConf
 from omegaconf.errors import OmegaConfBaseException
 
+from gensig import nearest, option_files
 from gensig.errors import ConfigError
 
 CONFIG_MODULE = "gensig.configs"
@@ -53,7 +54,7 @@ def compose(config_name: str, overrides: Sequence[str] = (), *, config_dir: str 
             config = hydra_compose(config_name=config_name, overrides=words)
             resolved = OmegaConf.to_container(config, resolve=True, throw_on_missing=True)
         except (HydraException, OmegaConfBaseException, ValueError) as error:
-            raise ConfigError(_explain(error, config_name, words)) from None
+            raise ConfigError(_explain(error, config_name, words, config_dir)) from None
     assert isinstance(resolved, dict)
     return {str(key): value for key, value in resolved.items()}
 
@@ -136,13 +137,16 @@ def _parse(overrides: Sequence[str]) -> list[Any]:
     for word in overrides:
         if not isinstance(word, str):
             raise ConfigError(f"an override is a text such as 'seed=1', not {word!r}; give each as its own argument")
+        if "=" not in word and not word.startswith("~"):
+            text = "is neither group=option nor key=value, such as fault=crack or seed=1"
+            raise ConfigError(f"cannot read the override: '{word}' {text}")
     try:
         return list(OverridesParser.create().parse_overrides(overrides=list(overrides)))
     except HydraException as error:
         raise ConfigError(f"cannot read the override: {_first_line(error)}") from None
 
 
-def _explain(error: Exception, config_name: str, overrides: Sequence[str]) -> str:
+def _explain(error: Exception, config_name: str, overrides: Sequence[str], config_dir: str | Path | None) -> str:
     """One line for a failed composition, with the nearest existing names."""
     text = " ".join(str(error).split())
     if "Config group override must be" in text:
@@ -159,10 +163,8 @@ def _explain(error: Exception, config_name: str, overrides: Sequence[str]) -> st
             return f"unknown key '{key}'{_nearest(key, _known_keys(config_name))}"
     if found := re.search(r"Could not find '([^']+)'", text):
         group, _, wanted = found.group(1).rpartition("/")
-        names = options(group) if group else []
-        return f"no option '{wanted}' of {group or 'the configuration'}" + (
-            f"; there is {', '.join(names)}" if names else ""
-        )
+        names = [one.name for one in option_files.options(group, config_dir)] if group else []
+        return f"no option '{wanted}' of {group or 'the configuration'}; {nearest.hint(wanted, names)}"
     if "mismatched input" in text or "extraneous input" in text or "no viable alternative" in text:
         return f"cannot read the override: {text}"
     if found := re.search(r"Could not override '([^']+)'\. No match in the defaults list", text):

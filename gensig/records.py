@@ -153,7 +153,7 @@ def _finish(
         signals["acceleration_source"] = source.astype(np.float32)
     if config["dataset"]["store_operating"]:
         angle = np.full(n_samples, MISSING) if isinstance(result, SimulationError) else result.shaft_angle
-        signals |= operating_signals(system.operating, sensing.sampling_rate, angle)
+        signals |= operating_signals(system.operating, sensing.sampling_rate, angle, system.load_exponent)
     signals |= row_shaft_signals(config, system, row, result if isinstance(result, CleanRecord) else None)
     if config["dataset"]["store_mesh_state"]:
         signals |= mesh_signals(result.mesh if isinstance(result, CleanRecord) else None, n_samples, system.most_pairs)

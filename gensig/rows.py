@@ -12,6 +12,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
+from gensig import nearest
 from gensig.errors import ConfigError, SimulationError
 from gensig.faults.base import Fault
 from gensig.faults.registry import read_faults
@@ -251,5 +252,18 @@ def replace_key(config: dict[str, Any], key: str, value: float) -> None:
     for name in parents:
         node = node.get(name) if isinstance(node, dict) else None
     if not isinstance(node, dict) or leaf not in node or isinstance(node[leaf], dict | list | str | bool):
-        raise ConfigError(f"plan.vary: '{key}' is no key of the configuration that holds a number")
+        near = nearest.near(key, [one for one in _numeric_keys(config) if not one.startswith(FIXED_KEYS)])
+        hint = f"; did you mean {' or '.join(map(repr, near))}?" if near else ""
+        raise ConfigError(f"plan.vary: '{key}' is no key of the configuration that holds a number{hint}")
     node[leaf] = int(value) if isinstance(node[leaf], int) and float(value).is_integer() else value
+
+
+def _numeric_keys(tree: Mapping[str, Any], prefix: str = "") -> list[str]:
+    """Dotted keys that hold numbers."""
+    found = []
+    for name, value in tree.items():
+        if isinstance(value, dict):
+            found += _numeric_keys(value, f"{prefix}{name}.")
+        elif isinstance(value, int | float) and not isinstance(value, bool):
+            found.append(f"{prefix}{name}")
+    return found

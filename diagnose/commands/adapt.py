@@ -2,10 +2,11 @@
 
 from __future__ import annotations
 
+from argparse import ArgumentParser
 from collections.abc import Sequence
 from pathlib import Path
 
-from diagnose.commands.parser import refuse_existing, verb_parser
+from diagnose.commands.parser import Parser, refuse_existing, verb_parser
 
 HELP = """\
 Move a trained network to a machine by healthy recordings of it, and write it as another model for predict.
@@ -20,9 +21,15 @@ example:
   diagnose predict --model runs/mine today.csv"""
 
 
-def run(words: Sequence[str]) -> int:
-    """Write the adapted model and say what changed for the recordings that it was adapted by."""
+def parser() -> Parser:
+    """The verb's parser, with its help."""
     parser = verb_parser("adapt", HELP, EXAMPLE)
+    add_arguments(parser)
+    return parser
+
+
+def add_arguments(parser: ArgumentParser) -> None:
+    """What can be typed behind the verb."""
     parser.add_argument("--model", required=True, metavar="DIR", help="folder that diagnose train wrote below models/")
     parser.add_argument("--healthy", required=True, nargs="+", metavar="RECORDING", help="as diagnose predict takes")
     parser.add_argument("--method", required=True, choices=("adabn", "coral"), help="see docs/howto/bridge.md")
@@ -34,7 +41,11 @@ def run(words: Sequence[str]) -> int:
     parser.add_argument("--channels", nargs="+", metavar="NAME", help="for the model's channels, in their order")
     parser.add_argument("--unit", default="m/s2", help="m/s2 or g, where the column does not say (default: m/s2)")
     parser.add_argument("--array", metavar="NAME", help="array of .npz, .h5 or .mat files (default: acceleration)")
-    arguments = parser.parse_args(words)
+
+
+def run(words: Sequence[str]) -> int:
+    """Write the adapted model and say what changed for the recordings that it was adapted by."""
+    arguments = parser().parse_args(words)
     out = Path(arguments.out)
     refuse_existing(out)
     from diagnose.machine import adapt_model

@@ -2,11 +2,13 @@
 
 from __future__ import annotations
 
+import sys
+from argparse import ArgumentParser
 from collections.abc import Sequence
 from functools import partial
 from pathlib import Path
 
-from diagnose.commands.parser import verb_parser
+from diagnose.commands.parser import Parser, verb_parser
 from gensig.errors import ConfigError
 
 HELP = """\
@@ -22,11 +24,19 @@ examples:
   diagnose detectability fault=crack --plot crack.png --json crack.json
   diagnose detectability fault=pitting sensing=housing --speeds 600 1200 2400 --torques 10 40 --n-units 12"""
 FIGURE_TYPES = (".png", ".svg", ".pdf")
+NOT_READ = {"out": "--json and --plot", "plan": "--n-units, --speeds, --torques", "executor": "--workers"}
+READ_OF_PLAN = ("plan.n_gearboxes", "plan.sham", "plan.vary")
 
 
-def run(words: Sequence[str]) -> int:
-    """Make the maps, write them, print the best test and the worst."""
+def parser() -> Parser:
+    """The verb's parser, with its help."""
     parser = verb_parser("detectability", HELP, EXAMPLE)
+    add_arguments(parser)
+    return parser
+
+
+def add_arguments(parser: ArgumentParser) -> None:
+    """What can be typed behind the verb."""
     parser.add_argument("overrides", nargs="*", metavar="OVERRIDES", help="see above")
     parser.add_argument("--config-dir", metavar="DIR", help="folder with groups and options of your own")
     shares = "of the driving pinion (default: shares of the set-point,"
@@ -39,7 +49,11 @@ def run(words: Sequence[str]) -> int:
     parser.add_argument("--workers", type=int, metavar="N", help="processes (default: one a core)")
     parser.add_argument("--json", metavar="FILE", help="write every number")
     parser.add_argument("--plot", metavar="FILE", help="write a figure (PNG, SVG or PDF)")
-    arguments = parser.parse_intermixed_args(words)
+
+
+def run(words: Sequence[str]) -> int:
+    """Make the maps, write them, print the best test and the worst."""
+    arguments = parser().parse_intermixed_args(words)
     figure, table = _file("--plot", arguments.plot, FIGURE_TYPES), _file("--json", arguments.json, (".json",))
     if arguments.workers is not None and arguments.workers < 1:
         raise ConfigError(f"--workers {arguments.workers} must be at least 1")
@@ -47,6 +61,7 @@ def run(words: Sequence[str]) -> int:
     speeds, torques, bandwidths = (
         _numbers(f"--{name}", getattr(arguments, name), overrides) for name in ("speeds", "torques", "bandwidths")
     )
+    _say_unread(overrides)
     import gensig
     from diagnose.detectability import confirm_best, make_maps, read_bandwidths
     from diagnose.detectability_report import content, summary
@@ -78,6 +93,16 @@ def run(words: Sequence[str]) -> int:
 
         detectability_figure(figure, maps)
     return 0
+
+
+def _say_unread(overrides: Sequence[str]) -> None:
+    """One line on stderr for every typed key of which a map makes nothing."""
+    from gensig.compose import override_keys
+
+    for key in override_keys(overrides):
+        flag = next((flag for name, flag in NOT_READ.items() if key == name or key.startswith(f"{name}.")), None)
+        if flag is not None and key not in READ_OF_PLAN:
+            print(f"diagnose: note: {key} is not read by detectability; use {flag}", file=sys.stderr)
 
 
 def _numbers(flag: str, given: Sequence[str] | None, overrides: list[str]) -> list[float] | None:

@@ -3,10 +3,11 @@
 from __future__ import annotations
 
 import difflib
+from argparse import ArgumentParser
 from collections.abc import Mapping, Sequence
 from pathlib import Path
 
-from diagnose.commands.parser import refuse_existing, verb_parser
+from diagnose.commands.parser import Parser, refuse_existing, verb_parser
 from gensig.errors import ConfigError
 
 HELP = """\
@@ -29,11 +30,21 @@ examples:
 KEYS = ("data", "model_dir", "out", "protocol", "subset", "channels")
 
 
+def parser() -> Parser:
+    """The verb's parser, with its help."""
+    parser = verb_parser("evaluate", HELP, EXAMPLE)
+    add_arguments(parser)
+    return parser
+
+
+def add_arguments(parser: ArgumentParser) -> None:
+    """What can be typed behind the verb."""
+    parser.add_argument("overrides", nargs="*", metavar="key=value", help="see above")
+
+
 def run(words: Sequence[str]) -> int:
     """Judge a trained network and print its scores."""
-    parser = verb_parser("evaluate", HELP, EXAMPLE)
-    parser.add_argument("overrides", nargs="*", metavar="key=value", help="see above")
-    arguments = parser.parse_intermixed_args(words)
+    arguments = parser().parse_intermixed_args(words)
     values = _key_values(arguments.overrides)
     out = Path(values["out"]) if "out" in values else None
     if out is not None:

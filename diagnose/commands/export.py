@@ -2,10 +2,11 @@
 
 from __future__ import annotations
 
+from argparse import ArgumentParser
 from collections.abc import Sequence
 from pathlib import Path
 
-from diagnose.commands.parser import verb_parser
+from diagnose.commands.parser import Parser, verb_parser
 from gensig.errors import ConfigError, DatasetError
 
 HELP = """\
@@ -19,13 +20,23 @@ example:
   diagnose export --to onnx --model runs/report/models/by_unit-seed0 --out gearbox.onnx"""
 
 
-def run(words: Sequence[str]) -> int:
-    """Write the file, check it, and say how well it agrees."""
+def parser() -> Parser:
+    """The verb's parser, with its help."""
     parser = verb_parser("export", HELP, EXAMPLE)
+    add_arguments(parser)
+    return parser
+
+
+def add_arguments(parser: ArgumentParser) -> None:
+    """What can be typed behind the verb."""
     parser.add_argument("--to", required=True, choices=["onnx"], help="format; needs pip install 'gensig[onnx]'")
     parser.add_argument("--model", required=True, metavar="DIR", help="folder that diagnose train wrote below models/")
     parser.add_argument("--out", required=True, metavar="FILE", help="file to write, .onnx; must not exist")
-    arguments = parser.parse_args(words)
+
+
+def run(words: Sequence[str]) -> int:
+    """Write the file, check it, and say how well it agrees."""
+    arguments = parser().parse_args(words)
     out = Path(arguments.out)
     if out.suffix != ".onnx":
         raise ConfigError(f"--out {out}: the name must end in .onnx")

@@ -2,30 +2,16 @@
 
 from __future__ import annotations
 
-import argparse
+from collections.abc import Mapping
 from pathlib import Path
-from typing import NoReturn
 
-from gensig.errors import ConfigError, DatasetError
-
-
-class Parser(argparse.ArgumentParser):
-    """Parser whose complaints are the one line of `diagnose.cli.main`."""
-
-    def error(self, message: str) -> NoReturn:
-        """Refuse the words."""
-        raise ConfigError(f"{message}; see {self.prog} --help")
+from gensig.errors import DatasetError
+from gensig.program import Parser
 
 
-def verb_parser(verb: str, description: str, epilog: str) -> Parser:
-    """Parser of a verb, to be given its arguments."""
-    return Parser(
-        prog=f"diagnose {verb}",
-        description=description,
-        epilog=epilog,
-        formatter_class=argparse.RawDescriptionHelpFormatter,
-        allow_abbrev=False,
-    )
+def verb_parser(verb: str, description: str, examples: str, exits: Mapping[int, str] | None = None) -> Parser:
+    """Parser of a verb, to be given its arguments; ``exits`` says what exit statuses of its own mean."""
+    return Parser(f"diagnose {verb}", description, examples, exits or {})
 
 
 def refuse_existing(folder: Path) -> None:

@@ -2,11 +2,11 @@
 
 from __future__ import annotations
 
-from argparse import Namespace
+from argparse import ArgumentParser, Namespace
 from collections.abc import Sequence
 from typing import TYPE_CHECKING, Any
 
-from diagnose.commands.parser import verb_parser
+from diagnose.commands.parser import Parser, verb_parser
 from gensig.errors import ConfigError
 
 if TYPE_CHECKING:
@@ -21,22 +21,27 @@ recording is resampled to that rate; one with less bandwidth is refused. Where t
 the recording at one speed, its own mean or --to-speed: with --tacho by the pulses of the driving shaft, with --teeth
 and --speed-rpm by the mesh. A model of remaining life must know speed and torque too."""
 EXAMPLE = """\
-exit status:
-  0    predicted, and like the training data (or the model is too old to tell)
-  2    a mistake: one line says which
-  3    predicted, but out of distribution: do not rely on the class
-
 examples:
   diagnose predict --model runs/report/models/by_unit-seed0 housing.wav --channels channel_1 --speed-rpm 1500
   diagnose predict --model runs/report/models/by_unit-seed0 runup.csv --tacho pulses
   diagnose predict --model runs/report/models/by_unit-seed0 bench.csv --teeth 23 84 --speed-rpm 1500
   diagnose predict --model runs/remaining/models/by_unit-cnn-seed0 today.csv --speed-rpm 1500 --torque-nm 90"""
 OUT_OF_DISTRIBUTION = 3
+EXITS = {
+    0: "predicted, and like the training data (or the model is too old to tell)",
+    OUT_OF_DISTRIBUTION: "predicted, but out of distribution: do not rely on the class",
+}
 
 
-def run(words: Sequence[str]) -> int:
-    """Print class probabilities; the exit status tells of a recording unlike the training data."""
-    parser = verb_parser("predict", HELP, EXAMPLE)
+def parser() -> Parser:
+    """The verb's parser, with its help."""
+    parser = verb_parser("predict", HELP, EXAMPLE, EXITS)
+    add_arguments(parser)
+    return parser
+
+
+def add_arguments(parser: ArgumentParser) -> None:
+    """What can be typed behind the verb."""
     parser.add_argument("recording", metavar="RECORDING", help=".csv, .wav, .npy, .npz, .h5, .hdf5 or .mat")
     parser.add_argument("--model", required=True, metavar="DIR", help="folder that diagnose train wrote below models/")
     parser.add_argument("--sampling-rate", type=float, metavar="HZ", help="samples a second, where the file is silent")
@@ -52,7 +57,11 @@ def run(words: Sequence[str]) -> int:
     parser.add_argument("--torque-nm", type=float, metavar="NM", help="of the driving shaft, for remaining lives")
     parser.add_argument("--life-time-h", type=float, metavar="H", help="since new, for remaining lives with the age")
     parser.add_argument("--json", action="store_true", help="print everything, window by window, as JSON")
-    arguments = parser.parse_args(words)
+
+
+def run(words: Sequence[str]) -> int:
+    """Print class probabilities; the exit status tells of a recording unlike the training data."""
+    arguments = parser().parse_args(words)
     from diagnose.model_io import load_domain, load_model, read_description
     from diagnose.predict import Source, predict_recording, summary
 

@@ -4,10 +4,11 @@ from __future__ import annotations
 
 import json
 import sys
+from argparse import ArgumentParser
 from collections.abc import Sequence
 from pathlib import Path
 
-from diagnose.commands.parser import verb_parser
+from diagnose.commands.parser import Parser, verb_parser
 
 HELP = """\
 Score predictions of your own on a data set's split, by the scorer of diagnose train.
@@ -21,14 +22,24 @@ examples:
   diagnose score --data runs/benchmark --predictions runs/report/predictions.csv --json"""
 
 
-def run(words: Sequence[str]) -> int:
-    """Print the scores; a benchmark that differs from the frozen one is named on stderr and not compared."""
+def parser() -> Parser:
+    """The verb's parser, with its help."""
     parser = verb_parser("score", HELP, EXAMPLE)
+    add_arguments(parser)
+    return parser
+
+
+def add_arguments(parser: ArgumentParser) -> None:
+    """What can be typed behind the verb."""
     parser.add_argument("--data", required=True, metavar="DIR", help="data set made by gensig generate")
     parser.add_argument("--predictions", required=True, metavar="FILE", help="CSV: record_id, predicted, ...")
     parser.add_argument("--protocol", metavar="NAME", help="of a file without that column (default: by_unit)")
     parser.add_argument("--json", action="store_true", help="print everything as JSON")
-    arguments = parser.parse_args(words)
+
+
+def run(words: Sequence[str]) -> int:
+    """Print the scores; a benchmark that differs from the frozen one is named on stderr and not compared."""
+    arguments = parser().parse_args(words)
     from diagnose.scoring import score_file, score_table
     from gensig.dataset.reader import open_dataset
 

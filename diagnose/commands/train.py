@@ -3,11 +3,12 @@
 from __future__ import annotations
 
 import sys
+from argparse import ArgumentParser
 from collections.abc import Sequence
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
-from diagnose.commands.parser import refuse_existing, verb_parser
+from diagnose.commands.parser import Parser, refuse_existing, verb_parser
 from gensig.errors import ConfigError
 
 if TYPE_CHECKING:
@@ -33,13 +34,23 @@ examples:
   diagnose train -m data=runs/quickstart out=runs/levels normalise=rms,none"""
 
 
-def run(words: Sequence[str]) -> int:
-    """Train, judge, write the report."""
+def parser() -> Parser:
+    """The verb's parser, with its help."""
     parser = verb_parser("train", HELP, EXAMPLE)
+    add_arguments(parser)
+    return parser
+
+
+def add_arguments(parser: ArgumentParser) -> None:
+    """What can be typed behind the verb."""
     parser.add_argument("overrides", nargs="*", metavar="key=value", help="see above")
     parser.add_argument("-m", "--multirun", action="store_true", help="one run for each combination of values a,b")
     parser.add_argument("--config-dir", metavar="DIR", help="folder with groups and options of your own")
-    arguments = parser.parse_intermixed_args(words)
+
+
+def run(words: Sequence[str]) -> int:
+    """Train, judge, write the report."""
+    arguments = parser().parse_intermixed_args(words)
     from gensig.compose import compose, override_keys
 
     if not arguments.multirun:

@@ -33,7 +33,7 @@ def generate(arguments: Namespace) -> int:
     jobs = sweep(arguments.overrides) if arguments.multirun else [arguments.overrides]
     requests = [read_request(job, config_dir=arguments.config_dir) for job in jobs]
     parents = {str(request.config["out"]) for request in requests}
-    if requests[0].config["out"] is None:
+    if requests[0].config["out"] in (None, ""):
         raise ConfigError("out is required: give out=DIR, a folder that does not exist or is empty")
     if len(parents) > 1:
         raise ConfigError("out must be one folder; with -m each data set gets a folder below it")

@@ -8,8 +8,10 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from gensig.commands.figures import COLOURS, FAULTY, GREY, SOUND, pyplot, save
+from gensig.commands.motor_figures import motor_rows
 from gensig.commands.time_figures import root_row, sweep_rows, time_rows
 from gensig.dynamics.engine_cycle import cycle_angles, gas_torque, inertia_torque
+from gensig.dynamics.engine_torques import Engine, EngineTorques
 from gensig.dynamics.forced import Waterfall, cycle_orders
 from gensig.systems.engine_line import EngineLine
 from gensig.units import from_si
@@ -27,10 +29,18 @@ def plot_response(line: EngineLine, found: Found, path: Path) -> None:
     blocks |= {"roots": 1 if found.roots else 0, "sweep": 3 if found.sweep else 0}
     n_rows = 2 + sum(blocks.values())
     figure, axes = pyplot.subplots(n_rows, 2, figsize=(12, 3.7 * n_rows), layout="constrained", squeeze=False)
-    _cycle(axes[0, 0], line, found)
-    _orders(axes[0, 1], line, found)
-    _speeds(axes[1, 0], line, found)
-    _spectra(axes[1, 1], line, found)
+    if isinstance(line.engine, Engine):
+        _cycle(axes[0, 0], line.engine, found)
+        _orders(axes[0, 1], line, line.engine, found)
+    else:
+        motor_rows(axes[0], line, found)
+    if isinstance(line.engine, Engine) or line.engine.ripple is not None:
+        _speeds(axes[1, 0], line, found)
+        _spectra(axes[1, 1], line, found)
+    else:
+        for one in axes[1]:
+            one.set_axis_off()
+        axes[1, 0].set_title("Without torque ripple the linear line turns evenly", loc="left")
     row = 2
     if found.run:
         _waterfall(figure, axes[row, 0], line, found.nodes[0], found.run[0])
@@ -53,12 +63,13 @@ def plot_response(line: EngineLine, found: Found, path: Path) -> None:
     save(figure, path)
 
 
-def _cycle(axes: Any, line: EngineLine, found: Found) -> None:
+def _cycle(axes: Any, engine: Engine, found: Found) -> None:
     """Pressure and torques of one cylinder from its own firing top dead center on."""
-    cylinder, pressure = line.engine.cylinder, found.torques.pressure
+    assert isinstance(found.torques, EngineTorques)
+    cylinder, pressure = engine.cylinder, found.torques.pressure
     angle = cycle_angles(len(pressure))
     degrees = np.degrees(angle)
-    gas = gas_torque(cylinder, angle, pressure, line.engine.crankcase_pressure)
+    gas = gas_torque(cylinder, angle, pressure, engine.crankcase_pressure)
     mass = inertia_torque(cylinder, angle, found.response.speed)
     axes.plot(degrees, gas / 1e3, color=SOUND, label="gas")
     axes.plot(degrees, mass / 1e3, "--", color=FAULTY, label="reciprocating mass")
@@ -75,11 +86,11 @@ def _cycle(axes: Any, line: EngineLine, found: Found) -> None:
     axes.legend(loc="upper center")
 
 
-def _orders(axes: Any, line: EngineLine, found: Found) -> None:
+def _orders(axes: Any, line: EngineLine, engine: Engine, found: Found) -> None:
     """Torques by orders: one throw, all throws, all plungers."""
     on = found.torques.on(line.drive.numbers)
-    numbers, throws = line.drive.numbers, list(line.engine.throw_nodes)
-    plungers = list(line.engine.plunger_nodes.values())
+    numbers, throws = line.drive.numbers, list(engine.throw_nodes)
+    plungers = list(engine.plunger_nodes.values())
     rows = [("one throw", on[numbers.index(throws[0])]), ("all throws together", _sum(on, numbers, throws))]
     if plungers:
         rows.append(("all plungers together", _sum(on, numbers, plungers)))

@@ -7,7 +7,7 @@ from typing import Any
 
 import numpy as np
 
-from gensig.dynamics.engine_torques import EngineTorques
+from gensig.dynamics.line_torques import LineTorques
 from gensig.errors import ConfigError
 from gensig.life.strength import RELIABILITY, reliability
 from gensig.systems.cycle_statistics import fluctuations, order_amplitudes, typical_extremes
@@ -24,7 +24,7 @@ WITHOUT = "_without_dampers"
 
 
 def simulate_time(
-    line: EngineLine, config: Mapping[str, Any], torques: EngineTorques, nodes: Sequence[int], duration: float
+    line: EngineLine, config: Mapping[str, Any], torques: LineTorques, nodes: Sequence[int], duration: float
 ) -> TimeResponse:
     """An operating point integrated in time, its spur meshes by tables of their teeth."""
     if not 0.0 < duration <= LONGEST_TIME:

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import json
 import sys
 from argparse import Namespace
 from collections.abc import Mapping
@@ -11,39 +10,38 @@ from typing import Any
 
 import numpy as np
 
-from gensig.commands.console import one_line_warnings, replaced_file
+from gensig.commands.console import one_line_warnings
 from gensig.commands.heat_report import heat_content, heat_report, print_heat
-from gensig.config import read_request
+from gensig.commands.output import check_outputs, write_outputs
+from gensig.commands.reading import read_watched
 from gensig.errors import ConfigError
 from gensig.faults.registry import read_faults
 from gensig.systems.registry import read_sliced_pair
 from gensig.systems.sliced_pair import SlicedPair, TransmissionError
 
-FIGURE_TYPES = (".png", ".svg", ".pdf")
 LOST_SHARE = 0.02  # of the bearing field; less is the edge of the reliefs
 LEAST_SHARE = 0.05  # of the highest stiffness of a pair; less is one slice that enters or leaves
 
 
 def transmission_error(arguments: Namespace) -> int:
     """Static transmission error under load over one mesh period: JSON, a figure, or a summary."""
-    if arguments.plot is not None and Path(arguments.plot).suffix not in FIGURE_TYPES:
-        raise ConfigError(f"--plot {arguments.plot}: the name must end in {', '.join(FIGURE_TYPES)}")
-    request = read_request(arguments.overrides, config_dir=arguments.config_dir)
+    check_outputs(arguments)
+    config = read_watched(arguments)
     with one_line_warnings("gensig"):
-        system, faults = read_sliced_pair(request.config), read_faults(request.config["fault"])
+        system, faults = read_sliced_pair(config), read_faults(config["fault"])
         sound = system.transmission_error()
         result = system.transmission_error(faults) if faults else sound
         _warn_of_lost_contact(system, sound)
     content = transmission_error_content(system, result)
     if faults:
         content["fault_adds_um"] = added_um(sound, result)
-    if arguments.json:
-        _write_json(arguments.json, content)
-    if arguments.plot:
+
+    def draw(path: Path) -> None:
         from gensig.commands.flank_figures import plot_transmission_error
 
-        with replaced_file(arguments.plot) as path:
-            plot_transmission_error(system, result, path)
+        plot_transmission_error(system, result, path)
+
+    write_outputs(arguments, content, draw)
     print(f"contact ratio              {content['transverse_contact_ratio']:.4f} transverse, "
           f"{content['overlap_ratio']:.4f} overlap, {content['total_contact_ratio']:.4f} total")  # fmt: skip
     print(f"transmission error, mean   {content['mean_um']:.4f} um")
@@ -124,17 +122,17 @@ def sliced_stiffness(config: Mapping[str, Any], arguments: Namespace) -> int:
         content["sound_mesh_stiffness_n_per_m"] = sound.contact.stiffness.tolist()
     if hot is not None:
         content["heat"] = heat_content(hot)
-    if arguments.json:
-        _write_json(arguments.json, content)
-    if arguments.plot:
+
+    def draw(path: Path) -> None:
         from gensig.commands.flank_figures import plot_sliced_stiffness
         from gensig.commands.heat_figures import plot_heat
 
-        with replaced_file(arguments.plot) as path:
-            if hot is None:
-                plot_sliced_stiffness(system, result, position, single, path, faulty=faulty)
-            else:
-                plot_heat(hot, path)
+        if hot is None:
+            plot_sliced_stiffness(system, result, position, single, path, faulty=faulty)
+        else:
+            plot_heat(hot, path)
+
+    write_outputs(arguments, content, draw)
     print(f"contact ratio              {system.pair.transverse_contact_ratio:.4f} transverse, "
           f"{system.pair.overlap_ratio:.4f} overlap, {system.pair.total_contact_ratio:.4f} total")  # fmt: skip
     print(f"mesh stiffness, mean       {stiffness.mean():.4e} N/m")
@@ -171,8 +169,3 @@ def _warn_of_lost_contact(system: SlicedPair, result: TransmissionError) -> None
             f"the unequal growth of hot gears is deeper than {system.torque:g} N m can close",
             file=sys.stderr,
         )
-
-
-def _write_json(file: str, content: Mapping[str, Any]) -> None:
-    with replaced_file(file) as path:
-        path.write_text(json.dumps(content, indent=1) + "\n", encoding="utf-8")

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import json
 from argparse import Namespace
 from collections.abc import Mapping
 from dataclasses import dataclass, field, replace
@@ -11,7 +10,6 @@ from typing import Any
 
 import numpy as np
 
-from gensig.commands.console import replaced_file
 from gensig.commands.engine_in_time import (
     print_in_time,
     print_roots,
@@ -23,9 +21,12 @@ from gensig.commands.engine_in_time import (
     time_content,
     without_dampers,
 )
-from gensig.config import read_request
+from gensig.commands.output import check_outputs, plain, write_outputs
+from gensig.commands.reading import read_watched
 from gensig.dynamics.engine_torques import EngineTorques
 from gensig.dynamics.forced import SteadyResponse, Waterfall, disturbance_response, over_cycle, run_of_speeds
+from gensig.dynamics.line_torques import LineTorques
+from gensig.dynamics.motor_torques import MotorDrive
 from gensig.errors import ConfigError
 from gensig.systems.engine_dampers import (
     DynamicRootStress,
@@ -40,7 +41,6 @@ from gensig.systems.line_time import TimeResponse
 from gensig.systems.time_root_stress import root_stress_in_time
 from gensig.units import from_si, to_si
 
-FIGURE_TYPES = (".png", ".svg", ".pdf")
 CYCLE_POINTS = 5760
 MOST_SPEEDS = 2000
 RUN_ORDERS = 80  # half orders of a run: up to order 40
@@ -54,7 +54,7 @@ class Found:
     teeth part. ``roots`` are root stresses by name: linear or in time, with dampers or without.
     """
 
-    torques: EngineTorques
+    torques: LineTorques
     response: SteadyResponse
     seen: dict[str, float]
     nodes: tuple[int, ...]
@@ -67,9 +67,8 @@ class Found:
 
 def forced_response(arguments: Namespace) -> int:
     """Speed fluctuation, spectra and tooth forces: JSON, a figure, or a summary."""
-    if arguments.plot is not None and Path(arguments.plot).suffix not in FIGURE_TYPES:
-        raise ConfigError(f"--plot {arguments.plot}: the name must end in {', '.join(FIGURE_TYPES)}")
-    config = read_request(arguments.overrides, config_dir=arguments.config_dir).config
+    check_outputs(arguments)
+    config = read_watched(arguments)
     line = read_engine_line(config)
     found = _find(line, arguments, config["seed"])
     if (arguments.time, arguments.sweep) != (None, None) and line.engine.pressure_decides_torque:
@@ -83,14 +82,13 @@ def forced_response(arguments: Namespace) -> int:
         sweep = simulate_sweep(line, config, found.nodes, arguments.sweep, arguments.run_torque, RUN_ORDERS)
         found = replace(found, sweep=sweep)
     content = response_content(line, found)
-    if arguments.json:
-        with replaced_file(arguments.json) as path:
-            path.write_text(json.dumps(content, indent=1) + "\n", encoding="utf-8")
-    if arguments.plot:
+
+    def draw(path: Path) -> None:
         from gensig.commands.engine_figures import plot_response
 
-        with replaced_file(arguments.plot) as path:
-            plot_response(line, found, path)
+        plot_response(line, found, path)
+
+    write_outputs(arguments, content, draw)
     _print(content)
     return 0
 
@@ -106,8 +104,6 @@ def response_content(line: EngineLine, found: Found) -> dict[str, Any]:
     content: dict[str, Any] = {
         "speed_rpm": from_si("speed_rpm", response.speed),
         "torque_nm": torques.brake_torque,
-        "indicated_torque_nm": torques.indicated_torque,
-        "peak_pressure_mpa": from_si("pressure_mpa", float(torques.pressure.max())),
         "node_numbers": list(numbers),
         "nodes": [node.name for node in line.drive.line.nodes],
         "mean_speed_rpm": [line.ratios[number] * from_si("speed_rpm", response.speed) for number in numbers],
@@ -121,7 +117,10 @@ def response_content(line: EngineLine, found: Found) -> dict[str, Any]:
         "least_tooth_force_n": forces.min(axis=1),
         "greatest_tooth_force_n": forces.max(axis=1),
     }
-    if torques.disturbance_torque:
+    if isinstance(torques, EngineTorques):
+        content["indicated_torque_nm"] = torques.indicated_torque
+        content["peak_pressure_mpa"] = from_si("pressure_mpa", float(torques.pressure.max()))
+    if isinstance(torques, EngineTorques) and torques.disturbance_torque:
         place = numbers.index(torques.disturbance_node)
         moved = disturbance_response(
             linear, place, torques.disturbance_torque, 2.0 * np.pi * torques.disturbance_frequency
@@ -139,7 +138,7 @@ def response_content(line: EngineLine, found: Found) -> dict[str, Any]:
         content["run_speeds_rpm"] = from_si("speed_rpm", 1.0) * found.run[0].speeds
         content["run_speed_fluctuation_rpm"] = [from_si("speed_rpm", 1.0) * one.fluctuation for one in found.run]
         content["run_angle_deg"] = [np.degrees(one.angle) for one in found.run]
-    return {key: _plain(value) for key, value in content.items()}
+    return {key: plain(value) for key, value in content.items()}
 
 
 def _roots(
@@ -171,7 +170,7 @@ def _find(line: EngineLine, arguments: Namespace, seed: int) -> Found:
     if measured and (arguments.torque is not None or arguments.run is not None):
         raise ConfigError("excitation.pressure.file decides the torque; leave --torque and --run out")
     measured_nodes = tuple(wheel.node for wheel in line.wheels.values())
-    nodes = tuple(arguments.nodes or measured_nodes or (line.engine.throw_nodes[0], line.engine.dynamometer.node))
+    nodes = tuple(arguments.nodes or measured_nodes or (line.engine.driving_nodes[0], line.engine.load_node))
     for node in nodes:
         if node not in ratios:
             raise ConfigError(f"--nodes {node}: the shaft line has no such node; it has {min(ratios)} to {max(ratios)}")
@@ -180,6 +179,11 @@ def _find(line: EngineLine, arguments: Namespace, seed: int) -> Found:
     places = [line.drive.numbers.index(node) for node in nodes]
     run: list[Waterfall] = []
     if arguments.run is not None:
+        if isinstance(line.engine, MotorDrive) and line.engine.ripple is None:
+            raise ConfigError(
+                "--run: a line whose meshes never part turns evenly without excitation.motor.torque_ripple; give one, "
+                "or take --sweep"
+            )
         low, high, step = (to_si("speed_rpm", value) for value in arguments.run)
         if not (0.0 < low < high and step > 0.0 and (high - low) / step < MOST_SPEEDS):
             given = " ".join(f"{value:g}" for value in arguments.run)
@@ -187,7 +191,7 @@ def _find(line: EngineLine, arguments: Namespace, seed: int) -> Found:
         speeds = np.arange(low, high + 0.5 * step, step)
         run = run_of_speeds(
             linear,
-            lambda one: line.on_line(line.torques(one, arguments.run_torque)),
+            lambda one: line.on_line(line.torques(one, line.load_at(arguments.run_torque, one / reference.speed))),
             speeds,
             places,
             n_orders=RUN_ORDERS,
@@ -198,10 +202,13 @@ def _find(line: EngineLine, arguments: Namespace, seed: int) -> Found:
 
 
 def _print(content: dict[str, Any]) -> None:
-    print(
-        f"{content['speed_rpm']:g} r/min, {content['torque_nm']:.6g} N m at the crank, "
-        f"{content['indicated_torque_nm']:.5g} N m indicated, peak {content['peak_pressure_mpa']:.4g} MPa"
-    )
+    if "indicated_torque_nm" in content:
+        print(
+            f"{content['speed_rpm']:g} r/min, {content['torque_nm']:.6g} N m at the crank, "
+            f"{content['indicated_torque_nm']:.5g} N m indicated, peak {content['peak_pressure_mpa']:.4g} MPa"
+        )
+    else:
+        print(f"{content['speed_rpm']:g} r/min, {content['torque_nm']:.6g} N m of the load at the motor")
     by_number = dict(zip(content["node_numbers"], range(len(content["nodes"])), strict=True))
     for node in content["shown_nodes"]:
         place = by_number[node]
@@ -226,10 +233,3 @@ def _print(content: dict[str, Any]) -> None:
         print_roots(content)
     if "sweep_energy_residual" in content:
         print_sweep(content)
-
-
-def _plain(value: Any) -> Any:
-    """Arrays as lists."""
-    if isinstance(value, list):
-        return [_plain(one) for one in value]
-    return value.tolist() if isinstance(value, np.ndarray) else value

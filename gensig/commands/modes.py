@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import json
 from argparse import Namespace
 from collections.abc import Mapping
 from pathlib import Path
@@ -10,34 +9,31 @@ from typing import Any
 
 import numpy as np
 
-from gensig.commands.console import replaced_file
-from gensig.config import read_request
+from gensig.commands.output import check_outputs, write_outputs
+from gensig.commands.reading import read_watched
 from gensig.dynamics.modal import Modes
 from gensig.errors import ConfigError
 from gensig.faults.registry import read_faults
 from gensig.systems.registry import LINE, read_system, section
 from gensig.systems.shaft_line import DriveLine, drive_line_of_pair, read_drive_line
 
-FIGURE_TYPES = (".png", ".svg", ".pdf")
 SHOWN = 12  # modes in the summary
 
 
 def modes(arguments: Namespace) -> int:
     """Natural frequencies, damping ratios, shapes and energy shares: JSON, a figure, or a summary."""
-    if arguments.plot is not None and Path(arguments.plot).suffix not in FIGURE_TYPES:
-        raise ConfigError(f"--plot {arguments.plot}: the name must end in {', '.join(FIGURE_TYPES)}")
-    config = read_request(arguments.overrides, config_dir=arguments.config_dir).config
+    check_outputs(arguments)
+    config = read_watched(arguments)
     line = read_line(config)
     found = line.modes()
     content = modes_content(line, found)
-    if arguments.json:
-        with replaced_file(arguments.json) as path:
-            path.write_text(json.dumps(content, indent=1) + "\n", encoding="utf-8")
-    if arguments.plot:
+
+    def draw(path: Path) -> None:
         from gensig.commands.mode_figures import plot_modes
 
-        with replaced_file(arguments.plot) as path:
-            plot_modes(line, found, path)
+        plot_modes(line, found, path)
+
+    write_outputs(arguments, content, draw)
     _print_modes(line, content)
     return 0
 

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import json
 import sys
 from argparse import Namespace
 from collections.abc import Sequence
@@ -10,9 +9,10 @@ from dataclasses import fields, replace
 from pathlib import Path
 from typing import Any
 
-from gensig.commands.console import one_line_warnings, replaced_file
-from gensig.commands.flanks import FIGURE_TYPES, sound_pair
-from gensig.config import read_request
+from gensig.commands.console import one_line_warnings
+from gensig.commands.flanks import sound_pair
+from gensig.commands.output import check_outputs, option_file, write_option, write_outputs
+from gensig.commands.reading import read_watched
 from gensig.errors import ConfigError
 from gensig.mesh.modification import FlankModification, PairModification
 from gensig.systems.flank_optimum import Cases, Optimum, judge, optimise
@@ -26,14 +26,11 @@ def modify_flank(arguments: Namespace) -> int:
     """Search, print the front, write the chosen modification as an option of the group ``modification``."""
     if arguments.points < 1:
         raise ConfigError(f"--points {arguments.points}: give 1 for the least ripple alone, 3 or more for a front")
-    if arguments.plot is not None and Path(arguments.plot).suffix not in FIGURE_TYPES:
-        raise ConfigError(f"--plot {arguments.plot}: the name must end in {', '.join(FIGURE_TYPES)}")
-    target = Path(arguments.out)
-    if target.suffix != ".yaml" or not target.stem.isidentifier():
-        raise ConfigError(f"--out {arguments.out}: give a file NAME.yaml in a folder {GROUP}, NAME without spaces")
-    request = read_request(arguments.overrides, config_dir=arguments.config_dir)
+    check_outputs(arguments)
+    target = option_file(arguments.out, GROUP)
+    config = read_watched(arguments)
     with one_line_warnings("gensig"):
-        system = sound_pair(request.config)
+        system = sound_pair(config)
         given = system.modification.misalignment
         cases = Cases(
             torques=tuple(arguments.torques or (system.torque,)),
@@ -43,21 +40,18 @@ def modify_flank(arguments: Namespace) -> int:
         before = judge(system, plain, cases)
         front = optimise(system, cases, n_front=arguments.points, seed=arguments.seed, on_done=_say)
     chosen = _chosen(front, before)
-    with replaced_file(target) as path:
-        path.write_text(option_text(chosen, system, cases), encoding="utf-8")
-    if arguments.json:
-        content = {"before": _content(before), "chosen": _content(chosen), "front": [_content(one) for one in front]}
-        with replaced_file(arguments.json) as path:
-            path.write_text(json.dumps(content, indent=1) + "\n", encoding="utf-8")
-    if arguments.plot:
+    content = {"before": _content(before), "chosen": _content(chosen), "front": [_content(one) for one in front]}
+
+    def draw(path: Path) -> None:
         from gensig.commands.flank_figures import plot_front
 
-        with replaced_file(arguments.plot) as path:
-            plot_front(system, before, chosen, front, path)
+        plot_front(system, before, chosen, front, path)
+
+    write_outputs(arguments, content, draw)
     print(f"{'':<12}{'peak to peak':>14}{'line load':>16}   worst of {_cases(cases)}")
     for name, one in (("before", before), *((("chosen" if one is chosen else "front"), one) for one in front)):
         print(f"{name:<12}{one.ripple * 1e6:>11.4f} um{one.line_load * 1e-3:>11.2f} N/mm")
-    print(f"{target}: take it with {GROUP}={target.stem} --config-dir {target.parent.parent}")
+    write_option(target, option_text(chosen, system, cases))
     return 0
 
 

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import json
 import sys
 from argparse import Namespace
 from pathlib import Path
@@ -12,6 +11,8 @@ import numpy as np
 from numpy.typing import NDArray
 
 from gensig.commands.console import replaced_file
+from gensig.commands.output import FIGURE_TYPES, check_file, check_outputs, write_outputs
+from gensig.commands.reading import read_watched
 from gensig.config import read_request
 from gensig.errors import ConfigError
 from gensig.faults.registry import read_faults, without_vary
@@ -25,27 +26,20 @@ if TYPE_CHECKING:
 Array = NDArray[np.float64]
 
 
-FIGURE_TYPES = (".png", ".svg", ".pdf")
 RECORD_TYPES = (".h5", ".hdf5", ".csv")
-
-
-def _check_file(flag: str, name: str | None, types: tuple[str, ...]) -> None:
-    """Refuse a file name before anything is computed for it."""
-    if name is not None and Path(name).suffix not in types:
-        raise ConfigError(f"{flag} {name}: the name must end in {', '.join(types)}")
 
 
 def stiffness(arguments: Namespace) -> int:
     """Mesh stiffness of a gear pair: curves to JSON, a figure, or a summary."""
-    _check_file("--plot", arguments.plot, FIGURE_TYPES)
-    request = read_request(arguments.overrides, config_dir=arguments.config_dir)
-    if request.config["system"].get("kind") == SLICED:
+    check_outputs(arguments)
+    config = read_watched(arguments)
+    if config["system"].get("kind") == SLICED:
         from gensig.commands.flanks import sliced_stiffness
 
-        return sliced_stiffness(request.config, arguments)
-    system = read_system(request.config)
+        return sliced_stiffness(config, arguments)
+    system = read_system(config)
     assert isinstance(system, SpurPair)  # the other kind has gone
-    faults = read_faults(request.config["fault"])
+    faults = read_faults(config["fault"])
     curves = system.stiffness_curves(faults)
     if system.pair.transverse_contact_ratio < 1.0:
         print(
@@ -54,14 +48,13 @@ def stiffness(arguments: Namespace) -> int:
             file=sys.stderr,
         )
     content = stiffness_content(system, curves)
-    if arguments.json:
-        with replaced_file(arguments.json) as path:
-            path.write_text(json.dumps(content, indent=1) + "\n", encoding="utf-8")
-    if arguments.plot:
+
+    def draw(path: Path) -> None:
         from gensig.commands.figures import plot_stiffness
 
-        with replaced_file(arguments.plot) as path:
-            plot_stiffness(system, curves, faults, path)
+        plot_stiffness(system, curves, faults, path)
+
+    write_outputs(arguments, content, draw)
     _print_stiffness(content, curves)
     return 0
 
@@ -114,8 +107,8 @@ def simulate(arguments: Namespace) -> int:
     from gensig.planning import make_plan
     from gensig.records import simulate_record
 
-    _check_file("--plot", arguments.plot, FIGURE_TYPES)
-    _check_file("--output", arguments.output, RECORD_TYPES)
+    check_file("--plot", arguments.plot, FIGURE_TYPES)
+    check_file("--output", arguments.output, RECORD_TYPES)
     if arguments.folder is not None:
         return _simulate_again(arguments)
     if arguments.record is not None or arguments.twin:

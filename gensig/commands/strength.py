@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import json
 from argparse import Namespace
 from dataclasses import asdict
 from pathlib import Path
@@ -10,21 +9,18 @@ from typing import Any
 
 import numpy as np
 
-from gensig.commands.console import replaced_file
-from gensig.config import read_request
+from gensig.commands.output import check_outputs, write_outputs
+from gensig.commands.reading import read_watched
 from gensig.errors import ConfigError
 from gensig.faults.registry import read_faults
 from gensig.life.strength import reliability
 from gensig.systems.root_strength import GearStress, RootHistory, RootStrength, read_root_strength
 
-FIGURE_TYPES = (".png", ".svg", ".pdf")
-
 
 def root_stress(arguments: Namespace) -> int:
     """Root stress over the mesh, at ISO's load point, and safety factors: JSON, a figure, or a summary."""
-    if arguments.plot is not None and Path(arguments.plot).suffix not in FIGURE_TYPES:
-        raise ConfigError(f"--plot {arguments.plot}: the name must end in {', '.join(FIGURE_TYPES)}")
-    config = read_request(arguments.overrides, config_dir=arguments.config_dir).config
+    check_outputs(arguments)
+    config = read_watched(arguments)
     if read_faults(config["fault"]):
         raise ConfigError(
             f"fault={config['fault']['kind']}: root stress is that of sound teeth here; take fault=healthy, and gensig "
@@ -37,14 +33,13 @@ def root_stress(arguments: Namespace) -> int:
     content = root_stress_content(system, gears, history)
     if arguments.stress is not None:
         content["tangential_force_over_mesh_n"] = system.force_over_mesh_for(arguments.stress * 1e6)
-    if arguments.json:
-        with replaced_file(arguments.json) as path:
-            path.write_text(json.dumps(content, indent=1) + "\n", encoding="utf-8")
-    if arguments.plot:
+
+    def draw(path: Path) -> None:
         from gensig.commands.strength_figure import plot_root_stress
 
-        with replaced_file(arguments.plot) as path:
-            plot_root_stress(system, gears, history, path)
+        plot_root_stress(system, gears, history, path)
+
+    write_outputs(arguments, content, draw)
     _print(system, gears, content)
     return 0
 

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import json
 import sys
 from argparse import Namespace
 from collections.abc import Mapping, Sequence
@@ -14,9 +13,9 @@ import numpy as np
 import yaml
 from numpy.typing import NDArray
 
-from gensig.commands.console import replaced_file
-from gensig.commands.forced_response import FIGURE_TYPES, MOST_SPEEDS
-from gensig.config import read_request
+from gensig.commands.forced_response import MOST_SPEEDS
+from gensig.commands.output import check_outputs, option_file, write_option, write_outputs
+from gensig.commands.reading import read_watched
 from gensig.dynamics.damper_tuning import tune_dampers
 from gensig.dynamics.dampers import TorsionalDamper
 from gensig.dynamics.forced import SteadyResponse
@@ -53,12 +52,9 @@ class State:
 
 def tune_damper(arguments: Namespace) -> int:
     """Search, write the line with its dampers as an option of the group ``system``, print both states."""
-    if arguments.plot is not None and Path(arguments.plot).suffix not in FIGURE_TYPES:
-        raise ConfigError(f"--plot {arguments.plot}: the name must end in {', '.join(FIGURE_TYPES)}")
-    target = Path(arguments.out)
-    if target.suffix != ".yaml" or not target.stem.isidentifier():
-        raise ConfigError(f"--out {arguments.out}: give a file NAME.yaml in a folder {GROUP}, NAME without spaces")
-    config = read_request(arguments.overrides, config_dir=arguments.config_dir).config
+    check_outputs(arguments)
+    target = option_file(arguments.out, GROUP)
+    config = read_watched(arguments)
     line = read_engine_line(config)
     if line.engine.pressure_decides_torque:
         raise ConfigError("excitation.pressure.file is of one operating point; tune-damper runs over a range of speeds")
@@ -78,18 +74,15 @@ def tune_damper(arguments: Namespace) -> int:
         for name, one, added in (("before", line, ()), ("after", with_own_dampers(line, dampers), dampers))
     }
     content = tuning_content(states, dampers, mesh, speeds, torque)
-    with replaced_file(target) as path:
-        path.write_text(option_text(config[GROUP], dampers, content), encoding="utf-8")
-    if arguments.json:
-        with replaced_file(arguments.json) as path:
-            path.write_text(json.dumps(content, indent=1) + "\n", encoding="utf-8")
-    if arguments.plot:
+
+    def draw(path: Path) -> None:
         from gensig.commands.damper_figure import plot_dampers
 
-        with replaced_file(arguments.plot) as path:
-            plot_dampers(states, dampers, mesh, speeds, path)
+        plot_dampers(states, dampers, mesh, speeds, path)
+
+    write_outputs(arguments, content, draw)
     _print(content)
-    print(f"{target}: take it with {GROUP}={target.stem} --config-dir {target.parent.parent}")
+    write_option(target, option_text(config[GROUP], dampers, content))
     return 0
 
 

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import argparse
-from collections.abc import Callable
+from collections.abc import Callable, Mapping
 from dataclasses import dataclass
 
 OVERRIDES = "OVERRIDES are group=option and key=value, as in Hydra: fault=crack operating.speed_rpm=1200 seed=3."
@@ -11,17 +11,34 @@ OVERRIDES = "OVERRIDES are group=option and key=value, as in Hydra: fault=crack 
 
 @dataclass(frozen=True)
 class Verb:
-    """One verb: what it does, an example, its own arguments, and ``module:function`` that runs it."""
+    """One verb: what it does, an example, its own arguments, and ``module:function`` that runs it.
+
+    ``one`` says what exit status 1 means, where the verb has it. ``instead`` maps keys that it does not read to the
+    flag that does their work, or to nothing; it stands where the verb looks at one machine, and what else was typed
+    and not read is named as well.
+    """
 
     summary: str
     example: str
     runs: str
     arguments: Callable[[argparse.ArgumentParser], None]
+    one: str | None = None
+    instead: Mapping[str, str] | None = None
 
 
 def _overrides(parser: argparse.ArgumentParser) -> None:
     parser.add_argument("overrides", nargs="*", metavar="OVERRIDES", help=OVERRIDES)
     parser.add_argument("--config-dir", metavar="DIR", help="folder with groups and options of your own")
+
+
+def _options(parser: argparse.ArgumentParser) -> None:
+    parser.add_argument("what", nargs="?", metavar="GROUP[=OPTION]", help="options of a group, or keys of an option")
+    parser.add_argument("--config-dir", metavar="DIR", help="folder with groups and options of your own")
+    parser.add_argument("--json", action="store_true", help="print as JSON")
+
+
+def _completion(parser: argparse.ArgumentParser) -> None:
+    parser.add_argument("shell", choices=("bash", "zsh", "fish"), help="the shell that reads it")
 
 
 def _generate(parser: argparse.ArgumentParser) -> None:
@@ -165,6 +182,27 @@ def _twin(parser: argparse.ArgumentParser) -> None:
     parser.add_argument("--check", metavar="FILE", help="healthy recording held out (default: the second half)")
 
 
+def _new(parser: argparse.ArgumentParser) -> None:
+    parser.add_argument("what", choices=("gearbox",), help="what to make")
+    parser.add_argument("name", metavar="NAME", help="of the options that are written")
+    two = ("PINION", "WHEEL")
+    parser.add_argument("--teeth", type=int, nargs=2, metavar=two, help="needed; teeth of both gears")
+    parser.add_argument("--module", type=float, metavar="MM", help="needed; normal module")
+    parser.add_argument("--speed", type=float, metavar="RPM", help="needed; rated speed of the pinion")
+    parser.add_argument("--torque", type=float, metavar="NM", help="needed; rated torque of the pinion")
+    parser.add_argument(
+        "--widths", type=float, nargs="+", metavar="MM", help="face width of both or each (default: 10 modules)"
+    )
+    parser.add_argument("--bores", type=float, nargs="+", metavar="MM", help="bore diameters (default: by the torque)")
+    parser.add_argument("--helix", type=float, metavar="DEG", help="helix angle of the pinion (default: 0, spur)")
+    parser.add_argument("--pressure-angle", type=float, metavar="DEG", help="of the basic rack (default: 20)")
+    parser.add_argument("--profile-shifts", type=float, nargs="+", metavar="X", help="profile shifts (default: 0)")
+    stiffness = "radial stiffness of what holds each gear (default: of ball bearings and shafts)"
+    parser.add_argument("--supports", type=float, nargs="+", metavar="N_PER_M", help=stiffness)
+    parser.add_argument("--dir", default="configs", help="folder of your options (default: configs)")
+    parser.add_argument("--json", action="store_true", help="print what was derived as JSON")
+
+
 def _resume(parser: argparse.ArgumentParser) -> None:
     _folder(parser)
     parser.add_argument(
@@ -200,13 +238,26 @@ def _export(parser: argparse.ArgumentParser) -> None:
     parser.add_argument("--one-channel", action="store_true", help="wav: one file a channel, not one a record")
 
 
+def _report(parser: argparse.ArgumentParser) -> None:
+    parser.add_argument("folder", metavar="DIR", help="folder of a complete data set")
+    parser.add_argument("--out", metavar="FILE", help="page to write, a new file (default: DIR/report.html)")
+    parser.add_argument("--records", type=int, metavar="N", help="records shown of each class (default: up to 3)")
+
+
 VERBS: dict[str, Verb] = {
+    "options": Verb(
+        "groups, their options, and the keys of an option, a line each",
+        "gensig options\n  gensig options fault\n  gensig options fault=crack --json",
+        "gensig.commands.options:list_options",
+        _options,
+    ),
     "generate": Verb(
         "make a labelled data set",
         "gensig generate experiment=quickstart out=runs/quickstart\n"
         "  gensig generate -m fault=healthy,crack plan.n_records=20 out=runs/two",
         "gensig.commands.datasets:generate",
         _generate,
+        one="records failed and are marked so, or the set is incomplete: gensig resume DIR goes on",
     ),
     "plan": Verb(
         "dry run: records, bytes, predicted time",
@@ -215,35 +266,51 @@ VERBS: dict[str, Verb] = {
         "gensig.commands.datasets:plan",
         _plan,
     ),
+    "new": Verb(
+        "options of a gearbox of your own, from its data sheet",
+        "gensig new gearbox mine --teeth 20 45 --module 3 --speed 1500 --torque 60",
+        "gensig.commands.new:new",
+        _new,
+    ),
     "resume": Verb(
         "finish an interrupted data set",
         "gensig resume runs/quickstart\n  gensig resume runs/quickstart executor=dask executor.n_workers=4",
         "gensig.commands.datasets:resume",
         _resume,
+        one="records failed and are marked so, or the set is incomplete: gensig resume DIR goes on",
     ),
     "finalize": Verb(
         "close a data set made by array jobs, or accept an edited card",
         "gensig finalize runs/large",
         "gensig.commands.datasets:finalize",
         _folder,
+        one="records failed and are marked so in the closed set",
     ),
     "verify": Verb(
         "is a data set whole and unaltered?",
         "gensig verify runs/quickstart",
         "gensig.commands.datasets:verify",
         _verify,
+        one="damaged, altered or incomplete; every problem is printed",
     ),
     "reproduce": Verb(
         "simulate records of a data set again and compare",
         "gensig reproduce runs/quickstart --records 20",
         "gensig.commands.datasets:reproduce",
         _reproduce,
+        one="records came out otherwise than recorded",
     ),
     "inspect": Verb(
         "what is in a data set or file",
         "gensig inspect runs/quickstart/shards/shard-00000.h5",
         "gensig.commands.datasets:inspect",
         _inspect,
+    ),
+    "report": Verb(
+        "a data set as one HTML page: signals, spectra, parameters, indicators, splits",
+        "gensig report runs/quickstart\n  gensig report runs/quickstart --out quickstart.html --records 5",
+        "gensig.commands.dataset_report:report",
+        _report,
     ),
     "export": Verb(
         "a data set as one HDF5 file, Parquet, npz or wav",
@@ -257,6 +324,7 @@ VERBS: dict[str, Verb] = {
         "  gensig transmission-error gear=xiamen_23_84 operating.torque_nm=20 --json te.json",
         "gensig.commands.flanks:transmission_error",
         _stiffness,
+        instead={"out": "--json or --plot"},
     ),
     "modify-flank": Verb(
         "reliefs and crowning that are best for your torques and misalignments",
@@ -265,6 +333,7 @@ VERBS: dict[str, Verb] = {
         "--out mine/modification/robust.yaml --plot front.png",
         "gensig.commands.modify:modify_flank",
         _modify_flank,
+        instead={"out": "--out, --json or --plot"},
     ),
     "root-stress": Verb(
         "bending stress at the tooth's root over the mesh, and safety factors",
@@ -272,6 +341,7 @@ VERBS: dict[str, Verb] = {
         "  gensig root-stress system=helical_pair strength.mean_stress_factor=0.7",
         "gensig.commands.strength:root_stress",
         _root_stress,
+        instead={"out": "--json or --plot"},
     ),
     "wear-life": Verb(
         "how long flanks last until they are worn, and what their wear looks like",
@@ -279,6 +349,7 @@ VERBS: dict[str, Verb] = {
         "  gensig wear-life operating.torque_nm=40 --map --out mine/fault/worn.yaml",
         "gensig.commands.wear:wear_life_verb",
         _wear_life,
+        instead={"out": "--out, --json or --plot"},
     ),
     "simulate": Verb(
         "one record: signal, spectrum, figure",
@@ -286,6 +357,8 @@ VERBS: dict[str, Verb] = {
         "  gensig simulate --from runs/quickstart --record 7 --twin --output twin.h5",
         "gensig.commands.physics:simulate",
         _simulate,
+        one="the record did not stay finite, or its solver gave up; nothing is written",
+        instead={"plan": "", "executor": "", "out": "--output"},
     ),
     "stiffness": Verb(
         "mesh stiffness of sound and faulty teeth",
@@ -293,6 +366,7 @@ VERBS: dict[str, Verb] = {
         "  gensig stiffness system=helical_pair gear=chongqing_40_162 heat=chongqing_rated --plot hot.png",
         "gensig.commands.physics:stiffness",
         _stiffness,
+        instead={"out": "--json or --plot"},
     ),
     "modes": Verb(
         "natural frequencies, damping, shapes of a pair or of a drive line from tables",
@@ -300,12 +374,14 @@ VERBS: dict[str, Verb] = {
         "  gensig modes system=shaft_line system.shafting_csv=mine.csv system.gears_csv=my_gears.csv",
         "gensig.commands.modes:modes",
         _modes,
+        instead={"out": "--json or --plot"},
     ),
     "forced-response": Verb(
         "steady vibration of a drive line under its engine: speed fluctuation, spectra, waterfalls, tooth forces",
         "gensig forced-response system=engine_gear_train excitation=engine_v20 --run 650 1750 10 --plot response.png",
         "gensig.commands.forced_response:forced_response",
         _forced_response,
+        instead={"operating.speed_rpm": "--speed", "operating.torque_nm": "--torque", "out": "--json or --plot"},
     ),
     "tune-damper": Verb(
         "torsional dampers that make the worst tooth force of an engine's mesh least; root stress before and after",
@@ -313,6 +389,7 @@ VERBS: dict[str, Verb] = {
         "--out mine/system/damped.yaml --plot dampers.png",
         "gensig.commands.tune_damper:tune_damper",
         _tune_damper,
+        instead={"operating.speed_rpm": "--run", "operating.torque_nm": "--torque"},
     ),
     "twin": Verb(
         "a configuration like a measured healthy machine",
@@ -321,10 +398,17 @@ VERBS: dict[str, Verb] = {
         "gensig.commands.twin:twin",
         _twin,
     ),
+    "completion": Verb(
+        "what to source so that the tab key completes both commands",
+        'gensig completion bash\n  eval "$(gensig completion zsh)"\n  gensig completion fish',
+        "gensig.completion:completion",
+        _completion,
+    ),
     "validate": Verb(
         "every printed figure of the source papers against ours",
         "gensig validate --markdown docs/validation.md",
         "gensig.commands.validate:validate",
         _validate,
+        one="rows have another verdict than they declare",
     ),
 }

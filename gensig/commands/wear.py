@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import json
 import math
 import sys
 from argparse import Namespace
@@ -15,8 +14,9 @@ import numpy as np
 import yaml
 from numpy.typing import NDArray
 
-from gensig.commands.console import one_line_warnings, replaced_file
-from gensig.config import read_request
+from gensig.commands.console import one_line_warnings
+from gensig.commands.output import check_outputs, option_file, write_option, write_outputs
+from gensig.commands.reading import read_watched
 from gensig.errors import ConfigError, SimulationError
 from gensig.life.archard import flank_radii, hunting_turns
 from gensig.life.life_laws import FittedLaw, LifeMap, fitted_laws, life_map, torque_exponent
@@ -30,7 +30,6 @@ from gensig.vibration_limit import WornVibration, limited_by_vibration
 
 Array = NDArray[np.float64]
 
-FIGURE_TYPES = (".png", ".svg", ".pdf")
 GROUP = "fault"
 MAP_TORQUES, MAP_SPEEDS = np.geomspace(0.25, 1.5, 6), np.geomspace(0.25, 2.0, 7)  # over the configured
 YIELD_SHARE = 0.6  # of the hardness: a line contact yields below its surface (Johnson, Contact Mechanics, 1985)
@@ -38,41 +37,32 @@ YIELD_SHARE = 0.6  # of the hardness: a line contact yields below its surface (J
 
 def wear_life_verb(arguments: Namespace) -> int:
     """Life and wear to JSON, a figure, an option for records, or a summary."""
-    _check_files(arguments)
-    request = read_request(arguments.overrides, config_dir=arguments.config_dir)
+    check_outputs(arguments)
+    target = None if arguments.out is None else option_file(arguments.out, GROUP)
+    config = read_watched(arguments)
     with one_line_warnings("gensig"):
-        case = read_wear_case(request.config)
-        speed = read_operating(section(request.config, "operating")).speed
+        case = read_wear_case(config)
+        speed = read_operating(section(config, "operating")).speed
         if case.pair.transverse_contact_ratio < 1.0:
             _warn_of_interruption(case)
-        case, vibration = limited_by_vibration(case, request.config)
+        case, vibration = limited_by_vibration(case, config)
         life = wear_life(case)
         if vibration is not None and vibration.limit_depth is not None:
             life = replace(life, ended_by="vibration")
         lives, laws = _lives(case, speed, arguments)
         content = wear_life_content(life, speed, lives, laws, vibration)
     _warn_of_pressure(case, content)
-    if arguments.json:
-        with replaced_file(arguments.json) as path:
-            path.write_text(json.dumps(content, indent=1, allow_nan=False) + "\n", encoding="utf-8")
-    if arguments.plot:
+
+    def draw(path: Path) -> None:
         from gensig.commands.wear_figure import plot_wear_life
 
-        with replaced_file(arguments.plot) as path:
-            plot_wear_life(life, speed, content, lives, path)
+        plot_wear_life(life, speed, content, lives, path)
+
+    write_outputs(arguments, content, draw)
     _print(content, lives, laws)
-    if arguments.out:
-        _write_option(life, speed, Path(arguments.out))
+    if target is not None:
+        _write_option(life, speed, target)
     return 0
-
-
-def _check_files(arguments: Namespace) -> None:
-    if arguments.plot is not None and Path(arguments.plot).suffix not in FIGURE_TYPES:
-        raise ConfigError(f"--plot {arguments.plot}: the name must end in {', '.join(FIGURE_TYPES)}")
-    if arguments.out is not None:
-        target = Path(arguments.out)
-        if target.suffix != ".yaml" or not target.stem.isidentifier():
-            raise ConfigError(f"--out {arguments.out}: give a file NAME.yaml in a folder {GROUP}, NAME without spaces")
 
 
 def _lives(case: WearCase, speed: float, arguments: Namespace) -> tuple[LifeMap | None, tuple[FittedLaw, ...]]:
@@ -276,10 +266,8 @@ def _write_option(life: WearLife, speed: float, target: Path) -> None:
     """The worn flanks as an option of the group ``fault``."""
     pair = life.case.pair
     option = yaml.safe_dump(wear_fault(life.case, life.depth[-1]), sort_keys=False, width=110)
-    with replaced_file(target) as path:
-        path.write_text(
-            f"# Flanks of {pair.pinion.n_teeth}/{pair.wheel.n_teeth} teeth after {hours(life.life, speed):.4g} h at "
-            f"{life.case.torque:g} N m (gensig wear-life).\n{option}",
-            encoding="utf-8",
-        )
-    print(f"{target}: take it with {GROUP}={target.stem} --config-dir {target.parent.parent}")
+    write_option(
+        target,
+        f"# Flanks of {pair.pinion.n_teeth}/{pair.wheel.n_teeth} teeth after {hours(life.life, speed):.4g} h at "
+        f"{life.case.torque:g} N m (gensig wear-life).\n{option}",
+    )

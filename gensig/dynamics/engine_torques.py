@@ -15,44 +15,15 @@ from gensig.dynamics.engine_cycle import CYCLE, Cylinder, cycle_angles, delayed,
 from gensig.dynamics.engine_pressure import PressureFile, WiebeCycle, read_pressure, wiebe_parts
 from gensig.dynamics.firing import Layout
 from gensig.dynamics.injection_pump import Plunger, plunger_torque
+from gensig.dynamics.line_torques import LAWS, POINTS, LineTorques, Load, Reference
 from gensig.errors import ConfigError
 from gensig.units import unit
 
 Array = NDArray[np.float64]
 
-POINTS = 2880  # of a cycle, a quarter of a degree
 CAM_RATIO = 0.5  # of a four-stroke engine's camshaft to its crank
 ROUNDS = 50
 ROUNDING = 1e-12
-
-LAWS = {"constant": 0, "quadratic": 2}  # exponent of the speed
-
-
-@dataclass(frozen=True, slots=True, kw_only=True)
-class Reference:
-    """The point at which loads, boost and delivery pressure are stated; ``torque`` is the brake torque at the crank."""
-
-    speed: float = unit("rpm")
-    torque: float = unit("nm")
-
-    def __post_init__(self) -> None:
-        if not (self.speed > 0.0 and self.torque > 0.0):
-            raise ConfigError("excitation.reference: speed_rpm and torque_nm must be positive")
-
-
-@dataclass(frozen=True, slots=True, kw_only=True)
-class Load:
-    """What a driven machine takes from its own shaft; ``torque`` is that at the reference speed."""
-
-    node: int
-    law: str
-    torque: float = unit("nm")
-
-    def __post_init__(self) -> None:
-        if self.law not in LAWS:
-            raise ConfigError(f"load.law = {self.law!r}; allowed: {', '.join(LAWS)}")
-        if not self.torque >= 0.0:
-            raise ConfigError(f"load.torque_nm = {self.torque:g} must not be negative")
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -130,6 +101,25 @@ class Engine:
         return isinstance(self.pressure, PressureFile)
 
     @property
+    def driving_nodes(self) -> tuple[int, ...]:
+        """Numbers of the nodes that what speeds the line up comes from; speeds are those of the first."""
+        return self.throw_nodes
+
+    @property
+    def load_node(self) -> int:
+        """Number of the node at which the set torque is taken."""
+        return self.dynamometer.node
+
+    @property
+    def load_exponent(self) -> int:
+        """Power of the speed by which the set torque changes along a course: a dynamometer holds it."""
+        return LAWS["constant"]
+
+    def dampers(self, ratios: Mapping[int, float]) -> dict[int, float]:
+        """Slopes of torque over speed by node, N m s/rad, beyond the tables over the cycle: none."""
+        return {}
+
+    @property
     def friction_torque(self) -> float:
         """Of the whole engine at the crank, N m: mean pressure times swept volume over 4 pi."""
         volume = self.cylinder.swept_volume * len(self.layout.cylinders)
@@ -137,33 +127,22 @@ class Engine:
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
-class EngineTorques:
-    """Torques at one operating point; positive turns a node in its own sense of rotation.
+class EngineTorques(LineTorques):
+    """Torques of an engine at one operating point.
 
-    ``nodes`` (excited,) are node numbers, ``torque`` (excited, point) N m over the crank angles ``angle`` (point,) rad
-    of one cycle. ``pressure`` (point,) Pa is that of a cylinder from its own firing top dead center on, ``fuel_volume``
-    m3 what it burns in a cycle. ``brake_torque`` and ``indicated_torque`` are those of the whole engine at the crank,
-    N m. The disturbance is a torque of its own frequency, not one over the cycle.
+    ``angle`` (point,) rad are the crank angles of one cycle. ``pressure`` (point,) Pa is that of a cylinder from its
+    own firing top dead center on, ``fuel_volume`` m3 what it burns in a cycle. ``brake_torque`` and
+    ``indicated_torque`` are those of the whole engine at the crank, N m. The disturbance is a torque of its own
+    frequency, not one over the cycle.
     """
 
-    speed: float
-    brake_torque: float
     indicated_torque: float
     fuel_volume: float
     angle: Array
     pressure: Array
-    nodes: tuple[int, ...]
-    torque: Array
     disturbance_node: int
     disturbance_torque: float
     disturbance_frequency: float
-
-    def on(self, line_nodes: tuple[int, ...]) -> Array:
-        """The torques on the nodes of a line, in its order, (node, point); 0 where nothing acts."""
-        out = np.zeros((len(line_nodes), self.torque.shape[1]))
-        for node, row in zip(self.nodes, self.torque, strict=True):
-            out[line_nodes.index(node)] += row
-        return out
 
 
 def engine_torques(

@@ -10,6 +10,7 @@ from numpy.typing import NDArray
 
 from gensig.dynamics._line_layout import Course
 from gensig.errors import ConfigError
+from gensig.units import from_si
 
 Array = NDArray[np.float64]
 
@@ -30,7 +31,9 @@ class LineCourse:
         if not np.isfinite(self.time).all() or np.any(np.diff(self.time) <= 0.0):
             raise ConfigError("course: the times of its knots must increase")
         if not np.isfinite(self.speed).all() or self.speed.min() < 0.0:
-            raise ConfigError(f"course: speed {self.speed.min():g} rad/s must not be negative")
+            raise ConfigError(
+                f"course: speed {from_si('speed_rpm', float(self.speed.min())):g} r/min must not be negative"
+            )
 
     @cached_property
     def knots(self) -> Course:

@@ -5,6 +5,7 @@ from __future__ import annotations
 import multiprocessing
 import os
 import signal
+import sys
 import threading
 from collections import Counter, deque
 from collections.abc import Callable, Iterator, Sequence
@@ -83,7 +84,7 @@ def _submit(
     worker: ProcessPoolExecutor, job: Callable[[int], T], index: int
 ) -> tuple[ProcessPoolExecutor, Future[T | ShardFailure]]:
     """Give a worker a job; one that died while it had none is replaced first."""
-    with _interrupts_held():
+    with _interrupts_held(), _main_unknown():
         try:
             return worker, worker.submit(guarded, job, index)
         except BrokenProcessPool:
@@ -104,6 +105,23 @@ def _interrupts_held() -> Iterator[None]:
         yield
     finally:
         signal.pthread_sigmask(signal.SIG_SETMASK, before)
+
+
+@contextmanager
+def _main_unknown() -> Iterator[None]:
+    """Processes that start in this block do not run the user's script again to import it.
+
+    A script that calls ``gensig.generate`` needs no ``if __name__ == "__main__"`` then: jobs are importable without it.
+    """
+    main = sys.modules["__main__"]
+    looked_at = ("__spec__", "__file__")  # by multiprocessing.spawn.get_preparation_data
+    hidden: dict[str, Any] = {name: vars(main)[name] for name in looked_at if name in vars(main)}
+    main.__spec__ = None
+    vars(main).pop("__file__", None)
+    try:
+        yield
+    finally:
+        vars(main).update(hidden)
 
 
 def _begin_worker() -> None:

@@ -130,6 +130,8 @@ def read_slice_options(values: Mapping[str, Any]) -> SliceOptions:
 
 def read_mesh_options(values: Mapping[str, Any]) -> MeshOptions:
     """Options from boundary keys; a convention that is null follows ``law``."""
-    convention = CONVENTIONS.get(str(values.get("law")), {})
+    convention = CONVENTIONS.get(str(values.get("law")))
+    if convention is None:
+        raise ConfigError(f"mesh.law = {values.get('law')!r}; allowed: {', '.join(CONVENTIONS)}")
     own = {key: value for key, value in values.items() if key not in SLICE_KEYS}
     return read(MeshOptions, {**own, **{k: v for k, v in convention.items() if values.get(k) is None}}, "mesh")

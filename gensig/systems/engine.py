@@ -8,9 +8,10 @@ from typing import Any
 from gensig.dynamics.cams import Cam
 from gensig.dynamics.engine_cycle import Cylinder
 from gensig.dynamics.engine_pressure import PressureFile, WiebeCycle
-from gensig.dynamics.engine_torques import Dynamometer, Engine, Load, Reference, ValveTrain
+from gensig.dynamics.engine_torques import Dynamometer, Engine, ValveTrain
 from gensig.dynamics.firing import Layout
 from gensig.dynamics.injection_pump import Plunger
+from gensig.dynamics.line_torques import Load, Reference
 from gensig.errors import ConfigError
 from gensig.sensing.toothed_wheel import ToothedWheel
 from gensig.units import read, to_si
@@ -41,14 +42,19 @@ def read_engine(values: Mapping[str, Any]) -> Engine:
     ------
     ConfigError    for unknown or missing keys, and values that make no engine
     """
-    _check_group(PLACE, values)
+    check_group(PLACE, values)
+    if values.get("kind", "engine") != "engine":
+        raise ConfigError(f"{PLACE}.kind = {values['kind']!r}; allowed: engine, motor_and_load")
+    if "motor" in values:
+        raise ConfigError(
+            f"{PLACE}.motor is of a motor, {PLACE}.kind = engine of an engine: a line is turned by one of them; take "
+            "excitation=engine_v20 or excitation=motor_and_load"
+        )
     for key in values:
         if key not in KEYS:
             raise ConfigError(f"{PLACE}: unknown key '{key}'; known: {', '.join(KEYS)}")
     if missing := [key for key in KEYS if key not in values]:
         raise ConfigError(f"{PLACE}: missing {', '.join(missing)}")
-    if values["kind"] != "engine":
-        raise ConfigError(f"{PLACE}.kind = {values['kind']!r}; allowed: engine")
     plunger, plunger_nodes = _read_pump(values["injection_pump"])
     return Engine(
         cylinder=read(Cylinder, values["cylinder"], f"{PLACE}.cylinder"),
@@ -58,30 +64,32 @@ def read_engine(values: Mapping[str, Any]) -> Engine:
         friction_mean_pressure=_number("friction_mean_pressure_mpa", values),
         reference=read(Reference, values["reference"], f"{PLACE}.reference"),
         throw_nodes=_whole_numbers("throw_nodes", values["throw_nodes"]),
-        valve_trains={name: _read_train(name, one) for name, one in _items("valves", values["valves"])},
+        valve_trains={name: _read_train(name, one) for name, one in named_groups("valves", values["valves"])},
         valve_nodes={
             name: _whole_numbers(f"valve_nodes.{name}", one)
-            for name, one in _items("valve_nodes", values["valve_nodes"])
+            for name, one in named_groups("valve_nodes", values["valve_nodes"])
         },
         plunger=plunger,
         plunger_nodes=plunger_nodes,
-        loads={name: _read(Load, one, f"loads.{name}", "load") for name, one in _items("loads", values["loads"])},
+        loads={
+            name: read_named(Load, one, f"loads.{name}", "load") for name, one in named_groups("loads", values["loads"])
+        },
         dynamometer=read(Dynamometer, values["dynamometer"], f"{PLACE}.dynamometer"),
     )
 
 
 def read_wheels(values: Mapping[str, Any]) -> dict[str, ToothedWheel]:
     """The toothed wheels of the group ``excitation``, by their names; none where it is null."""
-    _check_group(PLACE, values)
+    check_group(PLACE, values)
     return {
-        name: _read(ToothedWheel, one, f"toothed_wheels.{name}", "toothed_wheel")
-        for name, one in _items("toothed_wheels", values.get("toothed_wheels"))
+        name: read_named(ToothedWheel, one, f"toothed_wheels.{name}", "toothed_wheel")
+        for name, one in named_groups("toothed_wheels", values.get("toothed_wheels"))
     }
 
 
 def _read_pressure(values: Any) -> WiebeCycle | PressureFile:
     """The cycle, or the file in its place where one is given."""
-    _check_group(f"{PLACE}.pressure", values)
+    check_group(f"{PLACE}.pressure", values)
     cycle = read(WiebeCycle, {key: one for key, one in values.items() if key != "file"}, f"{PLACE}.pressure")
     if values.get("file") is None:
         return cycle
@@ -90,9 +98,9 @@ def _read_pressure(values: Any) -> WiebeCycle | PressureFile:
 
 def _read_train(name: str, values: Any) -> ValveTrain:
     place = f"{PLACE}.valves.{name}"
-    _check_group(place, values)
+    check_group(place, values)
     own = {key: one for key, one in values.items() if key != "cam"}
-    return read(ValveTrain, own, place, cam=_read(Cam, values.get("cam"), f"valves.{name}.cam", "cam"))
+    return read(ValveTrain, own, place, cam=read_named(Cam, values.get("cam"), f"valves.{name}.cam", "cam"))
 
 
 def _read_pump(values: Any) -> tuple[Plunger | None, dict[str, int]]:
@@ -100,33 +108,34 @@ def _read_pump(values: Any) -> tuple[Plunger | None, dict[str, int]]:
     if values is None:
         return None, {}
     place = f"{PLACE}.injection_pump"
-    _check_group(place, values)
+    check_group(place, values)
     own = {key: one for key, one in values.items() if key not in ("cam", "nodes", "cylinders")}
     nodes, cylinders = _whole_numbers("injection_pump.nodes", values.get("nodes")), values.get("cylinders")
     if not isinstance(cylinders, list | tuple) or len(set(cylinders)) != len(nodes) or len(cylinders) != len(nodes):
         raise ConfigError(f"{place}.cylinders must name a different cylinder for each of its {len(nodes)} nodes")
-    plunger = read(Plunger, own, place, cam=_read(Cam, values.get("cam"), "injection_pump.cam", "cam"))
+    plunger = read(Plunger, own, place, cam=read_named(Cam, values.get("cam"), "injection_pump.cam", "cam"))
     return plunger, dict(zip(cylinders, nodes, strict=True))
 
 
-def _read(cls: type[Any], values: Any, place: str, name: str) -> Any:
+def read_named(cls: type[Any], values: Any, place: str, name: str) -> Any:
     """A dataclass whose own errors begin with ``name``: with the whole place instead."""
-    _check_group(f"{PLACE}.{place}", values)
+    check_group(f"{PLACE}.{place}", values)
     try:
         return read(cls, values, name)
     except ConfigError as error:
         raise ConfigError(f"{PLACE}.{place}{str(error).removeprefix(name)}") from None
 
 
-def _items(key: str, values: Any) -> list[tuple[str, Any]]:
+def named_groups(key: str, values: Any) -> list[tuple[str, Any]]:
     """Names and values of a group that may be null."""
     if values is None:
         return []
-    _check_group(f"{PLACE}.{key}", values)
+    check_group(f"{PLACE}.{key}", values)
     return [(str(name), one) for name, one in values.items()]
 
 
-def _check_group(place: str, values: Any) -> None:
+def check_group(place: str, values: Any) -> None:
+    """Raise for anything that is no group of keys."""
     if not isinstance(values, Mapping):
         raise ConfigError(f"{place} = {values!r} must be a group of keys, not one value")
 

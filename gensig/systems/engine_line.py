@@ -1,20 +1,24 @@
-"""An engine on its drive line: the group ``excitation`` on the nodes of the tables, and the steady answer."""
+"""An engine or a motor on its drive line: the group ``excitation`` on nodes of the tables, and the steady answer."""
 
 from __future__ import annotations
 
 from collections.abc import Mapping
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
 
 from gensig.dynamics.engine_cycle import CYCLE
-from gensig.dynamics.engine_torques import Engine, EngineTorques, engine_torques
+from gensig.dynamics.engine_torques import Engine, engine_torques
 from gensig.dynamics.forced import Elements, LinearLine, SteadyResponse, closed_line, over_cycle, steady_response
+from gensig.dynamics.line_matrices import LineMatrices
+from gensig.dynamics.line_torques import LineTorques
+from gensig.dynamics.motor_torques import MotorDrive, motor_torques
 from gensig.errors import ConfigError
 from gensig.sensing.toothed_wheel import ToothedWheel, draw_wheel, instantaneous_speed
-from gensig.systems.engine import read_engine, read_wheels
+from gensig.systems.engine import check_group, read_engine, read_wheels
+from gensig.systems.motor import KIND, read_motor
 from gensig.systems.registry import LINE, section
 from gensig.systems.shaft_line import DriveLine, read_drive_line
 
@@ -26,16 +30,19 @@ SEEN_CYCLES = 6
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class EngineLine:
-    """A drive line and the engine that turns it; degrees of freedom are the nodes, then lateral motion if any."""
+    """A drive line and the engine that turns it; degrees of freedom are the nodes, then lateral motion if any.
+
+    ``engine`` may be a motor with its load: the crank is then the motor's shaft, the brake torque what the load takes.
+    """
 
     drive: DriveLine
-    engine: Engine
+    engine: Engine | MotorDrive
     wheels: Mapping[str, ToothedWheel]
 
     @property
     def ratios(self) -> dict[int, float]:
         """Speed of every node over the crank's, by its number, positive."""
-        crank = abs(self.drive.line.speed_ratio[self._place(self.engine.throw_nodes[0], "throw_nodes")])
+        crank = abs(self.drive.line.speed_ratio[self._place(self.engine.driving_nodes[0], "throw_nodes")])
         ratios = np.abs(self.drive.line.speed_ratio) / crank
         return {number: float(ratio) for number, ratio in zip(self.drive.numbers, ratios, strict=True)}
 
@@ -49,13 +56,31 @@ class EngineLine:
 
     def linear(self) -> tuple[LinearLine, Elements]:
         """The line whose meshes never part, and its meshes."""
-        return closed_line(self.drive.matrices())
+        return closed_line(self.matrices())
 
-    def torques(self, speed: float, torque: float | None) -> EngineTorques:
+    def matrices(self, *, merge_rigid: bool = False) -> LineMatrices:
+        """Those of the line, with what the torques of motor and loads give way to speed."""
+        matrices, slopes = self.drive.matrices(merge_rigid=merge_rigid), self.engine.dampers(self.ratios)
+        if not slopes:
+            return matrices
+        damping = matrices.damping.copy()
+        for node, slope in slopes.items():
+            dof = int(np.argmax(matrices.expand[self.drive.numbers.index(node)]))
+            damping[dof, dof] += slope
+        return replace(matrices, damping=damping)
+
+    def torques(self, speed: float, torque: float | None) -> LineTorques:
         """What acts at a speed of the crank (rad/s) and a brake torque (N m)."""
-        return engine_torques(self.engine, speed, torque, self.ratios)
+        if isinstance(self.engine, Engine):
+            return engine_torques(self.engine, speed, torque, self.ratios)
+        assert torque is not None
+        return motor_torques(self.engine, speed, torque, self.ratios)
 
-    def on_line(self, torques: EngineTorques) -> Array:
+    def load_at(self, torque: float | Array, speed_share: float | Array) -> Any:
+        """The brake torque at a share of the speed at which it is ``torque`` N m, by the law of the load."""
+        return torque * speed_share**self.engine.load_exponent
+
+    def on_line(self, torques: LineTorques) -> Array:
         """Torques on the degrees of freedom, (dof, point) N m."""
         rows = torques.on(self.drive.numbers)
         n_dofs = len(self.drive.matrices().mass)
@@ -81,7 +106,7 @@ class EngineLine:
 
 
 def read_engine_line(config: Mapping[str, Any]) -> EngineLine:
-    """The drive line and the engine of a configuration.
+    """The drive line and the engine, or motor, of a configuration.
 
     Raises
     ------
@@ -89,8 +114,15 @@ def read_engine_line(config: Mapping[str, Any]) -> EngineLine:
     """
     kind = section(config, "system").get("kind")
     if kind != LINE:
-        raise ConfigError(f"system.kind = {kind!r} is no drive line; take system=engine_gear_train or shaft_line")
+        raise ConfigError(
+            f"system.kind = {kind!r} is no drive line; take system=engine_gear_train, two_stage_gearbox or shaft_line"
+        )
     if config.get("excitation") is None:
-        raise ConfigError("no excitation is chosen; take excitation=engine_v20, or your own option of that group")
+        raise ConfigError(
+            "no excitation is chosen; take excitation=engine_v20, motor_and_load, or your own option of that group"
+        )
     values = config["excitation"]
-    return EngineLine(drive=read_drive_line(config), engine=read_engine(values), wheels=read_wheels(values))
+    check_group("excitation", values)
+    drive = read_drive_line(config)
+    engine = read_motor(values, drive) if values.get("kind") == KIND else read_engine(values)
+    return EngineLine(drive=drive, engine=engine, wheels=read_wheels(values))

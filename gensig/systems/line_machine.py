@@ -11,6 +11,7 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 from numpy.typing import NDArray
+from threadpoolctl import threadpool_limits
 
 from gensig.dynamics.engine_cycle import CYCLE
 from gensig.dynamics.forced import SteadyResponse, closed_line, steady_response
@@ -37,6 +38,9 @@ TABLE_SHARE = 0.1  # of the largest torque between them
 MOST_TABLES = 24
 LEAD_SAMPLES = 256  # before time 0: more than the low-pass looks back
 ROUNDED = 1e-12  # of the largest torque, below which a course of it over the cycle is constant
+
+# More threads of the linear algebra sum in another order; a line that rattles makes another motion of the last digit.
+one_thread = threadpool_limits.wrap(limits=1)
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -101,6 +105,7 @@ class RunningLine:
         """Place of the degree of freedom that a node, by its number, turns with."""
         return int(np.argmax(self.matrices.expand[self.machine.drive.numbers.index(node)]))
 
+    @one_thread
     def run(
         self, solver: LineSolver, *, duration: float, channels: Sequence[tuple[str, int]], settling: float
     ) -> LineMotion:
@@ -126,6 +131,7 @@ class RunningLine:
         )
 
 
+@one_thread
 def running_line(
     machine: EngineLine,
     course: EngineCourse,
@@ -145,7 +151,7 @@ def running_line(
     ------
     ConfigError    for courses that the engine cannot run
     """
-    matrices = with_viscous_losses(machine.drive.matrices(merge_rigid=True))
+    matrices = with_viscous_losses(machine.matrices(merge_rigid=True))
     first = _tables(machine, matrices, float(course.speed[0]), float(course.torque[0]))
     closed, elements = closed_line(matrices)
     linear = steady_response(closed, first, float(course.speed[0]))
@@ -272,12 +278,12 @@ def _torques(
                     factor=share,
                 )
             )
-    if len(course.time) > 1:  # what speeds the whole line up comes from the throws
+    if len(course.time) > 1:  # what speeds the whole line up comes from the throws, or the motor
         rise = float(rotation @ matrices.mass @ rotation) / crank * np.gradient(course.speed / crank, course.time)
-        throws = machine.engine.throw_nodes
-        for node in throws:
+        driving = machine.engine.driving_nodes
+        for node in driving:
             throw = int(np.argmax(matrices.expand[machine.drive.numbers.index(node)]))
-            found.append(ShaftTorque(dof=throw, table=np.array([1.0 / len(throws)]), factor=rise))
+            found.append(ShaftTorque(dof=throw, table=np.array([1.0 / len(driving)]), factor=rise))
     return tuple(found)
 
 
@@ -296,7 +302,7 @@ def _table_times(course: EngineCourse) -> Array:
 
 
 def _crank(machine: EngineLine, matrices: LineMatrices) -> int:
-    return int(np.argmax(matrices.expand[machine.drive.numbers.index(machine.engine.throw_nodes[0])]))
+    return int(np.argmax(matrices.expand[machine.drive.numbers.index(machine.engine.driving_nodes[0])]))
 
 
 def with_supports(machine: EngineLine, place: int, supports: Sequence[object]) -> EngineLine:

@@ -80,6 +80,8 @@ class LineOptions:
     viscous_damper_node: int | None
     dampers: tuple[TorsionalDamper, ...]
     record_mesh: tuple[int, ...] | None = None
+    motor_node: int | None = None
+    load_node: int | None = None
     helical_meshes: str
     backlash: float = unit("um")
     loss_factor: LossFactors

@@ -14,6 +14,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
+from gensig.dynamics.engine_torques import Engine
 from gensig.dynamics.integrator import Solver, check_memory
 from gensig.dynamics.newmark import LineMotion, LineSolver
 from gensig.dynamics.pair import Body, Support
@@ -34,6 +35,7 @@ from gensig.systems.line_machine import (
     RunningLine,
     mesh_forces,
     named_by_side,
+    one_thread,
     reference_force,
     running_line,
     steady_course,
@@ -90,6 +92,11 @@ class LineMachine(PairMachine):
         raise ConfigError("dataset.store_mesh_state: a drive line does not tell the loads of its teeth; take false")
 
     @property
+    def load_exponent(self) -> int:
+        """Power of the speed that the torque of the load follows."""
+        return self.engine.engine.load_exponent
+
+    @property
     def mesh_force(self) -> float:
         """Mean normal force of the mesh at the set-point, N, or what closes it by 2 um."""
         return reference_force(self.engine, self.place, float(self.mesh_forces[self.place]))
@@ -140,7 +147,7 @@ class LineMachine(PairMachine):
         Where the gears do not come back to each other after every cycle, the drawn one.
         """
         pinion, wheel = self.pair.pinion.n_teeth, self.pair.wheel.n_teeth
-        is_timed = round(2.0 * self.ratio) == 1 and pinion % wheel == 0
+        is_timed = isinstance(self.engine.engine, Engine) and round(2.0 * self.ratio) == 1 and pinion % wheel == 0
         return tooth_pinion % wheel if is_timed else drawn
 
     def draw_discs(self, rng: np.random.Generator) -> tuple[Disc, ...]:
@@ -160,6 +167,7 @@ class LineMachine(PairMachine):
         except SimulationError as error:
             return error
 
+    @one_thread
     def _record(self, run: Run) -> CleanRecord:
         sensing, rate = self.sensing, self.sensing.sampling_rate
         line = self.line(run)
@@ -232,9 +240,12 @@ class LineMachine(PairMachine):
         """Where the crank stands in its cycle when given teeth of the mesh are at a phase, rad.
 
         The driving gear's teeth are tied to the crank: the same tooth meets the same cylinder's firing in every record.
-        Where its shaft turns more than once a cycle, the driven gear's tooth chooses the turn.
+        Where its shaft turns more than once a cycle, the driven gear's tooth chooses the turn. A motor has no cycle:
+        its turns go on being counted, so that the other meshes stand as the teeth allow.
         """
         pitches = start.tooth_pinion + start.phase - start_phase(self.engine.drive, self.place)
+        if not isinstance(self.engine.engine, Engine):
+            return 2.0 * math.pi * (pitches / self.pair.pinion.n_teeth + start.tooth_wheel) / self.ratio
         turns = pitches / self.pair.pinion.n_teeth + start.tooth_wheel % max(1, round(2.0 * self.ratio))
         return 2.0 * math.pi * turns / self.ratio % (4.0 * math.pi)
 
@@ -248,9 +259,8 @@ class LineMachine(PairMachine):
             return steady_course(operating.speed / self.ratio, operating.torque)
         time = np.arange(-2.0 * SETTLING, operating.duration + AFTER, KNOT)
         nominal = operating.nominal(time)
-        return EngineCourse(
-            time=time, speed=nominal.speed / self.ratio, torque=operating.torque * nominal.torque_factor
-        )
+        load = self.engine.load_at(operating.torque, nominal.speed / operating.speed)
+        return EngineCourse(time=time, speed=nominal.speed / self.ratio, torque=load * nominal.torque_factor)
 
     def _channel(self, line: RunningLine, name: str) -> tuple[str, int]:
         """What the integration gives for a channel: a kind and a degree of freedom."""

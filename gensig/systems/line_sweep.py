@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import math
 from collections.abc import Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from itertools import pairwise
 
 import numpy as np
@@ -101,7 +101,9 @@ def sweep_response(
     if n_bins < 2:
         least = 2.0 * CYCLE * LEAST_CYCLES / low
         raise ConfigError(f"a sweep in {seconds:g} s passes too few cycles at its low end; give {least:.2g} s or more")
-    line = running_line(machine, sweep_course(low, high, seconds, torque), governor=GOVERNOR, own=own)
+    course = sweep_course(low, high, seconds, torque)
+    course = replace(course, torque=machine.load_at(torque, course.speed / machine.engine.reference.speed))
+    line = running_line(machine, course, governor=GOVERNOR, own=own)
     solver = LineSolver(sampling_rate=RATE, oversampling=STEPS, max_energy_residual=MOST_ENERGY_RESIDUAL)
     names = [(kind, line.dof(node)) for kind in ("angle", "speed") for node in nodes]
     names += [("mesh_force", place) for place in range(len(machine.mesh_names))]

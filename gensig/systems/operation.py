@@ -201,16 +201,19 @@ def _is_number(value: Any) -> bool:
     return isinstance(value, int | float) and not isinstance(value, bool) and abs(value) <= sys.float_info.max
 
 
-def operating_signals(operating: Operating, sampling_rate: float, shaft_angle: Array) -> dict[str, NDArray[np.float32]]:
+def operating_signals(
+    operating: Operating, sampling_rate: float, shaft_angle: Array, load_exponent: int = 0
+) -> dict[str, NDArray[np.float32]]:
     """Traces of a record, (sample,) each: ``shaft_speed`` in rad/s, as the shaft turned, and ``torque_set`` in N m.
 
     The speed is the central difference of the shaft angle: it takes sin(x) / x with x = 2 pi f / sampling_rate of a
     change at f, 1 % less at 0.039 of the rate (2 kHz of 51.2 kHz), -3 dB at 0.22 of it. An angle of one NaN a sample
-    is a failed record's.
+    is a failed record's. ``load_exponent`` is the power of the nominal speed that the torque of the load follows.
     """
     times = np.arange(len(shaft_angle)) / sampling_rate
     speed = np.full_like(shaft_angle, operating.speed)
     if len(shaft_angle) > 2:
         speed = np.gradient(shaft_angle, 1.0 / sampling_rate, edge_order=2)
-    torque = operating.torque * operating.nominal(times).torque_factor
+    nominal = operating.nominal(times)
+    torque = operating.torque * nominal.torque_factor * (nominal.speed / operating.speed) ** load_exponent
     return {"shaft_speed": speed.astype(np.float32), "torque_set": torque.astype(np.float32)}

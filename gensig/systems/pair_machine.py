@@ -133,6 +133,11 @@ class PairMachine(ABC):
         return np.array([torque])
 
     @property
+    def load_exponent(self) -> int:
+        """Power of the speed that the set torque follows along a course, beyond its own profile."""
+        return 0
+
+    @property
     def most_pairs(self) -> int:
         """Pairs of teeth that may be followed at once."""
         return N_PAIRS

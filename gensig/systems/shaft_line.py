@@ -38,7 +38,7 @@ class DriveLine:
 
     ``numbers`` (node,) as the table counts them, rings of dampers on from there; ``pairs`` (mesh,) the driving gear as
     pinion; ``record_mesh`` the numbers of the nodes whose mesh records are made of; ``slices_helical`` whether helical
-    meshes in time are sliced teeth.
+    meshes in time are sliced teeth; ``motor_node``, ``load_node`` those of a motor and its load.
     """
 
     name: str
@@ -49,6 +49,8 @@ class DriveLine:
     campbell: Campbell
     record_mesh: tuple[int, ...] | None = None
     slices_helical: bool = False
+    motor_node: int | None = None
+    load_node: int | None = None
 
     def matrices(self, *, merge_rigid: bool = False) -> LineMatrices:
         """Mass, damping and stiffness, the meshes apart; merged for integration, as the table has them for modes."""
@@ -115,6 +117,8 @@ def read_drive_line(config: Mapping[str, Any]) -> DriveLine:
         campbell=options.campbell,
         record_mesh=options.record_mesh,
         slices_helical=options.helical_meshes == "sliced",
+        motor_node=options.motor_node,
+        load_node=options.load_node,
     )
 
 

@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import json
-import re
 from collections.abc import Mapping
 from pathlib import Path
 from typing import Any
@@ -11,12 +10,12 @@ from typing import Any
 import numpy as np
 
 from gensig.errors import ConfigError
+from gensig.option_file import is_option_name, option_lines
 from gensig.twin.fitting import SOURCE_CHANNEL, Fit, minimum_phase, oversampling
 
 PATH_STEP = 20.0  # Hz between the lines of the path's file; its gain is smooth over a sixth of an octave
 DEFAULT_OVERSAMPLING = 5  # solver.oversampling of configs/generate.yaml
 PATH_FILE, NOISE_FILE = "path.csv", "noise.csv"
-OPTION_NAME = re.compile(r"[A-Za-z][A-Za-z0-9_-]*")
 
 
 def option_name(out: Path) -> str:
@@ -27,7 +26,7 @@ def option_name(out: Path) -> str:
     ConfigError    for a name that an option cannot have, and for a folder that holds anything
     """
     name = out.resolve().name
-    if not OPTION_NAME.fullmatch(name):
+    if not is_option_name(name):
         raise ConfigError(f"--out {out}: its name becomes that of the options; use letters, digits, _ and -")
     if out.exists() and (not out.is_dir() or any(out.iterdir())):
         raise ConfigError(f"--out {out} is there and not an empty folder; give another")
@@ -50,24 +49,12 @@ def write_options(
     for group in ("gear", "sensing", "experiment"):
         (out / group).mkdir(parents=True, exist_ok=True)
     head = "# Written by gensig twin; report.md beside this folder's options says what was fitted and what assumed.\n"
-    (out / "gear" / f"{name}.yaml").write_text(head + "\n".join(_lines(gear, remarks)) + "\n", encoding="utf-8")
+    (out / "gear" / f"{name}.yaml").write_text(head + "\n".join(option_lines(gear, remarks)) + "\n", encoding="utf-8")
     (out / "sensing" / f"{name}.yaml").write_text(head + _sensing(out, fitted), encoding="utf-8")
     experiment = "# @package _global_\n" + head + _experiment(name, fitted, torque_nm, duration)
     (out / "experiment" / f"{name}.yaml").write_text(experiment, encoding="utf-8")
     _write_path(out / PATH_FILE, fitted)
     _write_noise(out / NOISE_FILE, fitted)
-
-
-def _lines(values: Mapping[str, Any], remarks: Mapping[str, str], above: str = "", indent: str = "") -> list[str]:
-    lines = []
-    for key, value in values.items():
-        place = f"{above}{key}"
-        if isinstance(value, Mapping):
-            lines += [f"{indent}{key}:", *_lines(value, remarks, f"{place}.", indent + "  ")]
-        else:
-            remark = remarks.get(place)
-            lines.append(f"{indent}{key}: {json.dumps(value)}" + (f"   # {remark}" if remark else ""))
-    return lines
 
 
 def _sensing(out: Path, fitted: Fit) -> str:

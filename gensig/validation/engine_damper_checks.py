@@ -11,6 +11,7 @@ from typing import Any
 import numpy as np
 
 from gensig.compose import compose
+from gensig.dynamics.engine_torques import EngineTorques
 from gensig.dynamics.forced import SteadyResponse, Waterfall, disturbance_response, run_of_speeds
 from gensig.systems.engine_dampers import (
     DynamicRootStress,
@@ -96,6 +97,7 @@ class DamperCase:
         """Amplitude of a node's angle at the frequency of the dynamometer's disturbance, rad."""
         numbers, engine = self.line.drive.numbers, self.line.engine
         torques = self.line.torques(engine.reference.speed, engine.reference.torque)
+        assert isinstance(torques, EngineTorques)
         moved = disturbance_response(
             self.line.linear()[0],
             numbers.index(torques.disturbance_node),

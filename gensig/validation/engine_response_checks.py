@@ -23,6 +23,7 @@ POINTS = 5760  # of a cycle, over which forces are looked at
 def read_forced_case(overrides: tuple[str, ...]) -> ForcedCase:
     """Compose the engine and its line of a row."""
     whole = read_engine_line(compose("generate", overrides))
+    assert isinstance(whole.engine, Engine)
     line, meshes = whole.linear()
     return ForcedCase(
         line=line,

@@ -148,7 +148,16 @@ def realism_lines(path: Path = RESULTS) -> list[str]:
         ("A healthy recording", RECORDING_TEXT, "realism_recording.png", recording),
     ):
         if rows:
-            lines += [f"### {title}", "", text, "", f"![{title}](figures/{figure})", "", *table(rows), ""]
+            lines += [
+                f"### {title}",
+                "",
+                text,
+                "",
+                f"![{title}: simulated beside measured](figures/{figure})",
+                "",
+                *table(rows),
+                "",
+            ]
     return lines[:-1]
 
 

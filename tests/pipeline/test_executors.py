@@ -111,6 +111,21 @@ def wait_until(condition, process: subprocess.Popen | None = None, seconds: floa
         time.sleep(0.01)
 
 
+def test_a_script_without_a_main_guard_runs_once(tmp_path: Path) -> None:
+    script = tmp_path / "mine.py"
+    script.write_text(
+        "import operator\n"
+        "from gensig.execution.local import LocalExecutor\n"
+        "print('begun')\n"
+        "print(sorted(LocalExecutor(n_workers=2).run(operator.neg, range(4))))\n"
+        "print(__file__, __spec__)\n"
+    )
+    ran = subprocess.run([sys.executable, script], capture_output=True, text=True, timeout=120)
+    assert ran.returncode == 0, ran.stderr
+    assert ran.stdout.splitlines() == ["begun", "[(0, 0), (1, -1), (2, -2), (3, -3)]", f"{script} None"]
+    assert not ran.stderr
+
+
 def test_tasks_of_an_array_share_all_shards_out() -> None:
     tasks = [ArrayExecutor(shard_index=index, shard_count=3, n_workers=1) for index in range(3)]
     shares = [task.share(range(8)) for task in tasks]

@@ -15,8 +15,7 @@ from gensig.systems import line_loads
 
 LINE = (
     "experiment=engine_broken_tooth", "life=crack_growth", "plan.n_records=null", "plan.classes=[healthy,crack]",
-    "plan.n_repeats=1", "plan.n_units=2", "plan.n_gearboxes=1", "life.snapshot_count=3", "life.n_setpoints=1",
-    "plan.vary={}",
+    "plan.n_units=2", "plan.n_gearboxes=1", "life.snapshot_count=3", "life.n_setpoints=1", "plan.vary={}",
     "operating.duration_s=0.02", "life.crack.rate_scatter=0", "life.crack.start_scatter=0",
 )  # fmt: skip
 HELICAL = (

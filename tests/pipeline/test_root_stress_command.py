@@ -64,7 +64,7 @@ def test_strength_is_no_draw(capsys):
         (["--plot", "root.txt"], "the name must end in .png"),
         (["--stress", "-1"], "give a positive one"),
         (["--stress", "nan"], "give a positive one"),
-        (["--stress", "much"], "invalid float value"),
+        (["--stress", "much"], "--stress much is not a number"),
         (["operating.torque_nm=0"], "operating.torque_nm = 0 must be positive"),
         (["operating.torque_nm=-5", "system=helical_pair"], "must be positive"),
         (["strength.bending_limit_mpa=0"], "strength.bending_limit_mpa = 0 must be positive"),

@@ -1,0 +1,23 @@
+"""Figure of a line that a motor turns: mean torques by node and what its meshes carry."""
+
+from __future__ import annotations
+
+from typing import TYPE_CHECKING, Any
+
+from gensig.commands.figures import FAULTY, GREY, SOUND
+from gensig.systems.engine_line import EngineLine
+
+if TYPE_CHECKING:
+    from gensig.commands.forced_response import Found
+
+
+def motor_rows(axes: Any, line: EngineLine, found: Found) -> None:
+    """Mean torques on the nodes, and mean tooth forces of the meshes, (2,) axes."""
+    mean = found.torques.on(line.drive.numbers).mean(axis=1)
+    names = [f"{number}" for number in line.drive.numbers]
+    axes[0].bar(names, mean, color=[FAULTY if value < 0.0 else SOUND for value in mean])
+    axes[0].axhline(0.0, color=GREY, linewidth=0.8)
+    axes[0].set(title="Mean torques: given (blue) and taken (red)", xlabel="node", ylabel="N m, on its own shaft")
+    force = found.response.element_forces(line.linear()[1])[0]
+    axes[1].bar(list(line.mesh_names), force / 1e3, color=SOUND, width=0.4)
+    axes[1].set(title="Mean tooth force of the meshes", xlabel="mesh", ylabel="kN")

@@ -1,0 +1,145 @@
+"""One self-contained HTML page out of sections of text, tables, figures and charts; every text is escaped.
+
+Charts are drawn in the browser by plotly.js, which is copied into the page once, from data that is copied into it too.
+The page reads nothing else: its content security policy lets no script run but those two, and nothing be fetched.
+"""
+
+from __future__ import annotations
+
+import base64
+import hashlib
+import json
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass, field
+from pathlib import Path
+from typing import Any
+
+MARKS = ("", "good", "bad", "quiet")
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class Table:
+    """Cells of plain text under a head; `quiet` rows are set in grey."""
+
+    head: Sequence[str]
+    rows: Sequence[Sequence[str]]
+    quiet: Sequence[int] = ()
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class Card:
+    """One answer in large type: what it is about, the number, its interval, what it says, and what it claims."""
+
+    title: str
+    value: str
+    spread: str
+    verdict: str
+    meaning: str
+    mark: str = ""
+
+    def __post_init__(self) -> None:
+        if self.mark not in MARKS:
+            raise ValueError(f"mark must be one of {', '.join(MARKS)}, not {self.mark!r}")
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class Select:
+    """A drop-down of charts: a label, and groups of (value, text); a group without a title stands alone."""
+
+    name: str
+    label: str
+    groups: Sequence[tuple[str, Sequence[tuple[str, str]]]]
+    chosen: str = ""
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class Switch:
+    """A box of charts to tick."""
+
+    name: str
+    label: str
+    on: bool = False
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class Charts:
+    """Charts that share controls: `name` finds the function of the page's script that draws them.
+
+    Parameters
+    ----------
+    plots : (name, what it shows)
+    """
+
+    name: str
+    label: str
+    selects: Sequence[Select] = ()
+    switches: Sequence[Switch] = ()
+    plots: Sequence[tuple[str, str]] = ()
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class Section:
+    """A heading and below it, in this order, text, cards, a table, notes, figures, charts and code.
+
+    Parameters
+    ----------
+    text : paragraphs
+    notes : points of a list, each a term in bold, or "", and what is said of it
+    figures : (file in the folder of the page, what it shows)
+    side_by_side : whether figures share a line
+    code : what can be copied, set as it is
+    folded : whether the reader opens it by a click
+    """
+
+    title: str
+    text: Sequence[str] = ()
+    cards: Sequence[Card] = ()
+    table: Table | None = None
+    notes: Sequence[tuple[str, str]] = ()
+    figures: Sequence[tuple[str, str]] = field(default=())
+    side_by_side: bool = False
+    charts: Charts | None = None
+    code: str = ""
+    folded: bool = False
+
+
+def write_page(path: Path, *, title: str, lead: Sequence[str], sections: Sequence[Section]) -> None:
+    """Write the page; the figures lie beside it and are copied into it, so that it can be sent alone."""
+
+    def embedded(name: str) -> str:
+        return "data:image/png;base64," + base64.b64encode((path.parent / name).read_bytes()).decode("ascii")
+
+    text = _render(title=title, lead=lead, sections=sections, embedded=embedded, scripts=(), data="")
+    path.write_text(text, encoding="utf-8")
+
+
+def interactive_page(
+    *, title: str, lead: Sequence[str], sections: Sequence[Section], script: str, data: Mapping[str, Any]
+) -> str:
+    """The text of a page with charts, which cannot hold figures of files.
+
+    Parameters
+    ----------
+    script : file in the folder ``templates`` whose functions draw the charts
+    data : JSON, without NaN, that the script draws; see ``gensig.report.packing`` for long rows of numbers
+    """
+    from plotly.offline import get_plotlyjs
+
+    scripts = [get_plotlyjs(), (Path(__file__).parent / "templates" / script).read_text(encoding="utf-8")]
+    # neither a tag nor a comment can begin inside of the block that holds the data
+    content = json.dumps(data, allow_nan=False, separators=(",", ":")).replace("<", "\\u003c").replace(">", "\\u003e")
+    return _render(title=title, lead=lead, sections=sections, embedded=None, scripts=scripts, data=content)
+
+
+def _render(*, scripts: Sequence[str], **content: Any) -> str:
+    from jinja2 import Environment, PackageLoader, StrictUndefined
+    from markupsafe import Markup
+
+    environment = Environment(
+        loader=PackageLoader("gensig"), autoescape=True, undefined=StrictUndefined, trim_blocks=True
+    )
+    hashes = [base64.b64encode(hashlib.sha256(text.encode()).digest()).decode("ascii") for text in scripts]
+    policy = "script-src " + " ".join(f"'sha256-{text}'" for text in hashes) + "; " if scripts else ""
+    content["data"] = Markup(content["data"])
+    template = environment.get_template("page.html")
+    return template.render(**content, scripts=[Markup(text) for text in scripts], policy=Markup(policy)) + "\n"

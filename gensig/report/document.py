@@ -1,0 +1,280 @@
+"""The page of a data set, put together: one HTML file that needs nothing else."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+
+from gensig.dataset.atomic import write_bytes
+from gensig.dataset.card import plain
+from gensig.dataset.class_figures import FIRST_CHOICE
+from gensig.dataset.reader import Dataset, open_dataset
+from gensig.errors import ConfigError
+from gensig.page import Charts, Section, Select, Switch, interactive_page
+from gensig.report import tables
+from gensig.report.examples import Choice, choose, envelope_band, example, usable_top
+from gensig.report.measured_ranges import at_measured_rate, beside_measurements
+from gensig.report.packing import pack_floats
+from gensig.report.rotation import Rotation, read_rotation
+from gensig.report.values import (
+    ALONG,
+    INDICATORS,
+    MOST_ROWS,
+    Measured,
+    column_label,
+    drawn_columns,
+    has_lives,
+    life_table,
+    measure,
+    some_records,
+    value_table,
+)
+from gensig.validation.realism import Comparison
+
+SCRIPT = "dataset_report.js"
+REPORT = "report.html"
+MOST_BYTES = 15_000_000
+MARKS = (
+    ("mesh", "mesh harmonics", True),
+    ("sidebands", "sidebands", False),
+    ("shafts", "shaft orders", False),
+    ("fault", "fault frequency", True),
+)
+
+
+def write_report(folder: Path, out: Path | None = None, *, per_class: int | None = None) -> tuple[Path, str]:
+    """Write the page of a complete data set; returns its path and one line on what it shows.
+
+    Parameters
+    ----------
+    out : file that does not exist yet; None is `REPORT` in the folder
+    per_class : records shown of each class; None lets the page's size decide
+
+    Raises
+    ------
+    ConfigError     for a file that is there already, a folder that is not, or a number of records below 1
+    DatasetError    for a folder that is no data set, incomplete or damaged
+    """
+    path = folder / REPORT if out is None else out
+    if path.exists() or path.is_symlink():
+        raise ConfigError(f"{path} exists already; remove it, or choose another --out FILE")
+    if out is not None and not path.parent.is_dir():
+        raise ConfigError(f"{path}: there is no folder {path.parent}; give an existing one")
+    if per_class is not None and per_class < 1:
+        raise ConfigError(f"--records {per_class} must be at least 1")
+    with open_dataset(folder) as data:
+        text, said = report_text(data, per_class)
+    content = text.encode("utf-8")
+    if len(content) > MOST_BYTES:
+        raise ConfigError(
+            f"the page would have {len(content) / 1e6:.1f} MB, at most 15 are meant; give fewer --records"
+        )
+    write_bytes(path, content)
+    return path, f"{said}, {len(content) / 1e6:.1f} MB"
+
+
+def report_text(data: Dataset, per_class: int | None) -> tuple[str, str]:
+    """The page, and one line on what it shows."""
+    chosen = choose(data, per_class)
+    rotation = read_rotation(data)
+    units = dict(zip(data.channel_names, tables.channel_units(data), strict=True))
+    own_units = [units[name] for name in chosen.channels]
+    drawn = some_records(data, MOST_ROWS)
+    measured = measure(data, rotation, chosen.channels, at_measured_rate)
+    compared = beside_measurements(data, measured, own_units)
+    content = _content(data, chosen, rotation, own_units, drawn, measured, compared)
+    name = plain(data.folder.resolve().name)
+    n_shown = sum(len(records) for records in chosen.records.values())
+    sections = [
+        *tables.contents(data),
+        _signals(data, chosen, rotation, content["examples"]),
+        _parameters(data, content["drawn"]),
+        _indicators(data, chosen, measured, content["measured"]),
+        *([_lives(content["lives"])] if "lives" in content else []),
+        _beside(compared, own_units),
+        tables.splits(data),
+        *tables.loading(data),
+        *tables.provenance(data),
+    ]
+    page = interactive_page(
+        title=f"Data set {name}",
+        lead=[f"{data.n_records} records of {len(data.class_names)} classes, simulated and labelled by gensig "
+              f"{plain(data.manifest.generator_version)}. This page stands alone: it fetches nothing."],
+        sections=sections,
+        script=SCRIPT,
+        data=content,
+    )  # fmt: skip
+    return page, f"{n_shown} records shown, {len(measured.records)} measured"
+
+
+def _content(
+    data: Dataset,
+    chosen: Choice,
+    rotation: Rotation,
+    units: Sequence[str],
+    drawn: np.ndarray,
+    measured: Measured,
+    compared: Sequence[Comparison],
+) -> dict[str, Any]:
+    """What the script draws."""
+    along = [name for name in ALONG if name in data.column_names]
+    table = value_table(data, measured.records, along)
+    table["columns"] |= {name: pack_floats(values) for name, values in measured.values.items()}
+    content = {
+        "classes": [plain(name) for name in data.class_names],
+        "channels": [{"name": plain(n), "unit": plain(u)} for n, u in zip(chosen.channels, units, strict=True)],
+        "teeth": rotation.n_teeth,
+        "top": usable_top(data),
+        "examples": [
+            example(data, index, chosen.channels, rotation) for records in chosen.records.values() for index in records
+        ],
+        "drawn": value_table(data, drawn, drawn_columns(data, drawn)),
+        "measured": table,
+        "beside": [
+            {"name": f"{one.id}, {one.at}", "low": one.low, "high": one.high, "median": one.median, "p5": one.p5,
+             "p95": one.p95, "verdict": one.verdict} for one in compared
+        ],
+    }  # fmt: skip
+    if has_lives(data):
+        content["lives"] = life_table(data)
+    return content
+
+
+def _signals(data: Dataset, chosen: Choice, rotation: Rotation, examples: list[dict[str, Any]]) -> Section:
+    groups: dict[str, list[tuple[str, str]]] = {}
+    for number, one in enumerate(examples):
+        severity = "unknown" if one["severity"] is None else f"{one['severity']:.2f}"
+        text = plain(f"{one['class']}, severity {severity}, {one['unit']}, {one['record']}")
+        groups.setdefault(plain(one["class"]), []).append((str(number), text))
+    last = groups[list(groups)[-1]]
+    first = last[-1 if has_lives(data) else len(last) // 2][0]
+    orders = [("hz", "Hz and ms")] + [(name, f"orders: {words}") for name, words in rotation.references]
+    zooms = [("all", "usable band")]
+    if any(name == "mesh" for name, _ in orders):
+        zooms += [(f"{k}", f"around mesh harmonic {k}") for k in (1, 2, 3)]
+    low, high = envelope_band(data.sampling_rate)
+    sound = "of each class those of one life, from" if has_lives(data) else "of each class from"
+    lines = [
+        f"{len(examples)} of {data.n_records} records: {sound} the least to the greatest severity; sound ones at the "
+        "conditions of the middle one of another class, so that both can be compared.",
+        "Orders are multiples of the chosen shaft's mean speed. Amplitudes of spectra are rounded to 0.4 dB; waveform "
+        "and spectrogram are those of the first samples, up to 8192.",
+    ]
+    if chosen.remark:
+        lines.insert(1, f"Shown are {chosen.remark}.")
+    return Section(
+        title="Signals",
+        text=lines,
+        charts=Charts(
+            name="signals",
+            label="Choice of signal",
+            selects=[
+                Select(name="record", label="Record", groups=list(groups.items()), chosen=first),
+                Select(name="other", label="Compare with", chosen="same",
+                       groups=[("", [("", "nothing"), ("same", "its machine, least damaged")]), *groups.items()]),
+                Select(name="channel", label="Channel",
+                       groups=[("", [(str(i), plain(name)) for i, name in enumerate(chosen.channels)])],
+                       chosen=_first_channel(chosen)),
+                Select(name="axis", label="Axis", groups=[("", orders)], chosen="hz"),
+                Select(name="zoom", label="Spectrum", groups=[("", zooms)], chosen="all"),
+            ],
+            switches=[Switch(name="decibel", label="logarithmic", on=True),
+                      *(Switch(name=name, label=label, on=on) for name, label, on in MARKS)],
+            plots=[
+                ("wave", "Waveform"),
+                ("spectrum", "Amplitude spectrum"),
+                ("envelope", f"Spectrum of the envelope of {low / 1e3:.3g} to {high / 1e3:.3g} kHz"),
+                ("spectrogram", "Spectrogram"),
+            ],
+        ),
+    )  # fmt: skip
+
+
+def _first_channel(chosen: Choice) -> str:
+    """Number of the channel shown first: that of the data card's figures, where there is one."""
+    return str(chosen.channels.index(FIRST_CHOICE)) if FIRST_CHOICE in chosen.channels else "0"
+
+
+def _parameters(data: Dataset, table: dict[str, Any]) -> Section:
+    names = list(table["columns"])
+    drawn = [(name, column_label(name)) for name in names if name.startswith("params/")]
+    other = [(name, column_label(name)) for name in names if not name.startswith("params/")]
+    n_rows = table["rows"]
+    text = [
+        f"{_of(n_rows, data)}. A parameter is in the records to which it applies; those that never differ are left out."
+    ]
+    if not names:
+        return Section(title="Parameters", text=["No parameter differs between the records."])
+    return Section(
+        title="Parameters",
+        text=text,
+        charts=Charts(
+            name="parameters",
+            label="Choice of parameter",
+            selects=[
+                Select(name="column", label="Parameter", groups=[("drawn", drawn), ("of the record", other)],
+                       chosen=next((name for name in names if "/operating." in name), "")),
+                Select(name="form", label="Shown as",
+                       groups=[("", [("histogram", "histogram"), ("boxes", "boxes and points by class")])]),
+            ],
+            plots=[("parameters", "Distribution by class")],
+        ),
+    )  # fmt: skip
+
+
+def _indicators(data: Dataset, chosen: Choice, measured: Measured, table: dict[str, Any]) -> Section:
+    known = [(name, label) for name, label in INDICATORS if np.isfinite(measured.values[name]).any()]
+    along = [(name, column_label(name)) for name in ALONG if name in table["columns"]]
+    text = [f"{_of(len(measured.records), data)}. Averages over turns are taken at the mean speed; where it varies, "
+            "FM4 and sideband ratios say less."]  # fmt: skip
+    if not known:
+        return Section(title="Condition indicators", text=["No record tells one."])
+    return Section(
+        title="Condition indicators",
+        text=text,
+        charts=Charts(
+            name="indicators",
+            label="Choice of indicator",
+            selects=[
+                Select(name="indicator", label="Indicator", groups=[("", known)]),
+                Select(name="along", label="Over", groups=[("", along)], chosen="severity"),
+                Select(name="channel", label="Channel",
+                       groups=[("", [(str(i), plain(name)) for i, name in enumerate(chosen.channels)])],
+                       chosen=_first_channel(chosen)),
+            ],
+            switches=[Switch(name="decibel", label="logarithmic", on=False)],
+            plots=[("indicators", "Indicator by class"), ("levels", "Spread by class")],
+        ),
+    )  # fmt: skip
+
+
+def _lives(table: dict[str, Any]) -> Section:
+    shown = len(table["names"])
+    quantities = [("remaining_life_h", "remaining life, h"), ("severity", "severity")]
+    return Section(
+        title="Lives",
+        text=[f"{shown} of {table['n_lives']} lives, a line each, from new to failure or to the horizon (crosses)."],
+        charts=Charts(
+            name="lives",
+            label="Choice of quantity",
+            selects=[Select(name="quantity", label="Quantity", groups=[("", quantities)])],
+            switches=[Switch(name="relative", label="time as a share of the life", on=False)],
+            plots=[("lives", "Lives over time")],
+        ),
+    )
+
+
+def _beside(compared: Sequence[Comparison], units: Sequence[str]) -> Section:
+    section = tables.measured_table(compared, units)
+    if not compared:
+        return section
+    charts = Charts(name="beside", label="Nothing to choose", plots=[("beside", "Measured ranges and this set")])
+    return Section(title=section.title, text=section.text, table=section.table, charts=charts)
+
+
+def _of(n_rows: int, data: Dataset) -> str:
+    n_usable = int(np.count_nonzero(data.usable))
+    return f"All {n_rows} records" if n_rows == n_usable else f"{n_rows} of {n_usable} records, evenly of all classes"

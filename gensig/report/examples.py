@@ -1,0 +1,186 @@
+"""The records that the page shows: which, and their waveform, spectrum, envelope spectrum and spectrogram."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from gensig.dataset.reader import Dataset
+from gensig.errors import DatasetError
+from gensig.report.packing import pack_amplitude, pack_signal
+from gensig.report.rotation import Rotation
+from gensig.report.values import has_lives
+from gensig.signals.envelope import envelope_spectrum
+from gensig.signals.spectrum import amplitude_spectrum
+
+FloatArray = NDArray[np.floating]
+
+RECORDS_PER_CLASS = 3
+SIGNALS_BY_DEFAULT = 48  # records times channels: about 3 MB
+SIGNALS_AT_MOST = 140  # about 9 MB, plotly.js 5 MB: the page stays below 15 MB
+WAVEFORM_SAMPLES = 8192
+SPECTRUM_BINS = 20_000
+ENVELOPE_BINS = 4000
+ENVELOPE_MESHES = 3.2  # the envelope spectrum ends above the third harmonic of the mesh
+# above the lower mesh harmonics, below the highest usable frequency, as `gensig simulate --plot` takes it
+ENVELOPE_BAND = (5000.0 / 51200.0, 19000.0 / 51200.0)  # of the sampling rate
+WINDOW_SAMPLES = 256  # of the spectrogram
+SPECTROGRAM_COLUMNS = 96
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class Choice:
+    """Records (by number) and channels (by name) that are shown, and one line on what was left out, or ""."""
+
+    records: dict[str, list[int]]
+    channels: list[str]
+    remark: str
+
+    @property
+    def n_signals(self) -> int:
+        """Records times channels."""
+        return len(self.channels) * sum(len(records) for records in self.records.values())
+
+
+def choose(data: Dataset, per_class: int | None) -> Choice:
+    """Usable records of each class, from the least to the greatest severity; sound ones of the same machines.
+
+    Parameters
+    ----------
+    per_class : records of a class; None takes `RECORDS_PER_CLASS`, or fewer where the page would get heavy
+    """
+    label, usable = data.column("label_name"), data.usable
+    classes = [name for name in data.class_names if np.any((label == name) & usable)]
+    if not classes:
+        raise DatasetError(f"{data.folder} has no usable record to show; gensig inspect {data.folder} says why")
+    limit = SIGNALS_BY_DEFAULT if per_class is None else SIGNALS_AT_MOST
+    wanted = RECORDS_PER_CLASS if per_class is None else per_class
+    n_channels = min(len(data.channel_names), max(limit // len(classes), 1))
+    n_shown = max(min(wanted, limit // (len(classes) * n_channels)), 1)
+    faulty = {name: _spread(data, name, n_shown) for name in classes if name != "healthy"}
+    chosen = {
+        name: faulty[name] if name in faulty else _sound(data, list(faulty.values()), n_shown) for name in classes
+    }
+    remarks = []
+    if n_shown < wanted:
+        remarks.append(f"{n_shown} instead of {wanted} records a class, so that the page stays small")
+    if n_channels < len(data.channel_names):
+        remarks.append(f"the first {n_channels} of {len(data.channel_names)} channels, so that the page stays small")
+    return Choice(records=chosen, channels=data.channel_names[:n_channels], remark="; ".join(remarks))
+
+
+def _spread(data: Dataset, name: str, n_shown: int) -> list[int]:
+    """Records of a class at even steps of the rank of their severity; those of one life where there are lives."""
+    mine = np.flatnonzero((data.column("label_name") == name) & data.usable)
+    mine = mine[np.argsort(data.column("severity")[mine], kind="stable")]
+    if has_lives(data):  # the machine that gets worst, from its beginning
+        mine = mine[data.column("life_id")[mine] == data.column("life_id")[mine[-1]]]
+    places = np.linspace(0, mine.size - 1, n_shown) if n_shown > 1 else np.array([mine.size // 2])
+    return list(dict.fromkeys(mine[np.rint(places).astype(int)].tolist()))
+
+
+def _sound(data: Dataset, faulty: Sequence[Sequence[int]], n_shown: int) -> list[int]:
+    """Healthy records at the conditions of the middle records of the other classes; others where there are too few."""
+    condition, unit = data.column("condition_id"), data.column("unit_id")
+    sound = np.flatnonzero((data.column("label_name") == "healthy") & data.usable)
+    found: list[int] = []
+    for records in faulty:
+        middle = records[len(records) // 2]
+        same = sound[(condition[sound] == condition[middle]) & (unit[sound] == unit[middle])]
+        found += [index for index in same[:1].tolist() if index not in found]
+    found = found[:n_shown]
+    return found + [index for index in _spread(data, "healthy", n_shown) if index not in found][: n_shown - len(found)]
+
+
+def example(data: Dataset, index: int, channels: Sequence[str], rotation: Rotation) -> dict[str, Any]:
+    """What the page knows of a record: its labels, its frequencies, and of each channel four views.
+
+    Raises
+    ------
+    DatasetError    for a record with values that are not finite
+    """
+    values = {name: data.column(name)[index] for name in ("record_id", "label_name", "severity", "unit_id")}
+    signals = data.signals(index, channels=list(channels)).astype(float)
+    if not np.isfinite(signals).all():
+        raise DatasetError(f"record {values['record_id']} holds values that are not finite; run gensig verify")
+    return {
+        "record": str(values["record_id"]),
+        "class": str(values["label_name"]),
+        "severity": _finite(values["severity"]),
+        "unit": str(values["unit_id"]),
+        "condition": str(data.column("condition_id")[index]),
+        "torque": _finite(data.column("torque_nm")[index]),
+        "frequencies": rotation.of(index),
+        "fault": rotation.fault_gear(index),
+        "views": [
+            _views(signal, data.sampling_rate, usable_top(data), rotation.of(index)["mesh"]) for signal in signals
+        ],
+    }
+
+
+def usable_top(data: Dataset) -> float:
+    """Upper end of the usable band, Hz."""
+    band = data.attributes.get("usable_band_hz")
+    half = data.sampling_rate / 2
+    try:
+        return min(float(band[1]), half) if band is not None and float(band[1]) > 0.0 else half
+    except (TypeError, IndexError, ValueError):
+        return half
+
+
+def envelope_band(sampling_rate: float) -> tuple[float, float]:
+    """The band whose envelope is taken, Hz."""
+    return ENVELOPE_BAND[0] * sampling_rate, ENVELOPE_BAND[1] * sampling_rate
+
+
+def _views(signal: FloatArray, rate: float, top: float, mesh: float | None) -> dict[str, Any]:
+    part = signal[:WAVEFORM_SAMPLES]
+    frequency, amplitude = amplitude_spectrum(signal, rate)
+    views: dict[str, Any] = {
+        "wave": {**pack_signal(part), "step": 1.0 / rate},
+        "spectrum": _lines(frequency, amplitude, top, SPECTRUM_BINS),
+        "spectrogram": _spectrogram(part, rate, top),
+    }
+    if len(signal) > 100:  # the band-pass needs more samples than its ends
+        frequency, amplitude = envelope_spectrum(signal, rate, envelope_band(rate))
+        views["envelope"] = _lines(
+            frequency, amplitude, ENVELOPE_MESHES * mesh if mesh else top / 8.0, ENVELOPE_BINS, first=1
+        )
+    return views
+
+
+def _lines(frequency: FloatArray, amplitude: FloatArray, top: float, most: int, first: int = 0) -> dict[str, Any]:
+    """A spectrum from the bin `first` up to `top` Hz; of more bins than `most`, the largest of each few."""
+    amplitude = amplitude[first : max(int(np.searchsorted(frequency, top, side="right")), first + 2)]
+    each = -(-len(amplitude) // most)
+    largest = np.maximum.reduceat(amplitude, np.arange(0, len(amplitude), each))
+    step = float(frequency[1] - frequency[0])
+    return {**pack_amplitude(largest), "start": (first + (each - 1) / 2) * step, "step": each * step}
+
+
+def _spectrogram(signal: FloatArray, rate: float, top: float) -> dict[str, Any]:
+    """Amplitudes of a Hann window over time and frequency, (column, bin)."""
+    from scipy.signal import get_window
+
+    n_window = max(min(WINDOW_SAMPLES, len(signal) // 8 * 2), 2)
+    hop = max((len(signal) - n_window) // (SPECTROGRAM_COLUMNS - 1), 1)
+    weights = get_window("hann", n_window)
+    stretches = np.lib.stride_tricks.sliding_window_view(signal - signal.mean(), n_window)[::hop]
+    amplitude = np.abs(np.fft.rfft(stretches * weights, axis=-1)) * (2.0 / weights.sum())
+    amplitude = amplitude[:, : max(int(top / rate * n_window) + 1, 2)]
+    return {
+        **pack_amplitude(amplitude),
+        "shape": list(amplitude.shape),
+        "time": 0.5 * n_window / rate,
+        "time_step": hop / rate,
+        "step": rate / n_window,
+    }
+
+
+def _finite(value: Any) -> float | None:
+    number = float(value)
+    return number if np.isfinite(number) else None

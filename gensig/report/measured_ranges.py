@@ -1,0 +1,74 @@
+"""How the records lie beside published measurements, as far as any data set allows it.
+
+``python -m benchmarks.realism`` is the whole comparison, with records made for it; here are those of its quantities
+that need no pair of records at the same set-points, or find one.
+"""
+
+from __future__ import annotations
+
+import numpy as np
+from numpy.typing import NDArray
+
+from gensig.dataset.reader import Dataset
+from gensig.report.values import Measured
+from gensig.signals.indicators import kurtosis, rms
+from gensig.signals.resampling import rate_change
+from gensig.validation.realism import Comparison, Place, compare, read_ranges
+
+FloatArray = NDArray[np.floating]
+
+RATE = 5000.0  # Hz, of the measured records
+ALL, ELSEWHERE = "all conditions", "elsewhere"
+
+
+def at_measured_rate(signal: FloatArray, sampling_rate: float) -> dict[str, FloatArray]:
+    """RMS and kurtosis of the band that the measured records have; signal (channel, sample), results (channel,)."""
+    if sampling_rate < RATE:
+        unknown = np.full(signal.shape[0], np.nan)
+        return {"rms_5_khz": unknown, "kurtosis_5_khz": unknown}
+    x = rate_change(sampling_rate, RATE).apply(signal)
+    return {"rms_5_khz": rms(x), "kurtosis_5_khz": kurtosis(x)}
+
+
+def beside_measurements(data: Dataset, measured: Measured, units: list[str]) -> list[Comparison]:
+    """Every quantity with a measured range for which the data set has values.
+
+    Parameters
+    ----------
+    units : of the channels of `measured`; ranges are of accelerations in m/s^2
+    """
+    shown = [number for number, unit in enumerate(units) if unit == "m/s^2"]
+    if not shown or not measured.records.size:
+        return []
+    values = {name: of[:, shown] for name, of in measured.further.items()}
+    label = data.column("label_name")[measured.records]
+    found: dict[Place, FloatArray] = {}
+    for name in data.class_names:
+        mine = label == name
+        for at in (ALL, ELSEWHERE):
+            found[f"{name}.kurtosis", at] = values["kurtosis_5_khz"][mine]
+    found |= _ratios(data, measured, values)
+    ranges = read_ranges()
+    compared = [compare(ranges[place], of) for place, of in found.items() if place in ranges and np.isfinite(of).any()]
+    return [one for one in compared if one.low is not None or one.high is not None]
+
+
+def _ratios(data: Dataset, measured: Measured, values: dict[str, FloatArray]) -> dict[Place, FloatArray]:
+    """Faulty record over sound one of another set of gears, in one gearbox at one set-point."""
+    records = measured.records
+    if "speed_set_rpm" not in data.column_names:
+        return {}
+    keys = [data.column(name)[records].tolist() for name in ("gearbox_id", "speed_set_rpm", "torque_nm")]
+    place = list(zip(*keys, strict=True))
+    specimen, label = data.column("specimen_id")[records], data.column("label_name")[records]
+    sound: dict[tuple[object, ...], list[int]] = {}
+    for row in np.flatnonzero(label == "healthy").tolist():
+        sound.setdefault(place[row], []).append(row)
+    found: dict[Place, list[FloatArray]] = {}
+    for row in np.flatnonzero(label != "healthy").tolist():
+        for other in sound.get(place[row], []):
+            if specimen[row] != specimen[other]:
+                for ratio, of in (("rms_ratio", "rms_5_khz"), ("kurtosis_ratio", "kurtosis_5_khz")):
+                    quotient = values[of][row] / values[of][other]
+                    found.setdefault((f"{label[row]}.{ratio}", ALL), []).append(quotient)
+    return {name: np.concatenate(ratios) for name, ratios in found.items()}

@@ -1,0 +1,47 @@
+"""Long rows of numbers as short text: base64 of little-endian bytes, which the page's script unpacks."""
+
+from __future__ import annotations
+
+import base64
+from typing import Any
+
+import numpy as np
+from numpy.typing import ArrayLike, NDArray
+
+STEP_DB = 0.4  # of stored amplitudes: 5 % from one to the next, 102 dB in a byte
+COUNTS = 32767
+
+
+def packed(values: ArrayLike, dtype: str) -> str:
+    """Values as base64 of the little-endian numpy type, flat."""
+    return base64.b64encode(np.ascontiguousarray(values, dtype=np.dtype(dtype).newbyteorder("<")).tobytes()).decode()
+
+
+def pack_floats(values: ArrayLike) -> str:
+    """Values as float32; NaN stays NaN."""
+    return packed(values, "f4")
+
+
+def pack_signal(signal: NDArray[np.floating]) -> dict[str, Any]:
+    """A signal, (sample,), as 16-bit counts of `scale`."""
+    scale = float(np.abs(signal).max(initial=0.0)) / COUNTS
+    counts = np.zeros(signal.shape) if scale == 0.0 else np.rint(signal / scale)
+    return {"scale": scale, "n": packed(counts, "i2")}
+
+
+def pack_amplitude(amplitude: NDArray[np.floating]) -> dict[str, Any]:
+    """Amplitudes as bytes: 255 is the largest, `top`, and each count less `STEP_DB` lower; 0 is all below.
+
+    Parameters
+    ----------
+    amplitude : (...)    not negative
+
+    Returns
+    -------
+    `top`, `step_db`, and `n`, the bytes in C order
+    """
+    top = float(amplitude.max(initial=0.0))
+    relative = np.zeros(amplitude.shape) if top == 0.0 else amplitude / top
+    with np.errstate(divide="ignore"):
+        counts = 255.0 + np.rint(20.0 * np.log10(relative) / STEP_DB)
+    return {"top": top, "step_db": STEP_DB, "n": packed(np.maximum(counts, 0.0), "u1")}

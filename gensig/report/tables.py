@@ -1,0 +1,185 @@
+"""Sections of the page that are text and tables: what there is, splits, where it is from, how it is loaded."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Sequence
+from pathlib import Path
+
+import numpy as np
+
+from gensig.dataset.atomic import read_text
+from gensig.dataset.card import CAVEATS, GEOMETRY, plain, value_range
+from gensig.dataset.layout import CONFIG, CONFIG_BYTES_LIMIT, OVERRIDES
+from gensig.dataset.protocols import PROTOCOLS
+from gensig.dataset.reader import Dataset
+from gensig.page import Section, Table
+from gensig.validation.realism import Comparison, shown_range
+
+MANY_SHARDS = 200
+IN_WORDS = {
+    "n_teeth_pinion": "teeth of the pinion",
+    "n_teeth_wheel": "teeth of the wheel",
+    "normal_module_mm": "normal module, mm",
+    "pressure_angle_deg": "pressure angle, degrees",
+    "helix_angle_deg": "helix angle, degrees",
+    "usable_band_hz": "usable band, Hz",
+}
+
+
+def channel_units(data: Dataset) -> list[str]:
+    """Unit of each channel, m/s^2 where the data set does not say."""
+    units = data.attributes.get("channel_units", [])
+    return [str(dict(enumerate(units)).get(number, "m/s^2")) for number in range(len(data.channel_names))]
+
+
+def contents(data: Dataset) -> list[Section]:
+    """What is in the data set: facts, and classes."""
+    n_failed = int(np.count_nonzero(~data.usable))
+    channels = zip(data.channel_names, channel_units(data), strict=True)
+    rows = [
+        ("records", f"{data.n_records}" + (f", of which {n_failed} failed and are left out here" if n_failed else "")),
+        (
+            "a record",
+            f"{data.n_samples / data.sampling_rate:g} s, {data.n_samples} samples at {data.sampling_rate:g} Hz",
+        ),
+        ("channels", ", ".join(f"{plain(name)} ({plain(unit)})" for name, unit in channels)),
+        ("further signals", ", ".join(name for name in data.signal_names if name != "acceleration") or "none"),
+    ]
+    rows += [(IN_WORDS.get(name, name), _shown(data.attributes[name])) for name in GEOMETRY if name in data.attributes]
+    rows += [
+        (name, f"{len(np.unique(data.column(column)))}")
+        for name, column in (("units", "unit_id"), ("sets of gears", "specimen_id"), ("gearboxes", "gearbox_id"))
+    ]
+    rows += [
+        ("speed of the driving shaft", value_range(data.column("speed_rpm"), "r/min")),
+        ("torque of the driving shaft", value_range(data.column("torque_nm"), "N m")),
+    ]
+    if "snr_db" in data.column_names:
+        rows.append(("signal-to-noise ratio", value_range(data.column("snr_db"), "dB")))
+    if "life_id" in data.column_names:
+        rows.append(("lives", f"{len(np.unique(data.column('life_id')))}, to failure or to the horizon"))
+    return [
+        Section(title="What is in it", table=Table(head=("fact", "value"), rows=rows)),
+        Section(title="Classes", table=_classes(data)),
+    ]
+
+
+def _classes(data: Dataset) -> Table:
+    label, severity, unit = data.column("label_name"), data.column("severity"), data.column("unit_id")
+    order = [*data.class_names, *sorted(set(label.tolist()) - set(data.class_names))]
+    rows = []
+    for name in order:
+        mine = label == name
+        values = severity[mine]
+        middle = f"{np.nanmedian(values):.3g}" if np.isfinite(values).any() else "none"
+        rows.append((plain(name), f"{mine.sum()}", f"{len(np.unique(unit[mine]))}", value_range(values, ""), middle))
+    return Table(head=("class", "records", "units", "severity", "its median"), rows=rows)
+
+
+def splits(data: Dataset) -> Section:
+    """Records and units of every subset of every protocol."""
+    unit = data.column("unit_id")
+    rows: list[tuple[str, ...]] = []
+    leaky: list[int] = []
+    for protocol in data.protocols:
+        parts = data.split(protocol)
+        units = {name: set(unit[[row[0] for row in part]].tolist()) for name, part in parts.items()}
+        cells = [
+            f"{sum(stop - start for _, start, stop in part):.5g} ({len(units[name])})" for name, part in parts.items()
+        ]
+        apart = PROTOCOLS[protocol].apart if protocol in PROTOCOLS else ()
+        if not apart:
+            leaky.append(len(rows))
+        shared = len(units["train"] & units["test"])
+        kept = ", ".join(name.removesuffix("_id") for name in apart) or "nothing: leaks on purpose"
+        rows.append((plain(protocol), *cells, f"{shared}", kept))
+    head = ("protocol", "train", "validation", "test", "units on both sides", "keeps apart")
+    text = [
+        "Records of each subset, and in brackets the units that they are from.",
+        "A score is only worth what its protocol keeps apart.",
+    ]
+    left_out = [(name, plain(reason)) for name, reason in data.left_out.items()]
+    if left_out:
+        text.append("Below: protocols that this set cannot have, and why.")
+    table = Table(head=head, rows=rows, quiet=leaky) if rows else None
+    return Section(title="Splits", text=text, table=table, notes=left_out)
+
+
+def measured_table(found: Sequence[Comparison], units: Sequence[str]) -> Section:
+    """The values beside measured ranges, or why there are none."""
+    text = [
+        "Central 90 % of this set's values beside ranges of published recordings of a two-stage parallel spur gearbox "
+        "(5 kHz, one specimen a class), which is another machine: a miss says that they differ, not which is wrong. "
+        'RMS and kurtosis are those of the band up to 2.5 kHz; "elsewhere" is not slow and light, here all records.'
+    ]
+    if not found:
+        reason = "no channel is an acceleration in m/s^2" if "m/s^2" not in units else "it has none of their quantities"
+        text.append(f"This set cannot be put beside them: {reason}.")
+        return Section(title="Beside measurements", text=text)
+    rows = [
+        (one.id, one.at, shown_range(one), _number(one.median), f"{_number(one.p5)} to {_number(one.p95)}", f"{one.n}",
+         one.verdict) for one in found
+    ]  # fmt: skip
+    head = ("quantity", "at", "measured", "median here", "5 to 95 % here", "values", "verdict")
+    return Section(title="Beside measurements", text=text, table=Table(head=head, rows=rows))
+
+
+def provenance(data: Dataset) -> list[Section]:
+    """What made it, with what, and what it can be known by."""
+    manifest = data.manifest
+    rows = [
+        ("made by", f"gensig {plain(manifest.generator_version)}"),
+        ("format version", f"{manifest.schema_version}"),
+        ("seed", f"{manifest.seed}"),
+        ("identity (sha256 of configuration, schema and version)", plain(manifest.identity)),
+    ]
+    rows += [(plain(name).replace("_", " "), plain(value)) for name, value in manifest.environment.items() if value]
+    files = [(f"shards/{plain(one.name)}", f"{one.rows}", one.sha256) for one in manifest.shards[:MANY_SHARDS]]
+    files += [(plain(name), "", digest) for name, digest in manifest.files.items()]
+    text = ["As the manifest has them; gensig verify compares them with the files."]
+    if len(manifest.shards) > MANY_SHARDS:
+        text.append(f"The first {MANY_SHARDS} of {len(manifest.shards)} shards.")
+    return [
+        Section(title="Where it is from", table=Table(head=("fact", "value"), rows=rows)),
+        Section(title="Overrides as typed", code=_file(data.folder / OVERRIDES), folded=True),
+        Section(title="Configuration", code=_file(data.folder / CONFIG), folded=True),
+        Section(title="Files", text=text, table=Table(head=("file", "records", "sha256"), rows=files), folded=True),
+    ]
+
+
+def loading(data: Dataset) -> list[Section]:
+    """Code that reads this set, and what to mind."""
+    name = next((name for name in data.class_names if name != "healthy"), data.class_names[0])
+    protocol = "by_unit" if "by_unit" in data.protocols else (data.protocols or [""])[0]
+    code = [
+        "import gensig",
+        "",
+        'with gensig.open_dataset("PATH/TO/THIS/FOLDER") as data:',
+        "    print(data.class_names, data.channel_names, data.sampling_rate)",
+        '    labels = data.column("label")  # (record,) index into data.class_names',
+        f"    signal = data.signals(0)  # (channel, sample) float32: {', '.join(dict.fromkeys(channel_units(data)))}",
+        f"    mine = data.where(fault={name!r}, status='ok')  # by class, or by any column",
+    ]
+    if protocol:
+        code.append(f"    train = data.split({protocol!r})['train']  # [(record, start_fraction, stop_fraction), ...]")
+    text = ["Every shard is plain HDF5 too: h5py, MATLAB and Octave read it."]
+    caveats = [" ".join(line.replace("`", "").split()) for line in CAVEATS.removeprefix("- ").split("\n- ")]
+    return [
+        Section(title="Load it", text=text, code="\n".join(code)),
+        Section(title="What to mind", notes=[("", line) for line in caveats]),
+    ]
+
+
+def _file(path: Path) -> str:
+    return "".join(c if c.isprintable() or c == "\n" else " " for c in read_text(path, limit=CONFIG_BYTES_LIMIT))
+
+
+def _shown(value: object) -> str:
+    if isinstance(value, (list, tuple, np.ndarray)):
+        return " to ".join(f"{part:g}" if isinstance(part, (int, float)) else plain(part) for part in value)
+    return plain(value)
+
+
+def _number(value: float) -> str:
+    return "none" if math.isnan(value) else f"{value:.3g}"

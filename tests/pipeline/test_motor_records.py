@@ -1,0 +1,135 @@
+"""Records of a two-stage gearbox that a motor turns: a small set through the verbs, lives, and what is refused."""
+
+import h5py
+import numpy as np
+import pytest
+from numpy.testing import assert_allclose
+
+from gensig.cli import main
+from gensig.config import read_request
+from gensig.dataset.layout import PLAN
+from gensig.dataset.plan import PlanRows
+from gensig.planning import make_plan
+from gensig.records import simulate_record
+from gensig.systems import line_loads
+
+SMALL = ("experiment=two_stage", "operating.duration_s=0.1", "plan.n_records=8", "plan.n_units=2", "plan.n_gearboxes=1")
+MOTOR = ("system=two_stage_gearbox", "excitation=motor_and_load")
+SECOND = ("system.record_mesh=[5,6]", "fault.gear=wheel")
+LIFE = (
+    "experiment=two_stage", "plan.n_records=null", "plan.n_repeats=1", "plan.n_units=2", "plan.n_gearboxes=1",
+    "plan.vary={}", "life.snapshot_count=3", "life.n_setpoints=1", "operating.torque_nm=150",
+)  # fmt: skip
+
+
+@pytest.fixture(scope="module")
+def folder(tmp_path_factory):
+    out = tmp_path_factory.mktemp("two_stage") / "set"
+    assert main(["generate", *SMALL, *SECOND, f"out={out}"]) == 0
+    return out
+
+
+def test_a_set_of_the_second_stage_is_whole_and_tells_gear_and_tooth(folder):
+    assert main(["verify", str(folder)]) == 0
+    with h5py.File(folder / "shards" / "shard-00000.h5") as file:
+        assert {value.decode() for value in file["status"][:]} == {"ok"}
+        assert np.all(file["integration_error"][:] < 1e-3)
+        assert [value.decode() for value in file.attrs["channel_units"]] == ["rad/s^2", "rad/s^2", "m/s^2", "m/s^2"]
+        names = [value.decode() for value in file["label_name"][:]]
+        assert set(names) == {"healthy", "crack", "broken", "missing_tooth"}
+        for name, gear, tooth in zip(names, file["fault_gear"][:], file["fault_tooth"][:], strict=True):
+            assert (gear.decode(), 0 <= tooth < 80) == (("", False) if name == "healthy" else ("wheel", True))
+        assert_allclose(file["speed_set_rpm"][:], file["params/operating.speed_rpm"][:] / 3.0)
+        assert_allclose(file["mesh_frequency_hz"][:], 48 * file["speed_rpm"][:] / 60)
+        assert np.isfinite(file["acceleration"][:]).all()
+
+
+def test_a_record_depends_on_its_row_alone(folder):
+    row = PlanRows(folder / PLAN).records(0, 8)[5]
+    with h5py.File(folder / "shards" / "shard-00000.h5") as file:
+        stored = file["acceleration"][int(row["row"])]
+    again = simulate_record(read_request([*SMALL, *SECOND]).config, row)
+    np.testing.assert_array_equal(again.signals["acceleration"], stored)
+
+
+@pytest.mark.parametrize(("life", "kind"), [("crack_growth", "crack"), ("pit_growth", "distributed_pitting")])
+def test_lives_grow_under_the_steady_loads_of_the_mesh(life, kind, monkeypatch):
+    monkeypatch.setattr(line_loads, "SECONDS", 0.1)
+    columns = make_plan(read_request([*LIFE, f"life={life}", f"plan.classes=[healthy,{kind}]"]).config).columns
+    grown = columns["label_name"] == kind
+    assert columns["severity"][grown].max() > columns["severity"][grown].min()
+    assert (columns["severity"][~grown] == 0.0).all()
+
+
+def test_loads_of_a_steady_mesh_are_its_static_torque(monkeypatch):
+    from gensig.systems.machines import read_machine
+
+    monkeypatch.setattr(line_loads, "SECONDS", 0.1)
+    machine = read_machine(read_request(["experiment=two_stage"]).config)
+    loads = machine.mesh_torques(machine.operating.speed, 30.0)
+    assert_allclose(loads, 30.0, rtol=0.35)
+
+
+def test_an_encoder_and_the_load_s_own_torque_are_stored(tmp_path):
+    wheel = "{node: 1, n_teeth: 60, eccentricity_error_deg: 0, tooth_error_deg: 0, clock_frequency_hz: 100000000}"
+    words = (
+        f"excitation.toothed_wheels={{motor: {wheel}}}", "sensing.channels=[motor_speed, wheel_rotation]",
+        "excitation.load.law=quadratic", "operating=ramp", "operating.speed_profile.first_factor=0.5",
+        "dataset.store_operating=true", "operating.speed_rpm=1746", "operating.torque_nm=30",
+        "operating.duration_s=0.1",
+    )  # fmt: skip
+    out = tmp_path / "set"
+    assert main(["generate", *SMALL, *words, "plan.n_records=4", "plan.n_units=1", f"out={out}"]) == 0
+    with h5py.File(out / "shards" / "shard-00000.h5") as file:
+        torque = file["torque_set"][:]
+        assert_allclose(torque[:, 0], 0.25 * 30.0, rtol=1e-3)
+        assert_allclose(torque[:, -1], 30.0, rtol=0.01)
+
+
+@pytest.mark.parametrize(
+    ("words", "told"),
+    [
+        (["system.motor_node=null"], "system.motor_node = null: excitation=motor_and_load needs the node of a motor"),
+        (["system.motor_node=99"], "system.motor_node = 99: the shaft line has no node 99; it has 1, 2, 3"),
+        (["system.motor_node=8"], "turns 0.2 times as fast as the first node"),
+        (["system.load_node=null"], "system.load_node = null: excitation=motor_and_load needs the node of its load"),
+        (["system.load_node=99"], "system.load_node = 99: the shaft line has no node 99"),
+        (
+            ["excitation.loads={fan: {node: 99, law: linear, torque_nm: 1}}"],
+            "excitation.loads.fan.node: the shaft line",
+        ),
+        (["excitation.loads={fan: {node: 2, law: cubic, torque_nm: 1}}"], "excitation.loads.fan.law = 'cubic'"),
+        (["+excitation.cylinder={bore_mm: 100}"], "a line is turned by one of them"),
+        (["excitation=engine_v20", "+excitation.motor={slip: 0.1}"], "a line is turned by one of them"),
+        (["excitation=engine_v20"], "the shaft line has no node 13"),
+        (["excitation.kind=turbine"], "allowed: engine, motor_and_load"),
+        (["excitation.motor.slip=0"], "excitation.motor.slip = 0 must lie between 0 and 1"),
+        (
+            ["excitation.motor.torque_ripple={share: 2, order: 6}"],
+            "excitation.motor.torque_ripple.share = 2 must lie in 0..1",
+        ),
+        (["excitation.motor.torque_ripple={share: 0.1, order: 0.7}"], "a multiple of 0.5 up to 100"),
+        (["+excitation.motor.node=1"], "unknown key 'node'"),
+        (["excitation.load.law=cubic"], "excitation.load.law = 'cubic'; allowed: constant, linear, quadratic"),
+        (["excitation.reference.torque_nm=0"], "speed_rpm and torque_nm must be positive"),
+        (["excitation.motor=3"], "excitation.motor = 3 must be a group of keys"),
+    ],
+)
+def test_what_turns_no_line_is_refused_in_one_line(words, told, capsys):
+    assert main(["forced-response", *MOTOR, *words]) != 0
+    error = capsys.readouterr().err.strip()
+    assert told in error
+    assert "\n" not in error
+
+
+def test_forced_response_says_torque_and_meshes_and_draws(tmp_path, capsys):
+    assert main(["forced-response", *MOTOR, "--plot", str(tmp_path / "found.png")]) == 0
+    told = capsys.readouterr().out
+    assert "60 N m of the load at the motor" in told
+    assert "mean 1995 N" in told
+    assert (tmp_path / "found.png").stat().st_size > 10000
+    assert main(["forced-response", *MOTOR, "--run", "500", "1000", "100"]) != 0
+    assert "turns evenly without excitation.motor.torque_ripple" in capsys.readouterr().err
+    ripple = "excitation.motor.torque_ripple={share: 0.02, order: 12}"
+    words = [ripple, "--run", "500", "1000", "100", "--run-torque", "30", "--plot", str(tmp_path / "run.png")]
+    assert main(["forced-response", *MOTOR, *words]) == 0

@@ -1,0 +1,134 @@
+"""The page of a data set in headless Chromium: no errors, and each control does what it says.
+
+Needs the package ``playwright`` and a Chromium: ``GENSIG_CHROMIUM=/path/to/chromium``, or one on the path, or the one
+that ``playwright install chromium`` fetches; without them the test is skipped.
+"""
+
+import os
+import shutil
+from collections.abc import Iterator
+from pathlib import Path
+from typing import Any
+
+import pytest
+from dataset_samples import ATTRIBUTES, build, make_plan
+
+from gensig.report.document import write_report
+
+HOSTILE = '<a href="https://example.org">x</a></script><img src=x onerror=alert(1)>'
+TRACES = "name => document.getElementById('plot-' + name).data.map(t => t.name)"
+AXIS = "name => document.getElementById('plot-' + name).layout.xaxis.title.text"
+
+
+@pytest.fixture(scope="module")
+def browser() -> Iterator[Any]:
+    playwright = pytest.importorskip("playwright.sync_api", reason="package playwright")
+    path = os.environ.get("GENSIG_CHROMIUM") or shutil.which("chromium") or shutil.which("google-chrome")
+    with playwright.sync_playwright() as started:
+        try:
+            found = started.chromium.launch(executable_path=path, args=["--no-sandbox", "--disable-gpu"])
+        except playwright.Error as error:
+            pytest.skip(f"no Chromium: {str(error).splitlines()[0]}")
+        yield found
+        found.close()
+
+
+@pytest.fixture(scope="module")
+def page_file(tmp_path_factory: pytest.TempPathFactory) -> Path:
+    """A page of 36 records and two channels, one of them with a hostile name."""
+    attributes = {**ATTRIBUTES, "channel_names": ["pinion_y", HOSTILE], "channel_units": ["m/s^2", "rad/s"]}
+    folder = build(tmp_path_factory.mktemp("page") / "set", make_plan(), attributes=attributes)
+    return write_report(folder, folder.parent / "page.html")[0]
+
+
+@pytest.fixture(params=["desktop", "phone", "dark"])
+def page(browser: Any, page_file: Path, request: pytest.FixtureRequest) -> Iterator[Any]:
+    options: dict[str, Any] = {
+        "desktop": {"viewport": {"width": 1280, "height": 900}},
+        "phone": {"viewport": {"width": 390, "height": 844}, "is_mobile": True, "has_touch": True},
+        "dark": {"viewport": {"width": 1280, "height": 900}, "color_scheme": "dark"},
+    }[request.param]
+    context = browser.new_context(**options)
+    page = context.new_page()
+    said: list[str] = []
+    asked: list[str] = []
+    page.on("console", lambda message: said.append(message.text))
+    page.on("pageerror", lambda error: said.append(str(error)))
+    page.on("request", lambda request: asked.append(request.url))
+    page.goto(page_file.as_uri())
+    page.wait_for_selector("#plot-spectrogram .main-svg")
+    yield page
+    assert said == []
+    assert asked == [page_file.as_uri()]
+    context.close()
+
+
+def test_it_loads_and_fits(page: Any) -> None:
+    assert page.evaluate("document.documentElement.scrollWidth <= window.innerWidth")
+    assert page.evaluate("document.querySelectorAll('.plot .main-svg').length") >= 6
+    assert page.evaluate("document.querySelectorAll('img, svg a').length") == 0  # no text became markup
+
+
+def test_record_channel_and_comparison(page: Any) -> None:
+    form = "#signals-controls"
+    for value in ("0", "4"):
+        page.select_option(f"{form} [name=record]", value)
+        wanted = page.evaluate("i => JSON.parse(document.getElementById('data').textContent).examples[i].record", value)
+        assert wanted in page.evaluate(TRACES, "wave")[-1]
+        assert wanted in page.inner_text("#signals-said")
+    page.select_option(f"{form} [name=other]", "1")
+    assert len(page.evaluate(TRACES, "wave")) == 2
+    page.select_option(f"{form} [name=other]", "")
+    assert len(page.evaluate(TRACES, "wave")) == 1
+    first = page.evaluate("document.getElementById('plot-wave').data[0].y[7]")
+    page.select_option(f"{form} [name=channel]", "1")
+    assert page.evaluate("document.getElementById('plot-wave').data[0].y[7]") != first
+    assert HOSTILE in page.inner_text("#signals-said")
+    assert "rad/s" in page.evaluate("document.getElementById('plot-spectrum').layout.yaxis.title.text")
+
+
+def test_axes_marks_and_zoom(page: Any) -> None:
+    """690 Hz of mesh and 23 teeth: the mesh stands at order 23 of the pinion."""
+    form = "#signals-controls"
+    page.select_option(f"{form} [name=record]", "4")
+    page.select_option(f"{form} [name=other]", "")
+    marked = (
+        "name => document.getElementById('plot-envelope').data.find(t => t.name === name)?.x.filter(x => x !== null)[0]"
+    )
+    assert page.evaluate(AXIS, "spectrum") == "frequency, Hz"
+    assert page.evaluate(marked, "fault frequency") == pytest.approx(30.0)
+    page.select_option(f"{form} [name=axis]", "pinion")
+    assert page.evaluate(AXIS, "spectrum") == "orders of the pinion"
+    assert page.evaluate(AXIS, "wave") == "turns of the pinion"
+    assert page.evaluate(marked, "fault frequency") == pytest.approx(1.0)
+    page.select_option(f"{form} [name=axis]", "mesh")
+    assert page.evaluate(marked, "fault frequency") == pytest.approx(1 / 23)
+    for name, label in (("shafts", "shaft orders"), ("fault", "fault frequency")):
+        box = page.locator(f"{form} [name={name}]")
+        before = box.is_checked()
+        box.focus()
+        page.keyboard.press("Space")  # by keyboard alone
+        assert (label in page.evaluate(TRACES, "envelope")) is not before
+    page.locator(f"{form} [name=decibel]").uncheck()
+    assert page.evaluate("document.getElementById('plot-spectrum').layout.yaxis.type") == "linear"
+    page.select_option(f"{form} [name=axis]", "hz")
+    whole = page.evaluate("document.getElementById('plot-spectrum').layout.xaxis.range")
+    page.select_option(f"{form} [name=zoom]", "1")
+    assert page.evaluate("document.getElementById('plot-spectrum').layout.xaxis.range") != whole
+
+
+def test_parameters_and_indicators(page: Any) -> None:
+    page.select_option("#parameters-controls [name=column]", "params/crack_depth_mm")
+    assert page.evaluate(TRACES, "parameters") == ["crack"]
+    page.select_option("#parameters-controls [name=column]", "speed_rpm")
+    assert page.evaluate(TRACES, "parameters") == ["healthy", "crack", "pitting"]
+    page.select_option("#parameters-controls [name=form]", "boxes")
+    assert page.evaluate("document.getElementById('plot-parameters').data[0].type") == "box"
+    page.select_option("#indicators-controls [name=indicator]", "kurtosis")
+    page.select_option("#indicators-controls [name=along]", "speed_rpm")
+    assert page.evaluate(AXIS, "indicators") == "speed rpm, r/min"
+    first = page.evaluate("document.getElementById('plot-indicators').data[0].y[0]")
+    page.select_option("#indicators-controls [name=channel]", "1")
+    assert page.evaluate("document.getElementById('plot-indicators').data[0].y[0]") != first
+    page.locator("#indicators-controls [name=decibel]").check()
+    assert page.evaluate("document.getElementById('plot-levels').layout.yaxis.type") == "log"
