@@ -9,7 +9,7 @@ DEMO ?= demo
 PYTEST_ARGS ?= -n 2 --dist loadfile --no-loadscope-reorder
 BIN := $(VENV)/bin
 
-.PHONY: demo test check docs wheel-test clean
+.PHONY: demo test check wheel-test docs clean
 
 demo: $(VENV)/.installed
 	@test ! -e $(DEMO) || { echo "$(DEMO) exists: remove it, or choose another folder with DEMO=..."; exit 2; }
