@@ -38,7 +38,7 @@ def ran(words: list[str], folder: Path) -> str:
     """What a command prints; fails where it fails."""
     paths = {"PATH": f"{folder / 'bin'}{os.pathsep}{os.environ['PATH']}", "PYTHONPATH": str(ROOT)}
     done = subprocess.run(
-        words, cwd=folder / "empty", env=os.environ | paths, capture_output=True, text=True, timeout=900
+        words, cwd=folder / "empty", env=os.environ | paths, capture_output=True, text=True, timeout=3600
     )
     assert done.returncode == 0, f"{done.stdout[-2000:]}\n{done.stderr[-2000:]}"
     return done.stdout

@@ -39,7 +39,7 @@ def printed(tmp_path_factory: pytest.TempPathFactory) -> str:
     environment = os.environ | {"MPLBACKEND": "Agg", "PYTHONPATH": str(ROOT)}
     done = subprocess.run(
         [sys.executable, "-W", "error::RuntimeWarning", "tour.py"],
-        cwd=folder, env=environment, capture_output=True, text=True, timeout=900,
+        cwd=folder, env=environment, capture_output=True, text=True, timeout=3600,
     )  # fmt: skip
     assert done.returncode == 0, done.stderr[-3000:]
     assert [path.name for path in folder.iterdir()] == ["tour.py"]  # nothing is left behind
