@@ -113,7 +113,8 @@ def _main_unknown() -> Iterator[None]:
 
     A script that calls ``gensig.generate`` needs no ``if __name__ == "__main__"`` then: jobs are importable without it.
     """
-    main, hidden = sys.modules["__main__"], {}
+    main = sys.modules["__main__"]
+    hidden: dict[str, Any] = {}
     for name in ("__spec__", "__file__"):  # what multiprocessing.spawn.get_preparation_data looks at
         if name in vars(main):
             hidden[name] = vars(main)[name]
@@ -122,7 +123,7 @@ def _main_unknown() -> Iterator[None]:
     try:
         yield
     finally:
-        vars(main).update(hidden)
+        main.__dict__.update(hidden)
 
 
 def _begin_worker() -> None:
