@@ -121,7 +121,7 @@ def _main_unknown() -> Iterator[None]:
     try:
         yield
     finally:
-        vars(main).update(hidden)
+        main.__dict__.update(hidden)
 
 
 def _begin_worker() -> None:
