@@ -11,11 +11,14 @@ from numpy.typing import NDArray
 from gensig.dataset.distributions import GRID, design_points, level_values, n_levels, values_at
 from gensig.errors import ConfigError
 from gensig.faults.registry import COMPOUND, fault_parts, read_faults
+from gensig.geometry.tooth_profile import root_curve_point
 from gensig.systems.machines import read_machine
-from gensig.systems.registry import LINE
+from gensig.systems.registry import LINE, read_pair
 from gensig.units import from_si, split_unit, to_si
 
 SCALED = ("low", "high", "mean", "std", "values")  # of a distribution that is a share of a size
+CEILING = "at_most_of_root_chord"  # beside ``of``: the highest value, over the root chord of the faulted gear
+OWN = ("of", CEILING)
 
 
 def draw_values(
@@ -93,6 +96,12 @@ def _gear_sizes(config: Mapping[str, Any], gear: str) -> tuple[int, dict[str, fl
     return values["n_teeth"], sizes
 
 
+def _root_chord(config: Mapping[str, Any], gear: str) -> float:
+    """Thickness of a gear's tooth in the middle of its root curve, where cracks begin, m."""
+    pair = read_machine(config).pair if config["system"]["kind"] == LINE else read_pair(config)
+    return 2.0 * root_curve_point(getattr(pair, gear), "arc_mid")[1]
+
+
 def _for_gear(config: Mapping[str, Any], gear: str, key: str, spec: Any) -> Any:
     """A distribution for the faulted gear: ``distribution: tooth`` over its teeth, ``of`` as shares of a size of it."""
     if not isinstance(spec, Mapping):
@@ -113,6 +122,10 @@ def _for_gear(config: Mapping[str, Any], gear: str, key: str, spec: Any) -> Any:
         return [scaled(one) for one in value] if isinstance(value, list) else value * size
 
     try:
-        return {name: scaled(value) if name in SCALED else value for name, value in spec.items() if name != "of"}
+        drawn = {name: scaled(value) if name in SCALED else value for name, value in spec.items() if name not in OWN}
+        if CEILING in spec:
+            ceiling = from_si(key, spec[CEILING] * _root_chord(config, gear))
+            drawn["high"] = min(drawn["high"], ceiling)
+        return drawn
     except TypeError:
         raise ConfigError(f"fault.vary.{key}: {', '.join(SCALED)} must be numbers, or lists of them") from None

@@ -8,7 +8,9 @@ from numpy.testing import assert_allclose
 
 from gensig.config import read_request
 from gensig.errors import ConfigError
+from gensig.geometry.tooth_profile import root_curve_point
 from gensig.planning import make_plan
+from gensig.systems.registry import read_pair
 
 PLAN = ("plan.n_records=48", "plan.n_units=4", "plan.classes=[healthy,crack,pitting]")
 
@@ -59,3 +61,11 @@ def test_a_length_in_millimetres_is_taken_as_it_is():
 def test_what_is_no_share_is_refused(vary, complaint):
     with pytest.raises(ConfigError, match=re.escape(complaint)):
         make_plan(read_request(["fault=crack", f"fault.vary={vary}"]).config)
+
+
+def test_cracks_of_teeth_that_are_thin_at_the_root_stay_in_the_checked_range():
+    config = read_request(["gear.pinion.n_teeth=18", "plan.classes=[crack]", "plan.n_records=96"]).config
+    gear = read_pair(config).pinion
+    chord = 2e3 * root_curve_point(gear, "arc_mid")[1]
+    depth = np.asarray(make_plan(config).columns["params/fault.crack_depth_mm"])
+    assert 0.75 * chord < depth.max() <= 0.8 * chord < 1.59 * 2.0
