@@ -48,12 +48,14 @@ def test_shipped_gears_make_a_data_set_that_sounds_like_them(name, tmp_path, cap
     turns = {"pinion": gear["rated_speed_rpm"] / 60.0}
     n_teeth = {side: gear[side]["n_teeth"] for side in ("pinion", "wheel")}
     turns["wheel"] = turns["pinion"] * n_teeth["pinion"] / n_teeth["wheel"]
+    heard: list[float] = []
     for shard in out.glob("shards/*.h5"):
         with h5py.File(shard) as file:
-            for record in file["acceleration"]:
+            for record, label in zip(file["acceleration"], file["label_name"].asstr(), strict=True):
                 assert np.all(np.isfinite(indicators(record, 51200.0, turns, n_teeth)))
-                heard = heard_mesh_frequency(record[1], 51200.0, expected)
-                assert heard == pytest.approx(expected, rel=2e-3)
+                if label == "healthy":  # around a missing tooth the sidebands may be louder than the mesh
+                    heard.append(heard_mesh_frequency(record[1], 51200.0, expected))
+    assert heard == pytest.approx([expected] * 2, rel=2e-3)
 
 
 def test_the_pair_without_continuous_drive_is_refused(capsys):
