@@ -274,7 +274,7 @@ def test_the_command_writes_a_model_that_predict_takes_and_that_says_what_it_is(
 @pytest.mark.parametrize(
     ("words", "message"),
     [
-        (["--method", "dann"], "invalid choice"),
+        (["--method", "dann"], "dann is not one of adabn, coral"),
         (["--speed-rpm", "5000"], "5000 is outside the 1"),
         (["--channels", "channel_0"], "names 1 channel"),
     ],

@@ -246,7 +246,7 @@ def test_evaluate_refuses_damaged_models(trained, data, capsys, tmp_path):
         (["train", "data=good", "out=OUT", "normalise=rms,none"], "-m"),
         (["train", "data=good", "out=OUT", "features=al"], "features must be basic or all, not 'al'"),
         (["train", "data=good", "out=OUT", "window_samples=100000"], "longest stretch"),
-        (["train", "--fast"], "unrecognized arguments: --fast"),
+        (["train", "--fast"], "no flag '--fast'"),
         (["evaluate", "data=good"], "model_dir is required"),
         (["evaluate", "data=good", "modeldir=x"], "did you mean model_dir"),
         (["evaluate", "data=good", "x"], "not of the form key=value"),

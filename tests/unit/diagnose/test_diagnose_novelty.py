@@ -260,7 +260,7 @@ def test_the_command_reports_novelty_alone(monkeypatch, tmp_path, capsys):
     page = (out / "report.html").read_text()
     for text in (
         "noticed by who knows health alone (healthy_only)",
-        "<th>FPR95</th><th>false alarms</th><th>missing_tooth found",
+        '<th scope="col">FPR95</th><th scope="col">false alarms</th><th scope="col">missing_tooth found',
         "Balanced accuracy of the network on the known classes", "healthy_only: only 3 test unit(s)", "Caveats",
         "<b>AUROC of energy</b>: against healthy ",
         "validation record(s); with fewer than 19",

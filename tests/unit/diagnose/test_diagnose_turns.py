@@ -203,7 +203,8 @@ def test_bad_settings_are_refused_in_one_line(dataset, override, line):
 
 
 def test_what_a_turn_needs_and_is_not_there_is_said(dataset):
-    without = SimpleNamespace(attributes={"n_teeth_pinion": 23})
+    without = FakeDataset(duration=0.01)
+    without.attributes = {name: value for name, value in without.attributes.items() if name != "n_teeth_wheel"}
     with pytest.raises(ConfigError, match="does not say n_teeth_wheel"):
         make_settings(without)
     short = FakeDataset(duration=0.01)
