@@ -86,7 +86,10 @@ class ShardProgress:
     def _tick(self) -> None:
         """Show the time pass, also where no shard is finished yet; lines come less often in a long run."""
         while not self._ended.wait(1.0 if self._bar is not None else self._pause()):
-            self._show_bar() if self._bar is not None else self._print_line()
+            if self._bar is not None:
+                self._show_bar()
+            elif self._last is None or self._last.n_done < self.n_records:
+                self._print_line()
 
     def _pause(self) -> float:
         return max(LINE_SECONDS, 0.01 * (time.monotonic() - self._begin))
@@ -108,7 +111,8 @@ class ShardProgress:
 
     def _print_line(self) -> None:
         n_done = self._last.n_done if self._last is not None else 0
-        print(f"{n_done} of {self.n_records} records, {self.facts()}", file=sys.stderr, flush=True)
+        then = "; checksums, figures and card follow" if n_done == self.n_records else ""
+        print(f"{n_done} of {self.n_records} records, {self.facts()}{then}", file=sys.stderr, flush=True)
 
 
 def _duration(seconds: float) -> str:
