@@ -25,5 +25,9 @@ class SimulationError(GensigError):
     """A simulation that cannot be run or did not stay finite."""
 
 
+class StepError(SimulationError):
+    """A simulation whose steps were too long; with shorter ones it may be run."""
+
+
 class DatasetError(GensigError):
     """A folder or file that is no data set, is damaged, or would be overwritten."""

@@ -62,9 +62,9 @@ class Factor(NamedTuple):
 class Meshes(NamedTuple):
     """All meshes: ``number`` (mesh, N_NUMBERS), ``place`` (mesh, N_PLACES), and flat arrays for all of them.
 
-    ``table`` holds, node after node of row after row, the gap in m and the stiffness of every spring in N/m; ``depth``
-    where its springs begin beyond the gap, m; ``rows`` the row of every pair of kinds, -1 for a pair that never
-    touches; ``kind`` and ``error`` one number a tooth.
+    ``table`` holds, node after node of row after row, the gap in m and the stiffness of every spring in N/m, each with
+    its slope per cell; ``depth`` where its springs begin beyond the gap, m; ``rows`` the row of every pair of kinds, -1
+    for a pair that never touches; ``kind`` and ``error`` one number a tooth.
     """
 
     number: Any

@@ -21,6 +21,18 @@ ROUNDED = 1e-14  # of what forces take off an approach
 
 
 @compiled
+def between(table, low, high, share, per_cell, out):
+    """Value and slope, ``share`` of the way between two nodes whose values and slopes stand at ``low`` and ``high``.
+
+    The cubic through both. ``per_cell`` is the slope asked for over that per cell.
+    """
+    rise, slope, slope_1 = table[high] - table[low], table[low + 1], table[high + 1]
+    bend, twist = 3.0 * rise - 2.0 * slope - slope_1, slope + slope_1 - 2.0 * rise
+    out[0] = table[low] + share * (slope + share * (bend + share * twist))
+    out[1] = per_cell * (slope + share * (2.0 * bend + 3.0 * share * twist))
+
+
+@compiled
 def gather(meshes, mesh, flank, turned, within, pairs):
     """Gap and stiffnesses of the pairs of a flank and their slopes, where the mesh has rolled ``turned`` pitches.
 
@@ -41,7 +53,7 @@ def gather(meshes, mesh, flank, turned, within, pairs):
     newest = math.floor(turned) - first
     n_cells = n_pairs * n_nodes
     n_springs, at_depth = place[layout.N_SPRINGS], place[layout.AT_DEPTH]
-    n_columns, reach = n_springs + 1, np.inf
+    n_columns, reach = layout.STIFFNESS + layout.PER_SPRING * n_springs, np.inf
     if n_springs > 1:
         reach = within + meshes.depth[at_depth + 1]
     for j in range(n_pairs):
@@ -58,9 +70,7 @@ def gather(meshes, mesh, flank, turned, within, pairs):
         x = (turned - (index + first)) * n_nodes
         cell = min(max(int(x), 0), n_cells - 1)
         at = place[layout.AT_TABLE] + (row * (n_cells + 1) + cell) * n_columns
-        low, high = meshes.table[at], meshes.table[at + n_columns]
-        here[layout.GAP] = low + (x - cell) * (high - low)
-        here[layout.GAP_SLOPE] = sense * n_nodes * (high - low)
+        between(meshes.table, at, at + n_columns, x - cell, sense * n_nodes, here[layout.GAP :])
         if flank == DRIVE:
             here[layout.GAP] += (
                 meshes.error[place[layout.AT_ERROR_A] + tooth_a] + meshes.error[place[layout.AT_ERROR_B] + tooth_b]
@@ -68,10 +78,8 @@ def gather(meshes, mesh, flank, turned, within, pairs):
         for spring in range(n_springs):
             if here[layout.GAP] + meshes.depth[at_depth + spring] > reach:
                 break
-            low, high = meshes.table[at + 1 + spring], meshes.table[at + n_columns + 1 + spring]
             to = layout.STIFFNESS + layout.PER_SPRING * spring
-            here[to] = low + (x - cell) * (high - low)
-            here[to + 1] = sense * n_nodes * (high - low)
+            between(meshes.table, at + to, at + n_columns + to, x - cell, sense * n_nodes, here[to:])
     return reach
 
 

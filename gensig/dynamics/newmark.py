@@ -19,7 +19,7 @@ from gensig.dynamics._vector import LANES
 from gensig.dynamics.decimation import decimator
 from gensig.dynamics.geared_line import GearedLine, elimination_order, pack_line, pack_meshes, pack_torques
 from gensig.dynamics.line_course import LineCourse, ShaftTorque
-from gensig.errors import ConfigError, SimulationError
+from gensig.errors import ConfigError, SimulationError, StepError
 
 Array = NDArray[np.float64]
 
@@ -107,8 +107,8 @@ def integrate_line(
     Raises
     ------
     ConfigError        for channels, torques or starts that the line has not
-    SimulationError    where the contact does not converge, the motion leaves all bounds, the energies do not balance,
-        or a step passes a tooth
+    StepError          where the contact does not converge, the energies do not balance, or a step passes a tooth
+    SimulationError    where the motion leaves all bounds
     """
     n = len(line.names)
     _check_channels(line, channels)
@@ -129,7 +129,7 @@ def integrate_line(
     angle, speed = course.nominal(np.arange(n_samples) / solver.sampling_rate)
     motion = run.told(signals, angle, speed)
     if not motion.energy_residual <= solver.max_energy_residual:
-        raise SimulationError(
+        raise StepError(
             f"line: the energy balance misses {motion.energy_residual:.2g} of what goes through, more than "
             f"{solver.max_energy_residual:g}; raise the oversampling above {solver.oversampling}"
         )
@@ -214,7 +214,7 @@ class _Run:
         )  # fmt: skip
         q, v, *_ = self.state
         if failed >= 0:
-            raise SimulationError(
+            raise StepError(
                 f"line: the mesh forces do not converge at {failed * self.solver.step:.6g} s; raise the oversampling"
             )
         self.place += n_steps
@@ -311,7 +311,7 @@ def _check_step(line: GearedLine, course: LineCourse, step: float) -> None:
     for mesh in line.meshes:
         rate = mesh.n_teeth[0] * abs(float(line.rotation[mesh.roll_dof])) / (2.0 * math.pi) * course.speed.max()
         if rate * step > LONGEST_STEP:
-            raise SimulationError(
+            raise StepError(
                 f"mesh '{mesh.name}' rolls {rate * step:.2g} pitches in a step, its teeth pass at {rate:.4g} Hz; raise "
                 f"the oversampling {math.ceil(rate * step / LONGEST_STEP)} times"
             )

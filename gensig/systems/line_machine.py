@@ -22,7 +22,7 @@ from gensig.dynamics.line_matrices import LineMatrices
 from gensig.dynamics.line_mesh import LineMesh, pair_mesh, phase_mesh
 from gensig.dynamics.modal import with_viscous_losses
 from gensig.dynamics.newmark import LineMotion, LineSolver, integrate_line, static_start
-from gensig.errors import ConfigError
+from gensig.errors import ConfigError, StepError
 from gensig.geometry.contact import GearPair
 from gensig.mesh.pair_table import PairTable
 from gensig.mesh.sliced_table import SlicedTable
@@ -36,6 +36,7 @@ LEAST_APPROACH = 2e-6  # m, at which a mesh that carries next to nothing is take
 TABLE_STEP = 100.0 * math.pi / 30.0  # rad/s of the crank between torques that a run-up goes over
 TABLE_SHARE = 0.1  # of the largest torque between them
 MOST_TABLES = 24
+MOST_STEPS = 64  # per sample, that are tried where steps turn out to be too long
 LEAD_SAMPLES = 256  # before time 0: more than the low-pass looks back
 ROUNDED = 1e-12  # of the largest torque, below which a course of it over the cycle is constant
 
@@ -109,7 +110,10 @@ class RunningLine:
     def run(
         self, solver: LineSolver, *, duration: float, channels: Sequence[tuple[str, int]], settling: float
     ) -> LineMotion:
-        """Integrate, from the static place with the linear vibration on it, at least ``settling`` s before time 0."""
+        """Integrate, from the static place with the linear vibration on it, at least ``settling`` s before time 0.
+
+        What turns out to be too long a step is halved, as a gear pair's, up to ``MOST_STEPS`` a sample.
+        """
         lead = max(settling, LEAD_SAMPLES / solver.sampling_rate)
         lead = math.ceil(lead * solver.sampling_rate) / solver.sampling_rate
         turned, speed = (float(one[0]) for one in self.course.nominal(np.array([-lead])))
@@ -119,16 +123,22 @@ class RunningLine:
             still + np.real(self.linear.angle @ phasor),
             np.real((1j * self.linear.orders * speed * self.linear.angle) @ phasor),
         )
-        return integrate_line(
-            self.line,
-            self.course,
-            self.torques,
-            solver,
-            duration=duration,
-            channels=channels,
-            lead_in=lead,
-            start=start,
-        )
+        while True:
+            try:
+                return integrate_line(
+                    self.line,
+                    self.course,
+                    self.torques,
+                    solver,
+                    duration=duration,
+                    channels=channels,
+                    lead_in=lead,
+                    start=start,
+                )
+            except StepError:
+                if 2 * solver.oversampling > MOST_STEPS:
+                    raise
+                solver = replace(solver, oversampling=2 * solver.oversampling)
 
 
 @one_thread
