@@ -160,8 +160,9 @@ def gear_option(sheet: DataSheet) -> GearOption:
 def least_backlash(center_distance_mm: float, module_mm: float) -> float:
     """Recommended least normal backlash of industrial gears, micrometres, rounded.
 
-    Source: ISO/TR 10064-2:1996, j_bn = 2/3 (0.06 + 0.0005 a + 0.03 m_n) mm, for steel gears in ferrous housings with
-    pitch line speeds below 15 m/s and modules of 1.5 to 18 mm; for others it is an assumption.
+    Source: ISO/TR 10064-2:1996, j_bn = 2/3 (0.06 + 0.0005 a + 0.03 m_n) mm, for steel gears in ferrous housings. That
+    it holds below 15 m/s and for modules of 1.5 to 18 mm is from memory of the report, not checked against its text;
+    for others it is an assumption.
     """
     return round(2e3 / 3.0 * (0.06 + 0.0005 * center_distance_mm + 0.03 * module_mm), 1)
 

@@ -222,7 +222,8 @@ def mesh_start(
 
     Tooth 0's middle passes the mate at mate_angle, its flank a quarter pitch before (leading) or behind (trailing); the
     tooth that enters next stands one pitch back. Standard teeth: tooth and space are equal on the pitch circle.
-    Source: the planetary meshes' phases of Parker & Lin, J. Vib. Acoust. 126 (2004), written for one gear.
+    Source: the phases of Parker & Lin, Mesh Phasing Relationships in Planetary and Epicyclic Gears (ASME
+    DETC2003/PTG-48067), written for one gear.
     """
     if n_teeth < 1:
         raise GeometryError(f"a gear of {n_teeth} teeth has no phase")

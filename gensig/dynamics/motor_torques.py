@@ -76,8 +76,9 @@ class MotorDrive:
         """Slopes of torque over speed by node, N m s/rad: the motor gives less when faster, loads take more.
 
         Near its synchronous speed the torque of an induction motor is in proportion to the slip (Fitzgerald, Kingsley &
-        Umans, Electric Machinery, 6th ed., section 6.5), which makes T (1 - s) / (s omega) at the reference; under
-        V/f control that slope is the same at every speed. Of the loads it is n T / omega of their laws there.
+        Umans, Electric Machinery, 6th ed., section 6.5; from memory), which makes T (1 - s) / (s omega) at the
+        reference; under V/f control that slope is the same at every speed. Of the loads it is n T / omega of their laws
+        there.
         """
         speed, torque = self.reference.speed, self.reference.torque
         found = {self.motor_node: torque * (1.0 - self.slip) / (self.slip * speed)}
