@@ -38,9 +38,9 @@ def open_dataset(path: str | Path, *, allow_incomplete: bool = False) -> Dataset
 def load_system(*overrides: str, config_dir: str | Path | None = None) -> PairMachine:
     """The sound machine that overrides describe, as the commands would build it; for its faults see `load_faults`."""
     from gensig.config import read_request
-    from gensig.systems.registry import read_system
+    from gensig.systems.machines import read_machine
 
-    return read_system(read_request(overrides, config_dir=config_dir).config)
+    return read_machine(read_request(overrides, config_dir=config_dir).config)
 
 
 def load_faults(*overrides: str, config_dir: str | Path | None = None) -> tuple[Fault, ...]:

@@ -60,7 +60,7 @@ class TestLaw:
         errors = dict(zip(("pinion_error", "wheel_error"), mesh.errors, strict=True))
         found = chord_equilibrium(table, chord_states(table, rolls * table.pair.base_pitch, **errors), share * force)
         forces = [law_at(mesh, turned, approach)[0] for turned, approach in zip(rolls, found.approach, strict=True)]
-        assert_allclose(forces, share * force, rtol=5e-4, atol=0)
+        assert_allclose(forces, share * force, rtol=1e-3, atol=0)
 
     @pytest.mark.parametrize("approach", [2e-5, 6e-5, -1.5e-4])
     def test_force_and_torque_of_the_passing_teeth_are_slopes_of_one_potential(self, mesh, approach):

@@ -1,5 +1,6 @@
 """A line that a motor turns: static torques by the ratios, mesh frequencies, power, and what a missing tooth does."""
 
+from dataclasses import replace
 from functools import lru_cache
 
 import numpy as np
@@ -7,7 +8,8 @@ import pytest
 from numpy.testing import assert_allclose
 
 from gensig.config import read_request
-from gensig.dynamics.newmark import LineSolver
+from gensig.dynamics.newmark import LineSolver, integrate_line
+from gensig.errors import StepError
 from gensig.faults.registry import read_faults
 from gensig.systems.engine_line import read_engine_line
 from gensig.systems.line_machine import Governor, running_line, steady_course
@@ -79,6 +81,28 @@ def test_in_time_the_mean_forces_stay_and_the_energies_balance():
     assert np.abs(motion.signals["speed", line.dof(8)]).max() < 0.01 * SPEED / 5.0
     assert not motion.contact_loss.any()  # it does not rattle
     assert motion.energy_residual < 1e-3
+
+
+@pytest.mark.parametrize("speed_rpm", [900.0, 1200.0, 1500.0, 1800.0])
+def test_energies_balance_where_steps_meet_every_pitch_at_the_same_places(speed_rpm):
+    """Steps in a pitch: 256, 192, 153.6 and 128, of 512 cells each; an even line rests on such a speed."""
+    record = machine("operating.duration_s=0.3", f"operating.speed_rpm={speed_rpm}")
+    motion = record.line(Run(system=record, faults=())).run(
+        SOLVER, duration=0.3, channels=[("mesh_force", 0)], settling=0.3
+    )
+    assert motion.energy_residual < 3e-4
+
+
+def test_a_record_whose_steps_are_too_long_is_made_with_half_of_them():
+    words = ["operating.speed_rpm=2400", "operating.duration_s=0.05"]
+    short, long = (machine(*words, f"solver.oversampling={steps}") for steps in (8, 4))
+    line = long.line(Run(system=long, faults=()))
+    as_told = replace(SOLVER, oversampling=4), {"duration": 0.05, "channels": [("speed", 0)]}
+    with pytest.raises(StepError, match="the energy balance misses"):
+        integrate_line(line.line, line.course, line.torques, as_told[0], **as_told[1])
+    found = simulated(long)
+    assert found.integration_error < 1e-3
+    np.testing.assert_array_equal(found.acceleration, simulated(short).acceleration)
 
 
 @pytest.mark.parametrize("name", list(TEETH))
