@@ -14,6 +14,8 @@ from gensig.dynamics._line_layout import Factor, Line, Meshes, Padded, Rows, Tor
 from gensig.dynamics.line_course import LineCourse, ShaftTorque
 from gensig.dynamics.line_mesh import LineMesh
 from gensig.errors import ConfigError, SimulationError
+from gensig.mesh.pair_table import SMOOTHED_GAP
+from gensig.mesh.smooth_table import smooth
 
 Array = NDArray[np.float64]
 Index = NDArray[np.int64]
@@ -122,11 +124,10 @@ def pack_meshes(line: GearedLine, order: Index) -> Meshes:
 
     for m, mesh in enumerate(line.meshes):
         turning, (n_a, n_b) = float(line.rotation[mesh.roll_dof]), mesh.n_teeth
-        per_rad = n_a / (2.0 * np.pi)
+        per_rad, least_gap = n_a / (2.0 * np.pi), mesh.gap.min() - 0.25 * SMOOTHED_GAP
         number[m] = (
             mesh.backlash, mesh.damping, mesh.shared_compliance, mesh.start_phase, abs(turning) * per_rad,
-            np.sign(turning) * per_rad, mesh.mirror, mesh.gap.min() + sum(error.min() for error in mesh.errors),
-            mesh.gap.min(),
+            np.sign(turning) * per_rad, mesh.mirror, least_gap + sum(error.min() for error in mesh.errors), least_gap,
         )  # fmt: skip
         place[m] = (
             at_of[mesh.roll_dof], mesh.n_pairs, mesh.first_pitch, (mesh.stiffness.shape[1] - 1) // mesh.n_pairs,
@@ -150,23 +151,15 @@ def pack_meshes(line: GearedLine, order: Index) -> Meshes:
 
 
 def _columns(mesh: LineMesh) -> Array:
-    """Gap and stiffness of every spring, each with its slope per cell, (row, node, column)."""
-    springs = mesh.stiffness.reshape(len(mesh.gap), len(mesh.depth), -1)
-    values = np.concatenate([mesh.gap[:, :, None], np.moveaxis(springs, 1, 2)], axis=2)
-    return np.stack([values, _slopes(values)], axis=3).reshape(*values.shape[:2], -1)
+    """Gap and stiffness of every spring, each with its slope per cell, (row, node, column).
 
-
-def _slopes(values: Array) -> Array:
-    """Slopes per cell at the nodes of (row, node, column), with which cubics between nodes never leave their ends.
-
-    The harmonic mean of the chords on both sides, 0 at a turn; at the ends the chord itself. Source: Fritsch & Butland,
-    SIAM J. Sci. Stat. Comput. 5 (1984). A flank that ends keeps its edge, and no pair touches before it does.
+    Smooth over the roll, so that no step lands where the torque of the passing teeth jumps. Nothing is made up for in
+    stiffnesses: they stay positive.
     """
-    chord = np.diff(values, axis=1)
-    before, after = chord[:, :-1], chord[:, 1:]
-    product, total = before * after, before + after
-    inside = np.divide(2.0 * product, total, out=np.zeros_like(total), where=product > 0.0)
-    return np.concatenate([chord[:, :1], inside, chord[:, -1:]], axis=1)
+    n_rows, n_nodes = mesh.gap.shape
+    gap = np.stack(smooth(mesh.gap, 1.0, SMOOTHED_GAP, alike=False), axis=2)
+    springs = np.stack(smooth(mesh.stiffness, 1.0, 0.0), axis=2).reshape(n_rows, -1, n_nodes, 2)
+    return np.concatenate([gap, np.moveaxis(springs, 1, 2).reshape(n_rows, n_nodes, -1)], axis=2)
 
 
 def pack_torques(line: GearedLine, order: Index, torques: Sequence[ShaftTorque], course: LineCourse) -> Torques:
