@@ -23,6 +23,7 @@ from gensig.material import Material
 from gensig.mesh._slice_kernels import bite_forces
 from gensig.mesh.options import MeshOptions, SliceOptions
 from gensig.mesh.pair_table import FIRST_PITCH, SMOOTHED_GAP, SMOOTHED_SHARE, distinct_teeth
+from gensig.mesh.slice_entry import over_slice
 from gensig.mesh.slice_teeth import NO_FLANK
 from gensig.mesh.slices import SlicedMesh, cut_by_field, loaded_contact, sliced_mesh
 from gensig.mesh.smooth_table import smooth
@@ -348,13 +349,11 @@ def _bitten(setting: _Setting, mesh: SlicedMesh, position: Array, depth: Array, 
 def _curves(setting: _Setting, pinion: _Known, wheel: _Known, are_met: bool) -> tuple[Array, Array]:
     """First gap (node,) m and force (node, knot) N of one pair of teeth at the depths of the frame."""
     frame, mesh = _frame(setting), _mesh(setting, pinion, wheel)
-    looked = frame.position
-    later = float(setting.pair.face_width * math.tan(setting.pair.base_helix_angle)) / setting.slices.n_slices
-    apart = int(later / (PER_SLICE * (looked[1] - looked[0]))) if mesh.lag[-1] > 0.0 else 0
-    step = min(apart, setting.slices.n_slices // SLICES_PER_STEP) if are_met else UNMET_STEP
-    if step > 1:
-        looked = np.append(looked[:-1:step], looked[-1])
+    looked, n_looks = _looked(setting, frame.position, mesh, are_met)
     first, force = _bitten(setting, mesh, looked, frame.depth, frame.reach)
+    if n_looks:
+        first, force = over_slice(first, force, frame.depth, n_looks, FARTHEST)
+        looked = looked[n_looks // 2 : n_looks // 2 + len(first)]
     found = np.flatnonzero(first <= frame.reach)
     if not len(found):  # no flank is left to touch: what is sound, out of reach
         return np.full(len(frame.position), FARTHEST), _curves(setting, *_healthy(setting.pair), False)[1]
@@ -363,7 +362,22 @@ def _curves(setting: _Setting, pinion: _Known, wheel: _Known, are_met: bool) -> 
     else:  # beyond reach, the forces of the nearest position within
         nearest = np.searchsorted(0.5 * (found[1:] + found[:-1]), np.arange(len(first)))
         first, force = np.minimum(first, FARTHEST), force[found[nearest]]
-    if step > 1:
+    if len(looked) != len(frame.position) or n_looks:
         force = np.stack([np.interp(frame.position, looked, column) for column in force.T], axis=1)
         first = np.interp(frame.position, looked, first)
     return first, force
+
+
+def _looked(setting: _Setting, position: Array, mesh: SlicedMesh, are_met: bool) -> tuple[Array, int]:
+    """Positions at which two teeth are looked at, m, and, where slices enter one by one, how many of their distances
+    make the way from one slice to the next, an even number; else 0."""
+    node = position[1] - position[0]
+    if not mesh.lag[-1] > 0.0 or setting.options.law == "paper":  # whose slices the edge of the field cuts
+        return (position if are_met else np.append(position[:-1:UNMET_STEP], position[-1])), 0
+    n_slices = setting.slices.n_slices
+    later = float(setting.pair.face_width * math.tan(setting.pair.base_helix_angle)) / n_slices
+    apart = min(later / PER_SLICE, n_slices / SLICES_PER_STEP * node) if are_met else UNMET_STEP * node
+    n_looks = 2 * max(1, round(0.5 * later / max(apart, node)))
+    n_beside, distance = n_looks // 2, later / n_looks
+    n_steps = math.ceil((position[-1] - position[0]) / distance)
+    return position[0] + distance * np.arange(-n_beside, n_steps + n_beside + 1), n_looks

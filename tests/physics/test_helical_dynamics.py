@@ -10,6 +10,7 @@ from lane_tools import laws, right_hand_side, trajectory
 from numpy.testing import assert_allclose
 from scipy.optimize import brentq
 
+import gensig
 from gensig.dynamics.helical import AXIAL_DOFS, half_lag
 from gensig.dynamics.integrator import Solver, integrate
 from gensig.dynamics.pair import PAIR_DOFS
@@ -20,6 +21,7 @@ from gensig.mesh.sliced_statics import chord_equilibrium, chord_states
 HELIX = math.radians(20.0)
 DEPTH = np.array([0.0, 2.0, 5.0, 9.0, 14.0, 20.0]) * 1e-6
 STEP = 1 / (51200.0 * 32)
+QUIET = "sensing.snr_db=null", "operating.duration_s=0.2", "solver.max_error=null"
 IN_PLANE = slice(0, len(PAIR_DOFS))
 PLANAR = np.arange(len(PAIR_DOFS))
 
@@ -285,6 +287,26 @@ class TestChords:
         })  # fmt: skip
         assert found[-1] < -100.0
         assert_allclose(found, laws(replace(helical, table=alone), motion)[:, 0], rtol=1e-12, atol=1e-9)
+
+
+class TestSlices:
+    @pytest.mark.parametrize("speed_rpm", [620, 1480])
+    def test_a_record_does_not_know_how_many_slices_there_are(self, speed_rpm):
+        """Slices that enter whole strike at their own frequency: 20 and 40 of them made this pair up to 10 and 6 times as loud."""
+
+        def level(n_slices):
+            words = (
+                "system=helical_pair",
+                "gear=phm09_16_48",
+                f"operating.speed_rpm={speed_rpm}",
+                f"mesh.n_slices={n_slices}",
+            )
+            system = gensig.load_system(*words, *QUIET)
+            return system.simulate(()).acceleration.std(axis=1)
+
+        many = level(120)
+        assert_allclose(level(20), many, rtol=0.15, atol=0)
+        assert_allclose(level(40), many, rtol=0.1, atol=0)
 
 
 class TestRecords:

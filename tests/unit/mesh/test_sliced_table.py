@@ -76,8 +76,7 @@ def at_rest(table, roll, force, errors=None):
         ("mesh.contact=linear", "mesh.slice_coupling=independent", "mesh.pair_coupling=sum"),
         ("modification=beihang_both", "modification.misalignment_um=15"),
         ("gear=xiamen_23_84",),
-        ("mesh.n_slices=1",),
-        ("mesh.n_slices=12",),
+        ("mesh.n_slices=160",),
     ],
 )
 def test_equilibrium_is_that_of_the_slices(words):
@@ -95,6 +94,20 @@ def test_equilibrium_is_that_of_the_slices(words):
         np.testing.assert_allclose(
             load[:, behind:] if behind > 0 else load, own[:, : load.shape[1]], atol=0.012 * part * system.mesh_force
         )
+
+
+@pytest.mark.parametrize(("n_slices", "share"), [(6, 0.5), (12, 0.2), (20, 0.1)])
+def test_few_slices_that_enter_over_their_width_are_many(n_slices, share):
+    """The ripple of the table is that of 320 slices, which that of as few slices whole is not."""
+    system, table, _ = table_of(f"mesh.n_slices={n_slices}")
+    roll, force = system.phases(64), system.mesh_force
+    few, many = (
+        loaded_contact(table_of(f"mesh.n_slices={count}")[2], roll, force).approach for count in (n_slices, 320)
+    )
+    found = at_rest(table, roll, force)[0]
+    error, whole = (np.ptp(approach - approach.mean() - many + many.mean()) for approach in (found, few))
+    assert error < share * np.ptp(many)
+    assert error < 0.4 * whole
 
 
 @pytest.mark.parametrize("words", [(), ("gear=chongqing_40_162",), ("gear=xiamen_23_84",)])
