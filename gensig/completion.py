@@ -61,12 +61,16 @@ def _offer(action: argparse.Action, verb: str, primary: str) -> None:
 
 
 def candidates(prefix: str, typed: Sequence[str], arguments: Any, primary: str) -> dict[str, str]:
-    """Groups, options of a group, and keys of the chosen options, each with its line."""
+    """Groups, their options, keys of the chosen options, each with its line; paths for the keys that take one."""
+    from argcomplete.completers import FilesCompleter
+
     from gensig.option_files import groups, option_keys, options, section_keys, sections
 
     folder = getattr(arguments, "config_dir", None)
     offered = [group for group in groups(folder) if group.primary == primary]
-    name, equals, _ = prefix.partition("=")
+    name, equals, value = prefix.partition("=")
+    if equals and (name in ("data", "out") or name.endswith("_csv")):
+        return {f"{name}={path}": "" for path in FilesCompleter()(value)}
     if equals:
         known = options(name, folder) if name in [group.name for group in offered] else []
         return {f"{name}={one.name}": one.about for one in known}

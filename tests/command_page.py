@@ -31,7 +31,7 @@ several verbs.
 
 ## Tab key
 
-Commands, flags, groups, options and keys of both commands:
+Commands, flags, groups, options, keys and the paths of `data=`, `out=` and tables, of both commands:
 
     eval "$(gensig completion bash)"          # in ~/.bashrc
     eval "$(gensig completion zsh)"           # in ~/.zshrc, after compinit

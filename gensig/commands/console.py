@@ -18,6 +18,7 @@ if TYPE_CHECKING:
     from gensig.generation import Progress
 
 LINE_SECONDS = 5.0
+LONG_SECONDS = 10.0  # without a record: time to say what may take so long
 
 
 @contextmanager
@@ -103,7 +104,8 @@ class ShardProgress:
         last = self._last
         seconds = self._last_time - self._begin
         if last is None or not last.n_made or seconds <= 0.0:
-            return f"{time.monotonic() - self._begin:.0f} s"
+            waited = time.monotonic() - self._begin
+            return f"{waited:.0f} s" + ("; the first run compiles for a minute or two" if waited > LONG_SECONDS else "")
         rate = last.n_made / seconds
         left = max(0.0, (last.n_records - last.n_done) / rate - (time.monotonic() - self._last_time))
         failed = f", {last.n_failed} failed" if last.n_failed else ""

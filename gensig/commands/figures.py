@@ -101,8 +101,8 @@ def _terms(axes: Any, curves: StiffnessCurves) -> None:
         ylabel="compliance, 10$^{-12}$ m/N",
         yscale="log",
     )
-    axes.set_ylim(bottom=0.02)
-    axes.legend(fontsize="x-small", ncols=2, loc="lower right")
+    axes.set_ylim(bottom=0.004)
+    axes.legend(fontsize="x-small", ncols=3, loc="lower right")
 
 
 def plot_record(system: PairMachine, acceleration: NDArray[np.float32], values: dict[str, Any], path: Path) -> None:

@@ -206,6 +206,15 @@ def test_the_tab_key_knows_verbs_flags_options_and_keys(
     assert not absent & found
 
 
+def test_the_tab_key_completes_paths_of_keys(tmp_path: Path) -> None:
+    """Zsh and fish take `data=...` for one word and would offer no files by themselves."""
+    (tmp_path / "here").mkdir()
+    (tmp_path / "her.csv").touch()
+    for line in ("diagnose train data=", "gensig generate out=", "gensig modes system.gears_csv="):
+        key = line.split()[-1]
+        assert completed(f"{line}{tmp_path}/he", tmp_path) == {f"{key}{tmp_path}/here/", f"{key}{tmp_path}/her.csv"}
+
+
 @pytest.mark.parametrize("shell", ["bash", "zsh", "fish"])
 def test_what_a_shell_sources_names_both_commands(shell: str, capsys: pytest.CaptureFixture[str]) -> None:
     assert MAIN["gensig"](["completion", shell]) == 0
