@@ -292,7 +292,7 @@ class TestChords:
 class TestSlices:
     @pytest.mark.parametrize("speed_rpm", [620, 1480])
     def test_a_record_does_not_know_how_many_slices_there_are(self, speed_rpm):
-        """Slices that enter whole strike at their own frequency: 20 and 40 made this pair up to 10 and 6 times as loud."""
+        """Slices that enter whole strike at their own frequency: 20 and 40 made it up to 10 and 6 times as loud."""
 
         def level(n_slices):
             words = (
