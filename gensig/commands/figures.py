@@ -13,6 +13,7 @@ from numpy.typing import NDArray
 from gensig.faults.base import Fault
 from gensig.systems.pair_machine import PairMachine
 from gensig.systems.spur_pair import SpurPair, StiffnessCurves
+from gensig.units import SPEED, channel_unit
 
 matplotlib.use("Agg")
 from matplotlib import pyplot
@@ -114,12 +115,13 @@ def plot_record(system: PairMachine, acceleration: NDArray[np.float32], values: 
     name = "pinion_y" if "pinion_y" in names else names[0]
     signal = acceleration[names.index(name)].astype(np.float64)
     rate = system.sensing.sampling_rate
-    unit = "rad/s$^2$" if name.endswith("rotation") else "m/s$^2$"
+    unit = channel_unit(name).replace("^2", "$^2$")
+    what = "speed less the nominal one" if name.endswith(SPEED) else "acceleration"
     shaft, mesh = values["speed_rpm"] / 60.0, values["mesh_frequency_hz"]
     figure, axes = pyplot.subplots(3, 1, figsize=(11, 8.5), layout="constrained")
     shown = min(len(signal), int(5.0 * rate / shaft))
     axes[0].plot(np.arange(shown) / rate, signal[:shown], color=SOUND, linewidth=0.5)
-    axes[0].set(title=f"{name}, first turns of the pinion", xlabel="time, s", ylabel=f"acceleration, {unit}")
+    axes[0].set(title=f"{name}, first turns of the pinion", xlabel="time, s", ylabel=f"{what}, {unit}")
     frequency, amplitude = amplitude_spectrum(signal, rate)
     axes[1].semilogy(frequency / 1e3, np.maximum(amplitude, 1e-9), color=SOUND, linewidth=0.5)
     for harmonic in range(1, int(0.39 * rate / mesh) + 1):

@@ -16,9 +16,11 @@ from gensig.commands.reading import read_watched
 from gensig.config import read_request
 from gensig.errors import ConfigError
 from gensig.faults.registry import read_faults, without_vary
+from gensig.systems.machines import read_machine
 from gensig.systems.pair_machine import PairMachine
 from gensig.systems.registry import SLICED, read_system
 from gensig.systems.spur_pair import SpurPair, StiffnessCurves
+from gensig.units import channel_unit
 
 if TYPE_CHECKING:
     from gensig.records import Record
@@ -142,7 +144,7 @@ def _show(config: dict[str, Any], record: Record, arguments: Namespace) -> int:
     if record.values.get("status") == "failed":
         print(f"gensig: {record.values['status_reason']}", file=sys.stderr)
         return 1
-    system = read_system(config)
+    system = read_machine(config)
     if arguments.output:
         _write_record(config, system, record, arguments.output)
     if arguments.plot:
@@ -166,13 +168,11 @@ def _write_record(config: dict[str, Any], system: PairMachine, record: Record, o
     else:
         acceleration = record.signals["acceleration"]
         time = np.arange(acceleration.shape[1]) / system.sensing.sampling_rate
-        header = ",".join(["time_s", *(f"{name}_{_unit_suffix(name)}" for name in system.sensing.channel_names)])
+        units = (channel_unit(name).replace("/", "_per_").replace("^", "") for name in system.sensing.channel_names)
+        names = (f"{name}_{unit}" for name, unit in zip(system.sensing.channel_names, units, strict=True))
+        header = ",".join(["time_s", *names])
         with replaced_file(path) as temporary:
             np.savetxt(temporary, np.column_stack([time, *acceleration]), "%.9g", ",", header=header, comments="")
-
-
-def _unit_suffix(channel: str) -> str:
-    return "rad_per_s2" if channel.endswith("rotation") else "m_per_s2"
 
 
 def _print_record(system: PairMachine, acceleration: NDArray[np.float32], values: dict[str, Any]) -> None:
@@ -185,5 +185,5 @@ def _print_record(system: PairMachine, acceleration: NDArray[np.float32], values
         system.sensing.channel_names, rms(acceleration), kurtosis(acceleration), crest_factor(acceleration), strict=True
     )
     for name, level, fourth, crest in table:
-        unit = "rad/s2" if name.endswith("rotation") else "m/s2"
+        unit = channel_unit(name).replace("^", "")
         print(f"{name:<16}{level:>12.4g} {unit:<8}{fourth:>12.3f}{crest:>12.3f}")

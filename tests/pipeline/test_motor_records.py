@@ -70,6 +70,30 @@ def test_loads_of_a_steady_mesh_are_its_static_torque(monkeypatch):
     assert_allclose(loads, 30.0, rtol=0.35)
 
 
+def test_simulate_shows_writes_and_repeats_records_of_the_line(folder, tmp_path, capsys):
+    words = ["simulate", "experiment=two_stage", "operating.duration_s=0.1", "fault=missing_tooth"]
+    assert main([*words, "--plot", str(tmp_path / "one.png"), "--output", str(tmp_path / "one.csv")]) == 0
+    told = capsys.readouterr().out
+    assert "class missing_tooth" in told
+    assert "speed 174" in told
+    with open(tmp_path / "one.csv") as file:
+        assert file.readline().startswith(
+            "time_s,pinion_rotation_rad_per_s2,wheel_rotation_rad_per_s2,pinion_x_m_per_s2"
+        )
+    assert (tmp_path / "one.png").stat().st_size > 10000
+    rows = PlanRows(folder / PLAN).records(0, 8)
+    number = next(k for k, row in enumerate(rows) if row["label_name"] == "missing_tooth")
+    again = ["simulate", "--from", str(folder), "--record", str(number), "--output"]
+    assert main([*again, str(tmp_path / "again.h5")]) == 0
+    assert main([*again, str(tmp_path / "twin.h5"), "--twin"]) == 0
+    with h5py.File(tmp_path / "again.h5") as own, h5py.File(tmp_path / "twin.h5") as twin:
+        with h5py.File(folder / "shards" / "shard-00000.h5") as file:
+            stored = file["acceleration"][int(rows[number]["row"])]
+        assert_allclose(own["acceleration"][0], stored, rtol=0.0, atol=0.0)
+        assert twin["severity"][0] == 0.0
+        assert not np.array_equal(twin["acceleration"][0], stored)
+
+
 def test_an_encoder_and_the_load_s_own_torque_are_stored(tmp_path):
     wheel = "{node: 1, n_teeth: 60, eccentricity_error_deg: 0, tooth_error_deg: 0, clock_frequency_hz: 100000000}"
     words = (
