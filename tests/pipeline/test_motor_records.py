@@ -6,12 +6,13 @@ import pytest
 from numpy.testing import assert_allclose
 
 from gensig.cli import main
+from gensig.commands import engine_figures
 from gensig.config import read_request
 from gensig.dataset.layout import PLAN
 from gensig.dataset.plan import PlanRows
 from gensig.planning import make_plan
 from gensig.records import simulate_record
-from gensig.systems import line_loads
+from gensig.systems import line_loads, line_time
 
 SMALL = ("experiment=two_stage", "operating.duration_s=0.1", "plan.n_records=8", "plan.n_units=2", "plan.n_gearboxes=1")
 MOTOR = ("system=two_stage_gearbox", "excitation=motor_and_load")
@@ -144,6 +145,21 @@ def test_what_turns_no_line_is_refused_in_one_line(words, told, capsys):
     error = capsys.readouterr().err.strip()
     assert told in error
     assert "\n" not in error
+
+
+def test_the_figure_shows_the_forces_of_every_mesh(monkeypatch, tmp_path):
+    monkeypatch.setattr(line_time, "SETTLING", 0.02)
+    drawn = []
+    monkeypatch.setattr(engine_figures, "save", lambda figure, path: drawn.append(figure) or path.write_bytes(b"0"))
+    assert main(["forced-response", *MOTOR, "--time", "0.1", "--plot", str(tmp_path / "found.png")]) == 0
+    panels = {axes.get_title(): axes for axes in drawn[0].axes}
+    assert len(panels) == 6
+    low, high = panels["Tooth force of the meshes, least to greatest"].get_ylim()
+    assert low <= 0.0
+    assert high > 3.991
+    assert {"angle of the motor, degrees"} == {
+        axes.get_xlabel() for axes in panels.values() if "angle" in axes.get_xlabel()
+    }
 
 
 def test_forced_response_says_torque_and_meshes_and_draws(tmp_path, capsys):
