@@ -92,6 +92,11 @@ class LineMachine(PairMachine):
         raise ConfigError("dataset.store_mesh_state: a drive line does not tell the loads of its teeth; take false")
 
     @property
+    def torque_of(self) -> str:
+        """The load or the brake: torques are told at the shaft that turns the line, whichever mesh is followed."""
+        return "brake, at the crank" if isinstance(self.engine.engine, Engine) else "load, as the motor feels it"
+
+    @property
     def load_exponent(self) -> int:
         """Power of the speed that the torque of the load follows."""
         return self.engine.engine.load_exponent

@@ -125,6 +125,11 @@ class PairMachine(ABC):
         """Speed of the pinion's shaft over the one that ``operating`` is told for."""
         return 1.0
 
+    @property
+    def torque_of(self) -> str:
+        """What the set torque is that of, where it is not the driving shaft's own."""
+        return ""
+
     def mesh_torques(self, speed: float, torque: float) -> Array:
         """Loads that a tooth meets at a set-point, one a mesh, all equally likely, as torques of the pinion in N m.
 

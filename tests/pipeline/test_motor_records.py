@@ -30,8 +30,12 @@ def folder(tmp_path_factory):
     return out
 
 
-def test_a_set_of_the_second_stage_is_whole_and_tells_gear_and_tooth(folder):
+def test_a_set_of_the_second_stage_is_whole_and_tells_gear_and_tooth(folder, capsys):
     assert main(["verify", str(folder)]) == 0
+    capsys.readouterr()
+    assert main(["inspect", str(folder)]) == 0
+    assert "of the load, as the motor feels it" in capsys.readouterr().out
+    assert "torque of the load, as the motor feels it |" in (folder / "README.md").read_text()
     with h5py.File(folder / "shards" / "shard-00000.h5") as file:
         assert {value.decode() for value in file["status"][:]} == {"ok"}
         assert np.all(file["integration_error"][:] < 1e-3)
