@@ -16,10 +16,11 @@ from gensig.commands.reading import read_watched
 from gensig.config import read_request
 from gensig.errors import ConfigError
 from gensig.faults.registry import read_faults, without_vary
+from gensig.mesh.pair_table import PairTable
 from gensig.systems.machines import read_machine
 from gensig.systems.pair_machine import PairMachine
-from gensig.systems.registry import SLICED, read_system
-from gensig.systems.spur_pair import SpurPair, StiffnessCurves
+from gensig.systems.registry import SLICED
+from gensig.systems.stiffness_curves import StiffnessCurves
 from gensig.units import channel_unit
 
 if TYPE_CHECKING:
@@ -39,8 +40,7 @@ def stiffness(arguments: Namespace) -> int:
         from gensig.commands.flanks import sliced_stiffness
 
         return sliced_stiffness(config, arguments)
-    system = read_system(config)
-    assert isinstance(system, SpurPair)  # the other kind has gone
+    system = read_machine(config)
     faults = read_faults(config["fault"])
     curves = system.stiffness_curves(faults)
     if system.pair.transverse_contact_ratio < 1.0:
@@ -61,8 +61,10 @@ def stiffness(arguments: Namespace) -> int:
     return 0
 
 
-def stiffness_content(system: SpurPair, curves: StiffnessCurves) -> dict[str, Any]:
+def stiffness_content(system: PairMachine, curves: StiffnessCurves) -> dict[str, Any]:
     """The keys of ``gensig stiffness --json``."""
+    table = system.mesh_table()
+    assert isinstance(table, PairTable)  # which the curves are made of
     content: dict[str, Any] = {
         "transverse_contact_ratio": system.pair.transverse_contact_ratio,
         "base_pitch_mm": system.pair.base_pitch * 1e3,
@@ -77,7 +79,7 @@ def stiffness_content(system: SpurPair, curves: StiffnessCurves) -> dict[str, An
         "compliance_m_per_n": {
             gear: {name: values.tolist() for name, values in terms.items()} for gear, terms in curves.compliance.items()
         },
-        "shared_body_compliance_m_per_n": system.mesh_table().shared_compliance,
+        "shared_body_compliance_m_per_n": table.shared_compliance,
     }
     if curves.faulty_pair_stiffness is not None and curves.faulty_pair_gap is not None:
         content["faulty_pair_stiffness_n_per_m"] = curves.faulty_pair_stiffness.tolist()

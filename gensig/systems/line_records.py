@@ -53,6 +53,7 @@ from gensig.systems.mesh_phase import start_phase
 from gensig.systems.operation import read_operating
 from gensig.systems.pair_machine import CleanRecord, PairMachine, Run, Start
 from gensig.systems.registry import read_heat, read_material, read_modification, section
+from gensig.systems.stiffness_curves import StiffnessCurves, stiffness_curves
 from gensig.systems.supports import in_gearbox
 from gensig.units import SPEED, read
 
@@ -119,6 +120,19 @@ class LineMachine(PairMachine):
     def mesh_table(self, faults: Sequence[Fault] = ()) -> PairTable | SlicedTable:
         """Tables of the mesh with the given faults."""
         return tooth_table(self.law, self.pair, tuple(faults), self.mesh_force)
+
+    def stiffness_curves(
+        self, faults: Sequence[Fault] = (), *, n_positions: int = 201, points_per_tooth: int = 100
+    ) -> StiffnessCurves:
+        """Those of the mesh that records follow, under its mean force; ConfigError where its gears are helical."""
+        table = self.mesh_table(faults)
+        if not isinstance(table, PairTable):
+            raise ConfigError(
+                f"system.record_mesh {self.engine.mesh_names[self.place]} is of helical gears, which have their "
+                "stiffness slice by slice; choose a spur mesh, or take its gears with gensig stiffness "
+                "system=helical_pair"
+            )
+        return stiffness_curves(self, table, faults, n_positions=n_positions, points_per_tooth=points_per_tooth)
 
     def require_drive(self) -> None:
         """Raise unless at least one pair is always in contact, by the overlap of the face too."""

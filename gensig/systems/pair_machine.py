@@ -41,7 +41,7 @@ from gensig.systems.supports import in_gearbox
 from gensig.units import from_si
 
 if TYPE_CHECKING:
-    from gensig.systems.spur_pair import StiffnessCurves
+    from gensig.systems.stiffness_curves import StiffnessCurves
 
 Array = NDArray[np.float64]
 

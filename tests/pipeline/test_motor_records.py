@@ -1,5 +1,8 @@
 """Records of a two-stage gearbox that a motor turns: a small set through the verbs, lives, and what is refused."""
 
+import json
+from dataclasses import replace
+
 import h5py
 import numpy as np
 import pytest
@@ -13,6 +16,8 @@ from gensig.dataset.plan import PlanRows
 from gensig.planning import make_plan
 from gensig.records import simulate_record
 from gensig.systems import line_loads, line_time
+from gensig.systems.machines import read_machine
+from gensig.systems.spur_pair import SpurPair
 
 SMALL = ("experiment=two_stage", "operating.duration_s=0.1", "plan.n_records=8", "plan.n_units=2", "plan.n_gearboxes=1")
 MOTOR = ("system=two_stage_gearbox", "excitation=motor_and_load")
@@ -67,8 +72,6 @@ def test_lives_grow_under_the_steady_loads_of_the_mesh(life, kind, monkeypatch):
 
 
 def test_loads_of_a_steady_mesh_are_its_static_torque(monkeypatch):
-    from gensig.systems.machines import read_machine
-
     monkeypatch.setattr(line_loads, "SECONDS", 0.1)
     machine = read_machine(read_request(["experiment=two_stage"]).config)
     loads = machine.mesh_torques(machine.operating.speed, 30.0)
@@ -97,6 +100,27 @@ def test_simulate_shows_writes_and_repeats_records_of_the_line(folder, tmp_path,
         assert_allclose(own["acceleration"][0], stored, rtol=0.0, atol=0.0)
         assert twin["severity"][0] == 0.0
         assert not np.array_equal(twin["acceleration"][0], stored)
+
+
+def test_stiffness_is_that_of_the_record_mesh_and_a_helical_one_is_refused(tmp_path, capsys):
+    words = ["stiffness", *MOTOR, "system.record_mesh=[5,6]", "operating.torque_nm=60", "fault=crack"]
+    out = tmp_path / "curves.json"
+    assert main([*words, "--json", str(out), "--plot", str(tmp_path / "curves.png")]) == 0
+    content = json.loads(out.read_text())
+    # the same teeth as a pair, under what the first stage makes of the torque
+    line = read_machine(read_request([*MOTOR, "system.record_mesh=[5,6]", "operating.torque_nm=60"]).config)
+    alone = SpurPair(
+        pair=line.pair, material=line.material, mesh=line.mesh, pinion=line.pinion, wheel=line.wheel,
+        operating=replace(line.operating, torque=180.0), sensing=line.sensing, quality=line.quality, solver=line.solver,
+    ).stiffness_curves()  # fmt: skip
+    assert_allclose(line.stiffness_curves().mesh_stiffness, alone.mesh_stiffness, rtol=1e-9)
+    assert min(content["faulty_pair_stiffness_n_per_m"]) < min(content["single_pair_stiffness_n_per_m"])
+    capsys.readouterr()
+    engine = ["system=engine_gear_train", "excitation=engine_v20", "system.record_mesh=[3,18]"]
+    assert main(["stiffness", *engine]) != 0
+    error = capsys.readouterr().err.strip()
+    assert "system.record_mesh 3/18 is of helical gears" in error
+    assert "\n" not in error
 
 
 def test_an_encoder_and_the_load_s_own_torque_are_stored(tmp_path):
