@@ -142,11 +142,17 @@ def test_an_encoder_and_the_load_s_own_torque_are_stored(tmp_path):
 @pytest.mark.parametrize(
     ("words", "told"),
     [
-        (["system.motor_node=null"], "system.motor_node = null: excitation=motor_and_load needs the node of a motor"),
+        (
+            ["system.motor_node=null"],
+            "one of 1, 2, 3, 4, 5, 6, 7, 8; the tables want system.motor_node, system.load_node",
+        ),
         (["system.motor_node=99"], "system.motor_node = 99: the shaft line has no node 99; it has 1, 2, 3"),
         (["system.motor_node=8"], "turns 0.2 times as fast as the first node"),
         (["system.load_node=null"], "system.load_node = null: excitation=motor_and_load needs the node of its load"),
-        (["system.load_node=99"], "system.load_node = 99: the shaft line has no node 99"),
+        (
+            ["system.load_node=99"],
+            "has 1, 2, 3, 4, 5, 6, 7, 8; the tables want system.motor_node, system.load_node and, for records",
+        ),
         (
             ["excitation.loads={fan: {node: 99, law: linear, torque_nm: 1}}"],
             "excitation.loads.fan.node: the shaft line",
