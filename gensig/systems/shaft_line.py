@@ -67,6 +67,13 @@ class DriveLine:
         gears = self.line.gears
         return tuple(float(speed[gears[mesh.driving].node] * gears[mesh.driving].n_teeth) for mesh in self.line.meshes)
 
+    @property
+    def campbell_orders(self) -> tuple[float, ...]:
+        """Orders of the Campbell diagram: as given, or the turn, its double, every mesh and its double."""
+        if self.campbell.orders is not None:
+            return self.campbell.orders
+        return tuple(sorted({factor * order for order in (1.0, *self.mesh_orders) for factor in (1.0, 2.0)}))
+
 
 def read_drive_line(config: Mapping[str, Any]) -> DriveLine:
     """Build the drive line of a configuration from its tables.
