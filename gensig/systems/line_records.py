@@ -7,6 +7,7 @@ driving shaft. ``docs/theory/shaft_line_records.md``.
 from __future__ import annotations
 
 import math
+import warnings
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, replace
 from typing import Any
@@ -63,6 +64,7 @@ SETTLING = 0.3  # s before a record, in which what the start from the linear vib
 MOST_ENERGY_RESIDUAL = 1e-3
 KNOT = 5e-3  # s between the knots of a course that changes
 AFTER = 0.2  # s for which a course is told after a record: the low-pass looks ahead
+FAR_ABOVE = 3.0  # of the force of the supports; the stiffness of a ball bearing follows its third root
 SIDES = ("pinion", "wheel")
 AXES = ("x", "y")
 
@@ -156,9 +158,27 @@ class LineMachine(PairMachine):
             raise ConfigError(f"mesh.law = {self.mesh.law}: the meshes of a drive line are one-sided")
         if self.solver.precision != "float64":
             raise ConfigError(f"solver.precision = {self.solver.precision}: a drive line is integrated in float64")
+        self._warn_of_supports()
         self.quality.check_covered(self.pair.pinion, self.pair.wheel)
         check_memory(self.operating.duration, sensing.sampling_rate, len(sensing.channels), self.solver.precision)
         self.mesh_table()
+
+    def _warn_of_supports(self) -> None:
+        """Warn where gears bear far more than the one support that all of them are on is taken for."""
+        drive, rated = self.engine.drive, self.engine.drive.support_force
+        if rated is None:
+            return
+        force = np.abs(self.mesh_forces)
+        heavy = [place for place in range(len(force)) if force[place] > FAR_ABOVE * rated]
+        if heavy:
+            told = ", ".join(f"{self.engine.mesh_names[place]} {force[place]:.0f} N" for place in heavy)
+            warnings.warn(
+                f"{drive.name}: mean tooth forces of meshes {told}, but every gear is on a support for "
+                f"system.support.force_n = {rated:g} N, less stiff than bearings so loaded; set it, and bearing and "
+                "shaft, to those of the gears of system.record_mesh",
+                UserWarning,
+                stacklevel=2,
+            )
 
     def driven_tooth(self, tooth_pinion: int, drawn: int) -> int:
         """Tooth of the driven gear at the start: in a drive that turns once a cycle the marks of its timing say it.

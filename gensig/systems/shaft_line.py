@@ -38,7 +38,8 @@ class DriveLine:
 
     ``numbers`` (node,) as the table counts them, rings of dampers on from there; ``pairs`` (mesh,) the driving gear as
     pinion; ``record_mesh`` the numbers of the nodes whose mesh records are made of; ``slices_helical`` whether helical
-    meshes in time are sliced teeth; ``motor_node``, ``load_node`` those of a motor and its load.
+    meshes in time are sliced teeth; ``motor_node``, ``load_node`` those of a motor and its load; ``support_force`` N is
+    that for which the one support of all gears is taken, None without lateral motion.
     """
 
     name: str
@@ -51,6 +52,7 @@ class DriveLine:
     slices_helical: bool = False
     motor_node: int | None = None
     load_node: int | None = None
+    support_force: float | None = None
 
     def matrices(self, *, merge_rigid: bool = False) -> LineMatrices:
         """Mass, damping and stiffness, the meshes apart; merged for integration, as the table has them for modes."""
@@ -126,6 +128,7 @@ def read_drive_line(config: Mapping[str, Any]) -> DriveLine:
         slices_helical=options.helical_meshes == "sliced",
         motor_node=options.motor_node,
         load_node=options.load_node,
+        support_force=options.support.force if options.lateral else None,
     )
 
 

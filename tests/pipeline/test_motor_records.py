@@ -1,6 +1,7 @@
 """Records of a two-stage gearbox that a motor turns: a small set through the verbs, lives, and what is refused."""
 
 import json
+import warnings
 from dataclasses import replace
 
 import h5py
@@ -86,7 +87,7 @@ def test_simulate_shows_writes_and_repeats_records_of_the_line(folder, tmp_path,
     assert "speed 174" in told
     with open(tmp_path / "one.csv") as file:
         assert file.readline().startswith(
-            "time_s,pinion_rotation_rad_per_s2,wheel_rotation_rad_per_s2,pinion_x_m_per_s2"
+            "time_s,pinion_rotation_rad_per_s2,wheel_rotation_rad_per_s2,pinion_y_m_per_s2"
         )
     assert (tmp_path / "one.png").stat().st_size > 10000
     rows = PlanRows(folder / PLAN).records(0, 8)
@@ -100,6 +101,17 @@ def test_simulate_shows_writes_and_repeats_records_of_the_line(folder, tmp_path,
         assert_allclose(own["acceleration"][0], stored, rtol=0.0, atol=0.0)
         assert twin["severity"][0] == 0.0
         assert not np.array_equal(twin["acceleration"][0], stored)
+
+
+def test_gears_that_bear_far_more_than_their_support_is_for_are_named():
+    words = ["experiment=two_stage", "operating.torque_nm=60"]
+    with pytest.warns(UserWarning, match="meshes 3/4 1995 N, 5/6 3991 N, but every gear is on a support for .* 500 N"):
+        read_machine(read_request(words).config).check()
+    with warnings.catch_warnings():
+        warnings.simplefilter("error")
+        read_machine(read_request([*words, "system.support.force_n=2000"]).config).check()
+        torsion = ["system.lateral=false", "sensing.channels=[pinion_rotation,wheel_rotation]"]
+        read_machine(read_request([*words, *torsion]).config).check()
 
 
 def test_stiffness_is_that_of_the_record_mesh_and_a_helical_one_is_refused(tmp_path, capsys):
