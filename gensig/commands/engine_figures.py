@@ -8,7 +8,7 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from gensig.commands.figures import COLOURS, FAULTY, GREY, SOUND, pyplot, save
-from gensig.commands.motor_figures import motor_rows
+from gensig.commands.motor_figures import motor_rows, turner, turns_evenly
 from gensig.commands.time_figures import root_row, sweep_rows, time_rows
 from gensig.dynamics.engine_cycle import cycle_angles, gas_torque, inertia_torque
 from gensig.dynamics.engine_torques import Engine, EngineTorques
@@ -27,21 +27,18 @@ def plot_response(line: EngineLine, found: Found, path: Path) -> None:
     """Cycle, torques, speeds and angular displacement spectra; below these what else was asked for, row by row."""
     blocks = {"run": 1 if found.run else 0, "time": 2 if found.in_time else 0}
     blocks |= {"roots": 1 if found.roots else 0, "sweep": 3 if found.sweep else 0}
-    n_rows = 2 + sum(blocks.values())
+    blocks |= {"linear": 0 if turns_evenly(line) else 1}
+    n_rows = 1 + sum(blocks.values())
     figure, axes = pyplot.subplots(n_rows, 2, figsize=(12, 3.7 * n_rows), layout="constrained", squeeze=False)
     if isinstance(line.engine, Engine):
         _cycle(axes[0, 0], line.engine, found)
         _orders(axes[0, 1], line, line.engine, found)
     else:
         motor_rows(axes[0], line, found)
-    if isinstance(line.engine, Engine) or line.engine.ripple is not None:
+    if blocks["linear"]:
         _speeds(axes[1, 0], line, found)
         _spectra(axes[1, 1], line, found)
-    else:
-        for one in axes[1]:
-            one.set_axis_off()
-        axes[1, 0].set_title("Without torque ripple the linear line turns evenly", loc="left")
-    row = 2
+    row = 1 + blocks["linear"]
     if found.run:
         _waterfall(figure, axes[row, 0], line, found.nodes[0], found.run[0])
         if len(found.run) > 1:
@@ -123,7 +120,7 @@ def _speeds(axes: Any, line: EngineLine, found: Found) -> None:
             linewidth=1.1,
             label=f"{_name(line, node)}: +- {rpm * half[place]:.1f}",
         )
-    axes.set(title="Speed less its mean", xlabel="crank angle, degrees", ylabel="r/min", xlim=(0, 720))
+    axes.set(title="Speed less its mean", xlabel=f"angle of the {turner(line)}, degrees", ylabel="r/min", xlim=(0, 720))
     axes.set_xticks(range(0, 721, 90))
     axes.margins(y=0.25)
     axes.legend(loc="upper right", fontsize=8)
@@ -159,7 +156,11 @@ def _waterfall(figure: Any, axes: Any, line: EngineLine, node: int, run: Waterfa
             axes.annotate(
                 f"{order:g}", (order * rpm[-1] / 60.0, rpm[-1]), color="white", fontsize=8, ha="center", va="top"
             )
-    axes.set(title=f"Run of speeds, {_name(line, node)}", xlabel="frequency, Hz", ylabel="speed of the crank, r/min")
+    axes.set(
+        title=f"Run of speeds, {_name(line, node)}",
+        xlabel="frequency, Hz",
+        ylabel=f"speed of the {turner(line)}, r/min",
+    )
 
 
 def _name(line: EngineLine, node: int) -> str:

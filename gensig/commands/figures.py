@@ -12,7 +12,8 @@ from numpy.typing import NDArray
 
 from gensig.faults.base import Fault
 from gensig.systems.pair_machine import PairMachine
-from gensig.systems.spur_pair import SpurPair, StiffnessCurves
+from gensig.systems.stiffness_curves import StiffnessCurves
+from gensig.units import SPEED, channel_unit
 
 matplotlib.use("Agg")
 from matplotlib import pyplot
@@ -23,17 +24,18 @@ COLOURS = (SOUND, FAULTY, THIRD, FOURTH, "#56B4E9", GREY)
 ENVELOPE_BAND_HZ = (5000.0, 19000.0)
 
 
-def plot_stiffness(system: SpurPair, curves: StiffnessCurves, faults: Sequence[Fault], path: Path) -> None:
+def plot_stiffness(system: PairMachine, curves: StiffnessCurves, faults: Sequence[Fault], path: Path) -> None:
     """Single pair, mesh over one revolution, load sharing and compliance terms."""
     figure, axes = pyplot.subplots(2, 2, figsize=(11, 7.2), layout="constrained")
     _single_pair(axes[0, 0], curves, faults)
     _mesh(axes[0, 1], system, curves, faults)
     _load_sharing(axes[1, 0], system, curves, faults)
     _terms(axes[1, 1], curves)
-    pair = system.pair
+    pair, of_what = system.pair, f" of the {system.torque_of}" if system.torque_of else ""
     figure.suptitle(
         f"{pair.pinion.n_teeth}/{pair.wheel.n_teeth} teeth, contact ratio {pair.transverse_contact_ratio:.3f}, "
-        f"{system.operating.torque:g} N m, mesh.law={system.mesh.law}, pair_coupling={system.mesh.pair_coupling}"
+        f"{system.operating.torque:g} N m{of_what}, mesh.law={system.mesh.law}, "
+        f"pair_coupling={system.mesh.pair_coupling}"
     )
     save(figure, path)
 
@@ -60,7 +62,7 @@ def _single_pair(axes: Any, curves: StiffnessCurves, faults: Sequence[Fault]) ->
     axes.legend()
 
 
-def _mesh(axes: Any, system: SpurPair, curves: StiffnessCurves, faults: Sequence[Fault]) -> None:
+def _mesh(axes: Any, system: PairMachine, curves: StiffnessCurves, faults: Sequence[Fault]) -> None:
     axes.plot(np.degrees(curves.roll_angle), curves.mesh_stiffness / 1e8, color=SOUND, linewidth=0.9)
     if faults:
         angle = _fault_angle(system, faults[0])
@@ -75,7 +77,7 @@ def _mesh(axes: Any, system: SpurPair, curves: StiffnessCurves, faults: Sequence
     )
 
 
-def _load_sharing(axes: Any, system: SpurPair, curves: StiffnessCurves, faults: Sequence[Fault]) -> None:
+def _load_sharing(axes: Any, system: PairMachine, curves: StiffnessCurves, faults: Sequence[Fault]) -> None:
     pitch_angle = 360.0 / _n_teeth(system, faults)
     begin = _fault_angle(system, faults[0]) - pitch_angle if faults else 0.0
     angle = np.degrees(curves.roll_angle)
@@ -114,12 +116,13 @@ def plot_record(system: PairMachine, acceleration: NDArray[np.float32], values: 
     name = "pinion_y" if "pinion_y" in names else names[0]
     signal = acceleration[names.index(name)].astype(np.float64)
     rate = system.sensing.sampling_rate
-    unit = "rad/s$^2$" if name.endswith("rotation") else "m/s$^2$"
+    unit = channel_unit(name).replace("^2", "$^2$")
+    what = "speed less the nominal one" if name.endswith(SPEED) else "acceleration"
     shaft, mesh = values["speed_rpm"] / 60.0, values["mesh_frequency_hz"]
     figure, axes = pyplot.subplots(3, 1, figsize=(11, 8.5), layout="constrained")
     shown = min(len(signal), int(5.0 * rate / shaft))
     axes[0].plot(np.arange(shown) / rate, signal[:shown], color=SOUND, linewidth=0.5)
-    axes[0].set(title=f"{name}, first turns of the pinion", xlabel="time, s", ylabel=f"acceleration, {unit}")
+    axes[0].set(title=f"{name}, first turns of the pinion", xlabel="time, s", ylabel=f"{what}, {unit}")
     frequency, amplitude = amplitude_spectrum(signal, rate)
     axes[1].semilogy(frequency / 1e3, np.maximum(amplitude, 1e-9), color=SOUND, linewidth=0.5)
     for harmonic in range(1, int(0.39 * rate / mesh) + 1):

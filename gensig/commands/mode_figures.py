@@ -49,13 +49,13 @@ def _shown(found: Modes) -> range:
 def _campbell(axes: Any, line: DriveLine, found: Modes) -> None:
     """Natural frequencies across the speeds, rays of the orders, dots where they meet."""
     low, high = (from_si("speed_rpm", speed) for speed in (line.campbell.low_speed, line.campbell.high_speed))
-    top = 1.08 * max(line.campbell.orders) * high / 60.0
+    top = 1.08 * max(line.campbell_orders) * high / 60.0
     shown = [(mode, hz) for mode, hz in enumerate(found.frequency) if 0.0 < hz < top]
     speeds = np.array([low, high])
-    for order in line.campbell.orders:
+    for order in line.campbell_orders:
         axes.plot(speeds, order * speeds / 60.0, color=GREY, linewidth=0.8)
         axes.annotate(
-            f"{order:g}",
+            f"{order:.4g}",
             (high, order * high / 60.0),
             xytext=(3, 0),
             textcoords="offset points",

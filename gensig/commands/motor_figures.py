@@ -1,14 +1,25 @@
-"""Figure of a line that a motor turns: mean torques by node and what its meshes carry."""
+"""Figures of a line that a motor turns: mean torques by node and what its meshes carry, names of what turns a line."""
 
 from __future__ import annotations
 
 from typing import TYPE_CHECKING, Any
 
 from gensig.commands.figures import FAULTY, GREY, SOUND
+from gensig.dynamics.engine_torques import Engine
 from gensig.systems.engine_line import EngineLine
 
 if TYPE_CHECKING:
     from gensig.commands.forced_response import Found
+
+
+def turner(line: EngineLine) -> str:
+    """What speeds and angles of a line are those of."""
+    return "crank" if isinstance(line.engine, Engine) else "motor"
+
+
+def turns_evenly(line: EngineLine) -> bool:
+    """Whether nothing shakes the line while its meshes never part."""
+    return not isinstance(line.engine, Engine) and line.engine.ripple is None
 
 
 def motor_rows(axes: Any, line: EngineLine, found: Found) -> None:
@@ -20,4 +31,5 @@ def motor_rows(axes: Any, line: EngineLine, found: Found) -> None:
     axes[0].set(title="Mean torques: given (blue) and taken (red)", xlabel="node", ylabel="N m, on its own shaft")
     force = found.response.element_forces(line.linear()[1])[0]
     axes[1].bar(list(line.mesh_names), force / 1e3, color=SOUND, width=0.4)
-    axes[1].set(title="Mean tooth force of the meshes", xlabel="mesh", ylabel="kN")
+    evenly = " (no torque ripple: even in the linear line)" if turns_evenly(line) else ""
+    axes[1].set(title=f"Mean tooth force of the meshes{evenly}", xlabel="mesh", ylabel="kN")

@@ -16,9 +16,12 @@ from gensig.commands.reading import read_watched
 from gensig.config import read_request
 from gensig.errors import ConfigError
 from gensig.faults.registry import read_faults, without_vary
+from gensig.mesh.pair_table import PairTable
+from gensig.systems.machines import read_machine
 from gensig.systems.pair_machine import PairMachine
-from gensig.systems.registry import SLICED, read_system
-from gensig.systems.spur_pair import SpurPair, StiffnessCurves
+from gensig.systems.registry import SLICED
+from gensig.systems.stiffness_curves import StiffnessCurves
+from gensig.units import channel_unit
 
 if TYPE_CHECKING:
     from gensig.records import Record
@@ -37,8 +40,7 @@ def stiffness(arguments: Namespace) -> int:
         from gensig.commands.flanks import sliced_stiffness
 
         return sliced_stiffness(config, arguments)
-    system = read_system(config)
-    assert isinstance(system, SpurPair)  # the other kind has gone
+    system = read_machine(config)
     faults = read_faults(config["fault"])
     curves = system.stiffness_curves(faults)
     if system.pair.transverse_contact_ratio < 1.0:
@@ -59,8 +61,10 @@ def stiffness(arguments: Namespace) -> int:
     return 0
 
 
-def stiffness_content(system: SpurPair, curves: StiffnessCurves) -> dict[str, Any]:
+def stiffness_content(system: PairMachine, curves: StiffnessCurves) -> dict[str, Any]:
     """The keys of ``gensig stiffness --json``."""
+    table = system.mesh_table()
+    assert isinstance(table, PairTable)  # which the curves are made of
     content: dict[str, Any] = {
         "transverse_contact_ratio": system.pair.transverse_contact_ratio,
         "base_pitch_mm": system.pair.base_pitch * 1e3,
@@ -75,7 +79,7 @@ def stiffness_content(system: SpurPair, curves: StiffnessCurves) -> dict[str, An
         "compliance_m_per_n": {
             gear: {name: values.tolist() for name, values in terms.items()} for gear, terms in curves.compliance.items()
         },
-        "shared_body_compliance_m_per_n": system.mesh_table().shared_compliance,
+        "shared_body_compliance_m_per_n": table.shared_compliance,
     }
     if curves.faulty_pair_stiffness is not None and curves.faulty_pair_gap is not None:
         content["faulty_pair_stiffness_n_per_m"] = curves.faulty_pair_stiffness.tolist()
@@ -142,7 +146,7 @@ def _show(config: dict[str, Any], record: Record, arguments: Namespace) -> int:
     if record.values.get("status") == "failed":
         print(f"gensig: {record.values['status_reason']}", file=sys.stderr)
         return 1
-    system = read_system(config)
+    system = read_machine(config)
     if arguments.output:
         _write_record(config, system, record, arguments.output)
     if arguments.plot:
@@ -166,13 +170,11 @@ def _write_record(config: dict[str, Any], system: PairMachine, record: Record, o
     else:
         acceleration = record.signals["acceleration"]
         time = np.arange(acceleration.shape[1]) / system.sensing.sampling_rate
-        header = ",".join(["time_s", *(f"{name}_{_unit_suffix(name)}" for name in system.sensing.channel_names)])
+        units = (channel_unit(name).replace("/", "_per_").replace("^", "") for name in system.sensing.channel_names)
+        names = (f"{name}_{unit}" for name, unit in zip(system.sensing.channel_names, units, strict=True))
+        header = ",".join(["time_s", *names])
         with replaced_file(path) as temporary:
             np.savetxt(temporary, np.column_stack([time, *acceleration]), "%.9g", ",", header=header, comments="")
-
-
-def _unit_suffix(channel: str) -> str:
-    return "rad_per_s2" if channel.endswith("rotation") else "m_per_s2"
 
 
 def _print_record(system: PairMachine, acceleration: NDArray[np.float32], values: dict[str, Any]) -> None:
@@ -185,5 +187,5 @@ def _print_record(system: PairMachine, acceleration: NDArray[np.float32], values
         system.sensing.channel_names, rms(acceleration), kurtosis(acceleration), crest_factor(acceleration), strict=True
     )
     for name, level, fourth, crest in table:
-        unit = "rad/s2" if name.endswith("rotation") else "m/s2"
+        unit = channel_unit(name).replace("^", "")
         print(f"{name:<16}{level:>12.4g} {unit:<8}{fourth:>12.3f}{crest:>12.3f}")

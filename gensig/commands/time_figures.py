@@ -7,6 +7,7 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from gensig.commands.figures import COLOURS, FAULTY, GREY, SOUND
+from gensig.commands.motor_figures import turner
 from gensig.dynamics.engine_cycle import CYCLE
 from gensig.dynamics.forced import over_cycle
 from gensig.systems.cycle_statistics import typical_extremes
@@ -22,6 +23,7 @@ if TYPE_CHECKING:
 CYCLE_POINTS = 5760
 TRACE_CYCLES = 2
 SHOWN_HZ = 400.0
+FLAT_HZ = 4000.0  # to which what is given out in time is flat
 MARKED_ORDERS = (0.5, 1.0, 2.5, 5.0, 10.0, 20.0)
 ROOT_LOOKS = {
     "linear": (SOUND, "-"),
@@ -39,7 +41,7 @@ def time_rows(axes: Any, line: EngineLine, found: Found, response: TimeResponse)
     linear = mean[:, None] + over_cycle(amplitudes, CYCLE_POINTS)
     _loads(axes[1, 0], line, linear, response)
     mesh = int(linear.max(axis=1).argmax()) if found.mesh is None else found.mesh
-    _course(axes[1, 1], line.mesh_names[mesh], linear[mesh], response.mesh_force[mesh], response)
+    _course(axes[1, 1], line, mesh, linear[mesh], response)
 
 
 def root_row(axes: Any, line: EngineLine, found: Found) -> None:
@@ -82,9 +84,11 @@ def sweep_rows(figure: Any, axes: Any, line: EngineLine, found: Found, sweep: Sw
         top = max(way.spectra[column].max() for way in (sweep.up, sweep.down))
         for row, (way, word) in enumerate(((sweep.up, "up"), (sweep.down, "down"))):
             _waterfall(figure, axes[row, column], way, column, float(top))
+            axes[row, column].set_ylabel(f"speed of the {turner(line)}, r/min")
             axes[row, column].set_title(f"In time, {word}, {name}")
         _both_ways(axes[2, column], found, sweep, column)
         axes[2, column].set_title(f"Speed fluctuation in a cycle, {name}")
+        axes[2, column].set_xlabel(f"speed of the {turner(line)}, r/min")
 
 
 def _speeds(axes: Any, line: EngineLine, found: Found, response: TimeResponse) -> None:
@@ -97,27 +101,34 @@ def _speeds(axes: Any, line: EngineLine, found: Found, response: TimeResponse) -
         place, colour = line.drive.numbers.index(node), COLOURS[row]
         axes.plot(cycle, np.tile(rpm * linear[place], TRACE_CYCLES), color=colour, linewidth=0.7, linestyle=":")
         axes.plot(angle[shown], rpm * response.speed[row, shown], color=colour, linewidth=0.9, label=_name(line, node))
-    axes.set(title="Speed less its mean, in time (dotted: linear)", xlabel="crank angle, degrees", ylabel="r/min")
+    axes.set(
+        title="Speed less its mean, in time (dotted: linear)",
+        xlabel=f"angle of the {turner(line)}, degrees",
+        ylabel="r/min",
+    )
     axes.margins(y=0.25)
     axes.legend(fontsize=8, loc="upper right")
 
 
 def _spectra(axes: Any, line: EngineLine, found: Found, response: TimeResponse) -> None:
-    """Angular displacement by frequency; grey lines at the half orders."""
-    frequencies, spectra = amplitude_spectra(response.angle)
-    shown = frequencies <= SHOWN_HZ
+    """Angular displacement by frequency; grey lines at the half orders, or the mesh frequencies where none fires."""
     rate = found.response.speed / (2.0 * np.pi)
-    for order in np.arange(0.5, SHOWN_HZ / rate, 0.5):
+    of_motor = turner(line) == "motor"
+    orders = np.multiply.outer((1.0, 2.0), line.drive.mesh_orders).ravel() if of_motor else np.arange(0.5, 1e3, 0.5)
+    highest = min(1.1 * rate * float(orders.max()), FLAT_HZ) if of_motor else SHOWN_HZ
+    frequencies, spectra = amplitude_spectra(response.angle, highest)
+    shown = frequencies <= highest
+    for order in orders[orders * rate < highest]:
         axes.axvline(order * rate, color=GREY, linewidth=0.3, linestyle="-" if order % 1.0 == 0.0 else ":")
     for row, node in enumerate(found.nodes[: len(COLOURS)]):
         label = _name(line, node)
         axes.plot(frequencies[shown], np.degrees(spectra[row, shown]), color=COLOURS[row], linewidth=0.8, label=label)
     axes.set(
-        title="Angular displacement in time (dotted: half orders)",
+        title=f"Angular displacement in time ({'grey: meshes, doubles' if of_motor else 'dotted: half orders'})",
         xlabel="frequency, Hz",
         ylabel="amplitude, degrees",
         yscale="log",
-        xlim=(0.0, SHOWN_HZ),
+        xlim=(0.0, highest),
     )
     axes.set_ylim(None, 10.0 * np.degrees(spectra[:, shown].max()))
     axes.legend(fontsize=8, loc="upper right")
@@ -139,17 +150,18 @@ def _loads(axes: Any, line: EngineLine, linear: Any, response: TimeResponse) -> 
     )
     axes.set(title="Tooth force of the meshes, least to greatest", xlabel="mesh, share of time apart", ylabel="kN")
     lowest, highest = (float(end) / 1e3 for end in (min(least.min(), linear.min()), max(greatest.max(), linear.max())))
-    axes.set_ylim(1.1 * lowest, 1.3 * highest)
+    axes.set_ylim(1.1 * min(lowest, 0.0), 1.3 * max(highest, 0.0))
     axes.legend(fontsize=8)
 
 
-def _course(axes: Any, name: str, linear: Any, force: Any, response: TimeResponse) -> None:
+def _course(axes: Any, line: EngineLine, mesh: int, linear: Any, response: TimeResponse) -> None:
+    name, force = line.mesh_names[mesh], response.mesh_force[mesh]
     shown = response.crank_angle < TRACE_CYCLES * CYCLE
     cycle = np.linspace(0.0, 720.0 * TRACE_CYCLES, TRACE_CYCLES * len(linear), endpoint=False)
     axes.plot(np.degrees(response.crank_angle[shown]), force[shown] / 1e3, color=FAULTY, linewidth=0.7, label="in time")
     axes.plot(cycle, np.tile(linear, TRACE_CYCLES) / 1e3, color=SOUND, linewidth=0.9, label="linear")
     axes.axhline(0.0, color=GREY, linewidth=0.8)
-    axes.set(title=f"Tooth force of mesh {name}", xlabel="crank angle, degrees", ylabel="kN")
+    axes.set(title=f"Tooth force of mesh {name}", xlabel=f"angle of the {turner(line)}, degrees", ylabel="kN")
     axes.margins(y=0.2)
     axes.legend(fontsize=8, loc="upper right")
 
@@ -169,7 +181,7 @@ def _waterfall(figure: Any, axes: Any, way: SweepWay, column: int, top: float) -
             axes.annotate(
                 f"{order:g}", (order * rpm[-1] / 60.0, rpm[-1]), color="white", fontsize=8, ha="center", va="top"
             )
-    axes.set(xlabel="frequency, Hz", ylabel="speed of the crank, r/min")
+    axes.set_xlabel("frequency, Hz")
 
 
 def _both_ways(axes: Any, found: Found, sweep: Sweep, column: int) -> None:
@@ -182,7 +194,7 @@ def _both_ways(axes: Any, found: Found, sweep: Sweep, column: int) -> None:
     if found.run:
         run = found.run[column]
         axes.plot(factor * run.speeds, factor * run.fluctuation, color=GREY, linewidth=0.9, label="linear, steady")
-    axes.set(xlabel="speed of the crank, r/min", ylabel="plus or minus, r/min")
+    axes.set_ylabel("plus or minus, r/min")
     axes.set_ylim(0.0, None)
     axes.legend(fontsize=8)
 

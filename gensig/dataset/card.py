@@ -140,7 +140,7 @@ def _facts(data: Dataset) -> list[tuple[object, ...]]:
     ]
     rows += [
         ("speed of the driving shaft", value_range(data.column("speed_rpm"), "r/min")),
-        ("torque of the driving shaft", value_range(data.column("torque_nm"), "N m")),
+        (torque_words(data), value_range(data.column("torque_nm"), "N m")),
     ]
     if "snr_db" in data.column_names:
         rows.append(("signal-to-noise ratio", value_range(data.column("snr_db"), "dB")))
@@ -167,6 +167,11 @@ def _splits(data: Dataset) -> list[tuple[object, ...]]:
             (protocol, *(f"{sum(stop - start for _, start, stop in part):g} records" for part in parts.values()))
         )
     return rows
+
+
+def torque_words(data: Dataset) -> str:
+    """Whose torque `torque_nm` is: a drive line's is that of its load, whichever mesh its records follow."""
+    return f"torque of the {plain(data.attributes.get('torque_of', 'driving shaft'))}"
 
 
 def value_range(values: np.ndarray, unit: str) -> str:

@@ -64,6 +64,7 @@ def _dataset_lines(data: Dataset) -> list[str]:
     usable = data.usable
     duration = data.n_samples / data.sampling_rate
     units = " and ".join(map(_show, dict.fromkeys(data.attributes.get("channel_units", ["m/s^2"]))))
+    of_what = f", of the {_show(data.attributes['torque_of'])}" if "torque_of" in data.attributes else ""
     lines = [
         f"  signal       acceleration ({len(data.channel_names)}, {data.n_samples}) float32, {units}, "
         f"{data.sampling_rate:g} Hz, {duration:g} s",
@@ -71,7 +72,7 @@ def _dataset_lines(data: Dataset) -> list[str]:
         f"compression {data.compression}",
         f"  channels     {', '.join(map(_show, data.channel_names))}",
         f"  speed        {value_range(data.column('speed_rpm')[usable], 'r/min')}",
-        f"  torque       {value_range(data.column('torque_nm')[usable], 'N m')}",
+        f"  torque       {value_range(data.column('torque_nm')[usable], 'N m')}{of_what}",
         f"  splits       {', '.join(map(_show, data.protocols)) or 'none'}",
     ]
     for title, column in (

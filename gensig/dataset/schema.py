@@ -76,7 +76,7 @@ COLUMNS: dict[str, Column] = _table(
     ("start_phase", "float64", "1", "condition", "mesh phase at the first sample, as a fraction of a base pitch"),
     ("speed_rpm", "float64", "r/min", "result", "actual mean speed of the driving shaft"),
     ("speed_set_rpm", "float64", "r/min", "condition", "speed set-point of the driving shaft"),
-    ("torque_nm", "float64", "N m", "condition", "torque set-point of the driving shaft"),
+    ("torque_nm", "float64", "N m", "condition", "torque set-point of the driving shaft, or of what `torque_of` says"),
     (
         "mesh_frequency_hz",
         "float64",
@@ -174,7 +174,7 @@ SIGNALS: dict[str, Column] = {
         Column(name="shaft_speed", dtype="float32", unit="rad/s", role="result", axes=("sample",),
                description="actual speed of the driving shaft, central difference of its angle (optional)"),
         Column(name="torque_set", dtype="float32", unit="N m", role="condition", axes=("sample",),
-               description="set torque of the driving shaft over time (optional)"),
+               description="set torque over time, as torque_nm (optional)"),
         Column(name="mesh_pinion_tooth", dtype="int16", unit="1", role="fault", axes=("pair", "sample"),
                description="pinion tooth of each pair that carries load, from 0; -1 where it does not (optional)"),
         Column(name="mesh_wheel_tooth", dtype="int16", unit="1", role="fault", axes=("pair", "sample"),

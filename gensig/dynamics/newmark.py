@@ -129,11 +129,18 @@ def integrate_line(
     angle, speed = course.nominal(np.arange(n_samples) / solver.sampling_rate)
     motion = run.told(signals, angle, speed)
     if not motion.energy_residual <= solver.max_energy_residual:
+        missed = _told_above(motion.energy_residual, solver.max_energy_residual)
         raise StepError(
-            f"line: the energy balance misses {motion.energy_residual:.2g} of what goes through, more than "
+            f"line: the energy balance misses {missed} of what goes through, more than "
             f"{solver.max_energy_residual:g}; raise the oversampling above {solver.oversampling}"
         )
     return motion
+
+
+def _told_above(value: float, limit: float) -> str:
+    """A value in three digits, or in as many as show that it is above a limit."""
+    texts = (f"{value:.{digits}g}" for digits in range(3, 18))
+    return next((text for text in texts if float(text) > limit), f"{value:.3g}")
 
 
 def static_start(line: GearedLine, course: LineCourse, torques: Sequence[ShaftTorque], *, time: float = 0.0) -> Array:

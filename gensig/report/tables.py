@@ -9,7 +9,7 @@ from pathlib import Path
 import numpy as np
 
 from gensig.dataset.atomic import read_text
-from gensig.dataset.card import CAVEATS, GEOMETRY, plain, value_range
+from gensig.dataset.card import CAVEATS, GEOMETRY, plain, torque_words, value_range
 from gensig.dataset.layout import CONFIG, CONFIG_BYTES_LIMIT, OVERRIDES
 from gensig.dataset.protocols import PROTOCOLS
 from gensig.dataset.reader import Dataset
@@ -53,7 +53,7 @@ def contents(data: Dataset) -> list[Section]:
     ]
     rows += [
         ("speed of the driving shaft", value_range(data.column("speed_rpm"), "r/min")),
-        ("torque of the driving shaft", value_range(data.column("torque_nm"), "N m")),
+        (torque_words(data), value_range(data.column("torque_nm"), "N m")),
     ]
     if "snr_db" in data.column_names:
         rows.append(("signal-to-noise ratio", value_range(data.column("snr_db"), "dB")))

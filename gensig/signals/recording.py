@@ -19,7 +19,7 @@ Array = NDArray[np.float64]
 STANDARD_GRAVITY = 9.80665  # m/s2
 UNITS = {"m/s2": 1.0, "g": STANDARD_GRAVITY}
 SUFFIXES = {"_m_per_s2": 1.0, "_g": STANDARD_GRAVITY}
-WRONG_SUFFIXES = ("_rad_per_s2", "_rad", "_mm_per_s", "_um", "_mm", "_v", "_mv", "_rpm", "_nm", "_deg")
+WRONG_SUFFIXES = ("_rad_per_s2", "_rad_per_s", "_rad", "_mm_per_s", "_um", "_mm", "_v", "_mv", "_rpm", "_nm", "_deg")
 READERS: dict[str, Callable[[str, str | None], Content]] = {
     ".npy": read_npy,
     ".npz": read_npz,

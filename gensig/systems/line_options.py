@@ -33,17 +33,19 @@ class LossFactors:
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Campbell:
-    """Speeds of the first node and orders of it that the Campbell diagram shows."""
+    """Speeds of the first node and orders of it that the Campbell diagram shows; None takes those of the meshes."""
 
     low_speed: float = unit("rpm")
     high_speed: float = unit("rpm")
-    orders: tuple[float, ...]
+    orders: tuple[float, ...] | None
 
     def __post_init__(self) -> None:
         if not 0.0 <= self.low_speed < self.high_speed:
             raise ConfigError("system.campbell: low_speed_rpm must lie between 0 and high_speed_rpm")
-        if not self.orders or min(self.orders) <= 0.0:
-            raise ConfigError("system.campbell.orders: give orders of the first node, all positive, such as [1, 2]")
+        if self.orders is not None and (not self.orders or min(self.orders) <= 0.0):
+            raise ConfigError(
+                "system.campbell.orders: give orders of the first node, all positive, such as [1, 2], or null"
+            )
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)

@@ -7,6 +7,7 @@ driving shaft. ``docs/theory/shaft_line_records.md``.
 from __future__ import annotations
 
 import math
+import warnings
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, replace
 from typing import Any
@@ -53,6 +54,7 @@ from gensig.systems.mesh_phase import start_phase
 from gensig.systems.operation import read_operating
 from gensig.systems.pair_machine import CleanRecord, PairMachine, Run, Start
 from gensig.systems.registry import read_heat, read_material, read_modification, section
+from gensig.systems.stiffness_curves import StiffnessCurves, stiffness_curves
 from gensig.systems.supports import in_gearbox
 from gensig.units import SPEED, read
 
@@ -62,6 +64,7 @@ SETTLING = 0.3  # s before a record, in which what the start from the linear vib
 MOST_ENERGY_RESIDUAL = 1e-3
 KNOT = 5e-3  # s between the knots of a course that changes
 AFTER = 0.2  # s for which a course is told after a record: the low-pass looks ahead
+FAR_ABOVE = 3.0  # of the force of the supports; the stiffness of a ball bearing follows its third root
 SIDES = ("pinion", "wheel")
 AXES = ("x", "y")
 
@@ -92,6 +95,11 @@ class LineMachine(PairMachine):
         raise ConfigError("dataset.store_mesh_state: a drive line does not tell the loads of its teeth; take false")
 
     @property
+    def torque_of(self) -> str:
+        """The load or the brake: torques are told at the shaft that turns the line, whichever mesh is followed."""
+        return "brake, at the crank" if isinstance(self.engine.engine, Engine) else "load, as the motor feels it"
+
+    @property
     def load_exponent(self) -> int:
         """Power of the speed that the torque of the load follows."""
         return self.engine.engine.load_exponent
@@ -115,6 +123,19 @@ class LineMachine(PairMachine):
         """Tables of the mesh with the given faults."""
         return tooth_table(self.law, self.pair, tuple(faults), self.mesh_force)
 
+    def stiffness_curves(
+        self, faults: Sequence[Fault] = (), *, n_positions: int = 201, points_per_tooth: int = 100
+    ) -> StiffnessCurves:
+        """Those of the mesh that records follow, under its mean force; ConfigError where its gears are helical."""
+        table = self.mesh_table(faults)
+        if not isinstance(table, PairTable):
+            raise ConfigError(
+                f"system.record_mesh {self.engine.mesh_names[self.place]} is of helical gears, which have their "
+                "stiffness slice by slice; choose a spur mesh, or take its gears with gensig stiffness "
+                "system=helical_pair"
+            )
+        return stiffness_curves(self, table, faults, n_positions=n_positions, points_per_tooth=points_per_tooth)
+
     def require_drive(self) -> None:
         """Raise unless at least one pair is always in contact, by the overlap of the face too."""
         require_drive(self.pair, self.slices)
@@ -137,9 +158,27 @@ class LineMachine(PairMachine):
             raise ConfigError(f"mesh.law = {self.mesh.law}: the meshes of a drive line are one-sided")
         if self.solver.precision != "float64":
             raise ConfigError(f"solver.precision = {self.solver.precision}: a drive line is integrated in float64")
+        self._warn_of_supports()
         self.quality.check_covered(self.pair.pinion, self.pair.wheel)
         check_memory(self.operating.duration, sensing.sampling_rate, len(sensing.channels), self.solver.precision)
         self.mesh_table()
+
+    def _warn_of_supports(self) -> None:
+        """Warn where gears bear far more than the one support that all of them are on is taken for."""
+        drive, rated = self.engine.drive, self.engine.drive.support_force
+        if rated is None:
+            return
+        force = np.abs(self.mesh_forces)
+        heavy = [place for place in range(len(force)) if force[place] > FAR_ABOVE * rated]
+        if heavy:
+            told = ", ".join(f"{self.engine.mesh_names[place]} {force[place]:.0f} N" for place in heavy)
+            warnings.warn(
+                f"{drive.name}: mean tooth forces of meshes {told}, but every gear is on a support for "
+                f"system.support.force_n = {rated:g} N, less stiff than bearings so loaded; set it, and bearing and "
+                "shaft, to those of the gears of system.record_mesh",
+                UserWarning,
+                stacklevel=2,
+            )
 
     def driven_tooth(self, tooth_pinion: int, drawn: int) -> int:
         """Tooth of the driven gear at the start: in a drive that turns once a cycle the marks of its timing say it.

@@ -156,8 +156,8 @@ def _way(motion: LineMotion, signals: Array, n_nodes: int, edges: Array, speeds:
     )
 
 
-def amplitude_spectra(signals: Array) -> tuple[Array, Array]:
-    """Frequencies (frequency,) Hz up to `SPECTRUM_HZ` and amplitudes (signal, frequency) of signals (signal, sample).
+def amplitude_spectra(signals: Array, highest: float = SPECTRUM_HZ) -> tuple[Array, Array]:
+    """Frequencies (frequency,) Hz up to the highest and amplitudes (signal, frequency) of signals (signal, sample).
 
     Under Hann's window, straight trends taken off; a steady line has its amplitude.
     """
@@ -166,5 +166,5 @@ def amplitude_spectra(signals: Array) -> tuple[Array, Array]:
     rest = signals - (base @ np.linalg.lstsq(base, signals.T, rcond=None)[0]).T
     window = np.hanning(n_samples)
     frequencies = np.asarray(np.fft.rfftfreq(n_samples, 1.0 / RATE), dtype=np.float64)
-    shown = frequencies <= SPECTRUM_HZ
+    shown = frequencies <= highest
     return frequencies[shown], np.asarray(2.0 / window.sum() * np.abs(np.fft.rfft(rest * window))[:, shown])

@@ -16,6 +16,7 @@ from gensig.units import read
 
 KIND = "motor_and_load"
 KEYS = ("kind", "reference", "motor", "load", "loads", "toothed_wheels")
+TOGETHER = "the tables want system.motor_node, system.load_node and, for records, system.record_mesh of their own"
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -83,9 +84,9 @@ def _node(drive: DriveLine, key: str, what: str, node: int | None) -> int:
     """A node of the line; the motor's turns as fast as the first one, to which all speeds refer."""
     if node is None:
         numbers = ", ".join(map(str, drive.numbers))
-        raise ConfigError(f"system.{key} = null: {PLACE}={KIND} needs the node of {what}; give one of {numbers}")
+        raise ConfigError(f"system.{key} = null: {PLACE}={KIND} needs the node of {what}, one of {numbers}; {TOGETHER}")
     if node not in drive.numbers:
-        raise ConfigError(f"system.{key} = {node}: {_no_node(drive, node)}")
+        raise ConfigError(f"system.{key} = {node}: {_no_node(drive, node)}; {TOGETHER}")
     ratio = abs(float(drive.line.speed_ratio[drive.numbers.index(node)]))
     if key == "motor_node" and abs(ratio - 1.0) > 1e-9:
         raise ConfigError(

@@ -41,7 +41,7 @@ from gensig.systems.supports import in_gearbox
 from gensig.units import from_si
 
 if TYPE_CHECKING:
-    from gensig.systems.spur_pair import StiffnessCurves
+    from gensig.systems.stiffness_curves import StiffnessCurves
 
 Array = NDArray[np.float64]
 
@@ -124,6 +124,11 @@ class PairMachine(ABC):
     def ratio(self) -> float:
         """Speed of the pinion's shaft over the one that ``operating`` is told for."""
         return 1.0
+
+    @property
+    def torque_of(self) -> str:
+        """What the set torque is that of, where it is not the driving shaft's own."""
+        return ""
 
     def mesh_torques(self, speed: float, torque: float) -> Array:
         """Loads that a tooth meets at a set-point, one a mesh, all equally likely, as torques of the pinion in N m.

@@ -193,8 +193,8 @@ def _refuse_line(config: Mapping[str, Any]) -> None:
     machine = section(config, "system")
     if machine.get("kind") == LINE:
         raise ConfigError(
-            f"system={machine.get('name')} is a drive line from tables, for gensig modes, forced-response, simulate, "
-            f"generate; this is done with system={', '.join(SYSTEMS)}"
+            f"system={machine.get('name')} is a drive line from tables, for gensig modes, forced-response, stiffness, "
+            f"simulate, generate; this is done with system={', '.join(SYSTEMS)}"
         )
 
 

@@ -38,7 +38,8 @@ class DriveLine:
 
     ``numbers`` (node,) as the table counts them, rings of dampers on from there; ``pairs`` (mesh,) the driving gear as
     pinion; ``record_mesh`` the numbers of the nodes whose mesh records are made of; ``slices_helical`` whether helical
-    meshes in time are sliced teeth; ``motor_node``, ``load_node`` those of a motor and its load.
+    meshes in time are sliced teeth; ``motor_node``, ``load_node`` those of a motor and its load; ``support_force`` N is
+    that for which the one support of all gears is taken, None without lateral motion.
     """
 
     name: str
@@ -51,6 +52,7 @@ class DriveLine:
     slices_helical: bool = False
     motor_node: int | None = None
     load_node: int | None = None
+    support_force: float | None = None
 
     def matrices(self, *, merge_rigid: bool = False) -> LineMatrices:
         """Mass, damping and stiffness, the meshes apart; merged for integration, as the table has them for modes."""
@@ -66,6 +68,13 @@ class DriveLine:
         speed = np.abs(self.line.speed_ratio)
         gears = self.line.gears
         return tuple(float(speed[gears[mesh.driving].node] * gears[mesh.driving].n_teeth) for mesh in self.line.meshes)
+
+    @property
+    def campbell_orders(self) -> tuple[float, ...]:
+        """Orders of the Campbell diagram: as given, or the turn, its double, every mesh and its double."""
+        if self.campbell.orders is not None:
+            return self.campbell.orders
+        return tuple(sorted({factor * order for order in (1.0, *self.mesh_orders) for factor in (1.0, 2.0)}))
 
 
 def read_drive_line(config: Mapping[str, Any]) -> DriveLine:
@@ -119,6 +128,7 @@ def read_drive_line(config: Mapping[str, Any]) -> DriveLine:
         slices_helical=options.helical_meshes == "sliced",
         motor_node=options.motor_node,
         load_node=options.load_node,
+        support_force=options.support.force if options.lateral else None,
     )
 
 

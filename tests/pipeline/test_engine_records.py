@@ -34,6 +34,17 @@ def test_a_set_is_whole_and_its_records_come_again(folder, capsys):
     assert main(["reproduce", str(folder), "--records", "2"]) == 0
 
 
+def test_simulate_shows_and_writes_a_record_of_the_engine(folder, tmp_path, capsys):
+    words = ["simulate", "--from", str(folder), "--record", "1", "--plot", str(tmp_path / "one.png")]
+    assert main([*words, "--output", str(tmp_path / "one.csv")]) == 0
+    told = capsys.readouterr().out
+    assert "flywheel_speed" in told
+    assert "rad/s " in told
+    with open(tmp_path / "one.csv") as file:
+        header = "time_s,flywheel_speed_rad_per_s,pump_end_speed_rad_per_s,pinion_rotation_rad_per_s2"
+        assert file.readline().startswith(header)
+
+
 def test_labels_units_and_columns_tell_gear_tooth_and_shaft(folder):
     with h5py.File(folder / "shards" / "shard-00000.h5") as file:
         units = [value.decode() for value in file.attrs["channel_units"]]

@@ -89,13 +89,13 @@ def test_your_own_tables_are_read_by_their_path(tmp_path):
 def test_the_page_on_your_own_line_runs_as_it_stands(tmp_path, capsys, monkeypatch):
     monkeypatch.chdir(tmp_path)
     page = HOWTO.read_text(encoding="utf-8")
-    for name, table in zip(("line.csv", "gears.csv"), blocks(page, "csv"), strict=True):
+    for name, table in zip(("line.csv", "gears.csv"), blocks(page, "csv")[:2], strict=True):
         (tmp_path / name).write_text(table, encoding="utf-8")
     command, *_ = blocks(page, "sh")  # the others make records: tests/pipeline/test_motor_records.py
     assert main(command.split()[1:]) == 0
     assert len(json.loads((tmp_path / "modes.json").read_text())["natural_frequencies_hz"]) == 4
     assert (tmp_path / "modes.png").stat().st_size > 1000
-    (option,) = blocks(page, "yaml")
+    option, *_ = blocks(page, "yaml")
     (tmp_path / "mine" / "system").mkdir(parents=True)
     (tmp_path / "mine" / "system" / "my_fan.yaml").write_text(option.replace("/data", str(tmp_path)), encoding="utf-8")
     assert modes_of(tmp_path, "system=my_fan", "--config-dir", "mine")["system"] == "my_fan"
@@ -147,7 +147,7 @@ def test_a_spoilt_table_names_row_and_column(tmp_path, capsys, node, column, val
         (["generate", ENGINE, "out=never"], "no excitation is chosen"),
         (["plan", ENGINE], "no excitation is chosen"),
         (["simulate", "system=two_stage_gearbox"], "no excitation is chosen"),
-        (["stiffness", ENGINE], "is a drive line from tables"),
+        (["stiffness", ENGINE], "no excitation is chosen"),
         (["transmission-error", ENGINE], "is a drive line from tables"),
         (["modify-flank", ENGINE, "--out", "best.yaml"], "is a drive line from tables"),
     ],

@@ -8,7 +8,7 @@ import pytest
 from line_tools import chain, constant_torques, state_after, two_gears
 
 from gensig.dynamics.line_course import LineCourse, ShaftTorque, constant_speed
-from gensig.dynamics.newmark import LineSolver, integrate_line, static_start
+from gensig.dynamics.newmark import LineSolver, _told_above, integrate_line, static_start
 from gensig.errors import ConfigError, GensigError, SimulationError
 
 SOLVER = LineSolver(sampling_rate=10240.0, oversampling=4, max_energy_residual=1e-3)
@@ -178,3 +178,10 @@ class TestRun:
         line = two_gears(backlash=1e-4)
         q = static_start(line, constant_speed(10.0), constant_torques([-10.0, 20.0]))
         assert line.meshes[0].direction @ q == pytest.approx(-1e-4 - 10.0 / 0.05 / 3e8, rel=1e-6)
+
+
+@pytest.mark.parametrize(
+    ("missed", "told"), [(0.0123456, "0.0123"), (1.0004e-3, "0.0010004"), (float("nan"), "nan"), (1e-3, "0.001")]
+)
+def test_a_residual_just_above_what_is_allowed_reads_above_it(missed, told):
+    assert _told_above(missed, 1e-3) == told

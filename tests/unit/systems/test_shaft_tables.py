@@ -54,6 +54,7 @@ def test_a_line_is_read_with_its_units(line_of):
     assert line.meshes[0].backlash == pytest.approx(80e-6)
     assert read.mesh_orders == (20.0,)
     assert read.numbers == (1, 2, 3, 4)
+    assert read.campbell_orders == (1.0, 2.0, 20.0, 40.0)
 
 
 def test_what_is_empty_is_derived(line_of):
@@ -208,6 +209,7 @@ def test_gears_that_lock_are_named(line_of):
         ({"loss_factor": {"shaft": 0}}, "system.loss_factor: missing coupling, gear_mesh"),
         ({"campbell": {"low_speed_rpm": 9, "high_speed_rpm": 3, "orders": [1]}}, "low_speed_rpm must lie between"),
         ({"campbell": {"low_speed_rpm": 0, "high_speed_rpm": 3, "orders": [0]}}, "all positive"),
+        ({"campbell": {"low_speed_rpm": 0, "high_speed_rpm": 3, "orders": []}}, "all positive"),
         ({"support": None}, "system.support = None must be a group of keys"),
         ({"latral": True}, "system: unknown key 'latral'; did you mean 'lateral'"),
     ],
