@@ -21,6 +21,7 @@ from diagnose.metrics import (
     recall,
     score_with_interval,
 )
+from diagnose.report import without_interval
 from diagnose.report_text import score_cell
 from diagnose.windows import SUBSETS, subset_segments, task_of
 from gensig.errors import DatasetError
@@ -88,6 +89,13 @@ def test_few_units_have_no_interval(n_units):
     assert score_cell({"balanced_accuracy": asdict(score)}).startswith(
         "0.50 [too few machines]" if n_units < LEAST_UNITS else "0.50 [0.50"
     )
+
+
+def test_why_there_is_no_interval_is_said_once():
+    few, many = ({"n_units": {"test": n}} for n in (2, 12))
+    (line,) = without_interval({"protocols": {"by_unit": few, "cross_speed": few, "cross_snr": many}, "novelty": {}})
+    assert line.startswith("by_unit, cross_speed: 2 test unit(s) are too few machines for an interval, 4 are the least")
+    assert without_interval({"protocols": {"by_unit": many}, "novelty": {}}) == []
 
 
 def test_interval_covers_the_truth_about_as_often_as_it_says():
