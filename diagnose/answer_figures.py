@@ -9,6 +9,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
+from diagnose.detection_limit import CURVE_NEEDS, records_behind, too_few_for_curve
 from diagnose.figures import COLORS, MARKERS, save, subplots
 
 PANELS_A_ROW = 5
@@ -73,7 +74,11 @@ def detection_figure(path: Path, answers: Answers) -> None:
             if alarms is not None:
                 panel.axhline(alarms, color=COLORS[index], linestyle=":", linewidth=1)
         _draw_limits(panel, detection[methods[0]]["classes"][name]["limits"])
-        panel.set(xlabel="severity (dotted: false alarms)", ylim=(-0.03, 1.03), title=name)
+        panel.set(xlabel="severity (dotted: false alarms)", ylim=(-0.03, 1.03))
+        mine = detection[methods[0]]["classes"][name]
+        panel.set_title(f"{name}: {records_behind(mine)}", fontsize=9)
+        if too_few_for_curve(mine):
+            panel.text(0.5, 0.5, f"too few: {CURVE_NEEDS}", fontsize=8, ha="center", transform=panel.transAxes)
         panel.grid(alpha=0.3)
     axes[0].set_ylabel("share of records found")
     axes[-1].legend(loc="best", fontsize=8)

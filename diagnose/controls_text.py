@@ -5,6 +5,8 @@ from __future__ import annotations
 from collections.abc import Mapping
 from typing import Any
 
+from diagnose.judged import interval_text
+from diagnose.metrics import is_above
 from diagnose.report_text import METHODS, score_cell
 from gensig.page import Section, Table
 
@@ -35,6 +37,8 @@ MEANING = {
 def verdict(method: Mapping[str, Any], chance: float) -> str:
     """What a control that must be at chance says."""
     score = method["balanced_accuracy"]
+    if score["low"] is None:
+        return "no verdict: too few machines"
     if score["low"] > chance:
         return "ABOVE chance: look for a leak"
     return "at chance" if score["high"] >= chance else "below chance: one interval in forty is, by luck"
@@ -70,7 +74,7 @@ def _rows(result: Mapping[str, Any], model: str) -> list[list[str]]:
     ]
     if "result_probe" in methods:
         probe = methods["result_probe"]
-        found = "follows the fault" if probe["balanced_accuracy"]["low"] > chance else "at chance"
+        found = "follows the fault" if is_above(probe["balanced_accuracy"], chance) else "at chance"
         rows.append(["result probe", score_cell(probe), found])
     if "oracle" in methods:
         chosen = {"oracle_network": model, "oracle_indicators": METHODS["indicators"]}
@@ -82,11 +86,10 @@ def _rows(result: Mapping[str, Any], model: str) -> list[list[str]]:
 
 def oracle_share(result: Mapping[str, Any]) -> str:
     """The network's score over the oracle's, with its interval."""
-    share = result["over_oracle"]["balanced_accuracy"]
-    return f"{share['mean']:.2f} [{share['low']:.2f}, {share['high']:.2f}]"
+    return interval_text(result["over_oracle"]["balanced_accuracy"])
 
 
 def oracle_verdict(result: Mapping[str, Any]) -> str:
     """Whether the oracle was a bound here."""
     share = result["over_oracle"]["balanced_accuracy"]
-    return "the oracle was not learnt: no bound here" if share["low"] > 1 else "share of what the oracle finds"
+    return "the oracle was not learnt: no bound here" if is_above(share, 1) else "share of what the oracle finds"

@@ -22,6 +22,7 @@ FALSE_ALARMS = 0.05
 RECORDS_A_GROUP = 8  # fewer say nothing of a share
 MOST_GROUPS = 5
 CURVE_POINTS = 41
+CURVE_NEEDS = f"a curve needs {LEAST_RECORDS} records of {LEAST_SIZES} severities"
 SIZE_FOLLOWS_SEVERITY = 0.95  # least rank correlation of a fault parameter that is called its size
 
 
@@ -287,7 +288,9 @@ def _curve(severity: FloatArray | None, found: FloatArray, weight: FloatArray) -
 def _sentence(name: str, found: Mapping[str, Any], false_alarms: Interval) -> str:
     rows = [row for row in found["limits"] if row["quantity"] == "severity"]
     alarms = f"at {false_alarms['mean']:.0%} false alarms" if false_alarms["mean"] is not None else ""
-    text = f"{name}: {interval_text(found['share_found'])} of the records found {alarms}"
+    text = f"{name}: {interval_text(found['share_found'])} of {records_behind(found)} found {alarms}"
+    if too_few_for_curve(found):
+        text += f"; from what severity on is not told: {CURVE_NEEDS}"
     for row in rows:
         text += f"; {row['share']:.0%} are found {_limit_text(row)}"
         others = [
@@ -298,6 +301,16 @@ def _sentence(name: str, found: Mapping[str, Any], false_alarms: Interval) -> st
         if row["status"] == "reached" and others:
             text += " (" + ", ".join(f"{other['quantity']} {_ends(other)}" for other in others) + ")"
     return text + "."
+
+
+def records_behind(found: Mapping[str, Any]) -> str:
+    """What a class's figures rest on."""
+    return f"{found['n_records']} records of {found['n_units']} machines"
+
+
+def too_few_for_curve(found: Mapping[str, Any]) -> bool:
+    """Whether the severity of a class varies, over too few records for a curve."""
+    return bool(found["by_severity"]) and not found["curve"]["severity"]
 
 
 def _limit_text(row: Mapping[str, Any]) -> str:

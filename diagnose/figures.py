@@ -46,7 +46,8 @@ def scores_figure(path: Path, metrics: Mapping[str, Any]) -> None:
                 continue
             score = result["methods"][name]["balanced_accuracy"]
             color = "0.6" if result["leaky"] else COLORS[0] if name == metrics["model"] else COLORS[-1]
-            panel.plot([score["low"], score["high"]], [place, place], color=color, linewidth=2)
+            if score["low"] is not None:
+                panel.plot([score["low"], score["high"]], [place, place], color=color, linewidth=2)
             panel.plot(score["mean"], place, color=color, marker="o")
         panel.set_yticks(range(len(methods)), [name.replace("_", " ") for name in reversed(methods)])
         title = protocol + ("\nLEAKY: not a result" if result["leaky"] else "")

@@ -11,7 +11,8 @@ import torch
 from numpy.typing import NDArray
 from torch.nn.functional import log_softmax
 
-from diagnose.metrics import confusion_by_unit, over_records, score_with_interval
+from diagnose.judged import interval_text
+from diagnose.metrics import confusion_by_unit, over_records, percentile_interval, score_with_interval
 from diagnose.network import GEARS, Network
 from diagnose.targets import record_targets
 from diagnose.windows import Task, WindowSet
@@ -108,12 +109,12 @@ def _severity_error(
     counts = np.bincount(position)
     times_drawn = rng.multinomial(names.size, np.full(names.size, 1 / names.size), size=n_bootstrap)
     means = (times_drawn @ np.bincount(position, weights=error)) / (times_drawn @ counts)
-    low, high = np.quantile(means, [0.025, 0.975])
+    low, high = percentile_interval(means, names.size)
     usual = in_training[~np.isnan(in_training)]
     return {
         "mean": float(error.mean()),
-        "low": float(low),
-        "high": float(high),
+        "low": low,
+        "high": high,
         "constant": float(np.abs(np.median(usual) - truth).mean()) if usual.size else None,
         "n_records": int(truth.size),
     }
@@ -124,17 +125,15 @@ def heads_notes(clean: Mapping[str, Any]) -> list[tuple[str, str]]:
     notes = []
     for name, result in clean.items():
         said = [
-            f"severity of {kind} off by {_interval(row, '.3f')}"
+            f"severity of {kind} off by {interval_text(row, '.3f')}"
             + ("" if row["constant"] is None else f", by {row['constant']:.3f} if its usual one is said of all")
             for kind, row in result["heads"].get("severity_mae", {}).items()
         ]
         if "faulted_gear" in result["heads"]:
             gear = result["heads"]["faulted_gear"]
-            said.append(f"faulted gear {_interval(gear['balanced_accuracy'], '.2f')}, {gear['chance']:.2f} by chance")
+            said.append(
+                f"faulted gear {interval_text(gear['balanced_accuracy'], '.2f')}, {gear['chance']:.2f} by chance"
+            )
         if said:
             notes.append((f"{name}, severity and gear", "; ".join(said) + "."))
     return notes
-
-
-def _interval(score: Mapping[str, Any], form: str) -> str:
-    return f"{score['mean']:{form}} [{score['low']:{form}}, {score['high']:{form}}]"

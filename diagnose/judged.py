@@ -2,18 +2,21 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable
+from collections.abc import Callable, Mapping
 from dataclasses import dataclass, replace
+from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
 
-from diagnose.metrics import balanced_accuracy
+from diagnose.metrics import LEAST_UNITS, balanced_accuracy
 
 IntArray = NDArray[np.integer]
 FloatArray = NDArray[np.floating]
 BoolArray = NDArray[np.bool_]
 Interval = dict[str, float | None]
+
+NO_INTERVAL = "[too few machines]"
 
 
 def share_right(confusion: NDArray[np.integer]) -> FloatArray:
@@ -105,7 +108,7 @@ def score(judged: Judged, measure: str) -> float:
 
 
 def with_interval(value: float, resampled: FloatArray, n_units: int) -> Interval:
-    """Value with its 95 % percentile interval; no interval (None) for fewer than two units, which show no spread.
+    """Value with its 95 % percentile interval; None for fewer units than `diagnose.metrics.LEAST_UNITS`.
 
     Parameters
     ----------
@@ -116,7 +119,7 @@ def with_interval(value: float, resampled: FloatArray, n_units: int) -> Interval
     Source: Efron & Tibshirani (1993), section 13.3.
     """
     known = resampled[~np.isnan(resampled)]
-    if n_units < 2 or not known.size:
+    if n_units < LEAST_UNITS or not known.size:
         return {"mean": finite(value), "low": None, "high": None}
     low, high = np.quantile(known, [0.025, 0.975], method="inverted_cdf")
     return {"mean": finite(value), "low": finite(low), "high": finite(high)}
@@ -146,12 +149,12 @@ def finite(value: float) -> float | None:
     return float(value) if np.isfinite(value) else None
 
 
-def interval_text(scored: Interval, form: str = ".2f") -> str:
-    """Value and interval in words, as ``0.53 [0.46, 0.59]``."""
+def interval_text(scored: Mapping[str, Any], form: str = ".2f") -> str:
+    """Value and interval in words, as ``0.53 [0.46, 0.59]``, or `NO_INTERVAL` behind a value that has none."""
     mean, low, high = (scored[key] for key in ("mean", "low", "high"))
     if mean is None:
         return "unknown"
     if low is None and high is None:
-        return f"{mean:{form}} (no interval: too few units)"
+        return f"{mean:{form}} {NO_INTERVAL}"
     ends = ["?" if end is None else f"{end:{form}}" for end in (low, high)]
     return f"{mean:{form}} [{ends[0]}, {ends[1]}]"

@@ -3,7 +3,9 @@
 from __future__ import annotations
 
 import warnings
+from collections.abc import Mapping
 from dataclasses import dataclass
+from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
@@ -12,14 +14,18 @@ IntArray = NDArray[np.integer]
 FloatArray = NDArray[np.floating]
 CountArray = NDArray[np.integer]
 
+# Of n units one resample in n^n holds the worst alone: of three or fewer more than 2.5 % do, and a 95 % interval would
+# end at the worst and the best unit, of zero width where they agree.
+LEAST_UNITS = 4
+
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Score:
-    """Mean over seeds, its 95 % interval over units, and each seed's own value."""
+    """Mean over seeds, its 95 % interval over units (None for fewer than `LEAST_UNITS`), and each seed's own value."""
 
     mean: float
-    low: float
-    high: float
+    low: float | None
+    high: float | None
     per_seed: tuple[float, ...]
 
 
@@ -88,7 +94,7 @@ def score_with_interval(
     shuffled : whether the labels of the training were shuffled; the interval then covers the luck of the shuffle too
 
     Source: percentile interval of Efron & Tibshirani (1993), "An introduction to the bootstrap", section 13.3. With few
-    units it is too narrow: it is no wider than what the units at hand show.
+    units it is too narrow: it is no wider than what the units at hand show. Fewer than `LEAST_UNITS` give none.
     """
     score = SCORES[name]
     per_seed = score(confusion.sum(axis=1))
@@ -97,11 +103,21 @@ def score_with_interval(
     resampled = score(np.einsum("bu,sutp->bstp", times_drawn, confusion))
     if shuffled:
         resampled = resampled + _renaming_luck(name, confusion.sum(axis=1), n_bootstrap, rng)
-    means = _over_drawn_seeds(resampled, rng)
-    low, high = np.clip(np.nanquantile(means, [0.025, 0.975]), 0, 1)
-    return Score(
-        mean=float(np.mean(per_seed)), low=float(low), high=float(high), per_seed=tuple(float(v) for v in per_seed)
-    )
+    low, high = percentile_interval(np.clip(_over_drawn_seeds(resampled, rng), 0, 1), n_units)
+    return Score(mean=float(np.mean(per_seed)), low=low, high=high, per_seed=tuple(float(v) for v in per_seed))
+
+
+def percentile_interval(resampled: FloatArray, n_units: int) -> tuple[float, float] | tuple[None, None]:
+    """95 % interval of (resample,) values, NaN left out; None for fewer than `LEAST_UNITS`."""
+    if n_units < LEAST_UNITS:
+        return None, None
+    low, high = np.nanquantile(resampled, [0.025, 0.975])
+    return float(low), float(high)
+
+
+def is_above(score: Mapping[str, Any], level: float) -> bool:
+    """Whether a whole interval lies above a level; False where there is no interval."""
+    return score["low"] is not None and bool(score["low"] > level)
 
 
 def ratio_with_interval(
@@ -111,7 +127,7 @@ def ratio_with_interval(
     *,
     n_bootstrap: int,
     rng: np.random.Generator,
-) -> dict[str, float]:
+) -> dict[str, float | None]:
     """Score over that of a reference on the same units, each a mean over its seeds, with a 95 % interval.
 
     Parameters
@@ -123,7 +139,7 @@ def ratio_with_interval(
 
     Returns
     -------
-    ``mean``, ``low``, ``high``
+    ``mean``, ``low``, ``high``; the last two None for fewer than `LEAST_UNITS`
     """
     score, n_units = SCORES[name], confusion.shape[1]
     times_drawn = rng.multinomial(n_units, np.full(n_units, 1 / n_units), size=n_bootstrap)
@@ -132,9 +148,9 @@ def ratio_with_interval(
         for counts in (confusion, reference)
     )
     least = np.finfo(float).tiny  # a reference that finds nothing in a resample
-    low, high = np.nanquantile(above / np.maximum(below, least), [0.025, 0.975])
+    low, high = percentile_interval(above / np.maximum(below, least), n_units)
     mean = np.mean(score(confusion.sum(axis=1))) / max(np.mean(score(reference.sum(axis=1))), least)
-    return {"mean": float(mean), "low": float(low), "high": float(high)}
+    return {"mean": float(mean), "low": low, "high": high}
 
 
 def _over_drawn_seeds(resampled: FloatArray, rng: np.random.Generator) -> FloatArray:

@@ -56,6 +56,7 @@ class ModelDescription:
     temperature: float = 1.0  # see `diagnose.calibration`; models of before have none
     test_channel_names: tuple[str, ...] | None = None  # of protocol cross_sensor
     adaptation: dict[str, Any] | None = None  # see `diagnose.machine`; None as trained
+    test_score: dict[str, Any] | None = None  # see `diagnose.study.test_score`; models of before have none
     remaining_life: dict[str, Any] | None = None  # see `diagnose.life_io`; None for a classifier
 
     def __post_init__(self) -> None:
@@ -263,7 +264,7 @@ def read_description(folder: str | Path) -> ModelDescription:
         if content.get("n_teeth") is not None:
             driving, driven = content["n_teeth"]
             content["n_teeth"] = (int(driving), int(driven))
-        for name in ("out_of_distribution", "adaptation", "remaining_life"):
+        for name in ("out_of_distribution", "adaptation", "remaining_life", "test_score"):
             if content.get(name) is not None:
                 content[name] = dict(content[name])
         return ModelDescription(**content)

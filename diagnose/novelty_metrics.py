@@ -11,7 +11,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from diagnose.metrics import Score, confusion_by_unit, score_with_interval
+from diagnose.metrics import Score, confusion_by_unit, percentile_interval, score_with_interval
 from diagnose.novelty import NoveltyRun
 from diagnose.windows import SUBSETS, Task, subset_segments
 from gensig.errors import ConfigError
@@ -191,7 +191,7 @@ def _area(scores: FloatArray, novel: Mask, unit: IntArray, drawn: IntArray, seed
     pairs = pairs * (drawn @ np.bincount(unit[~novel], minlength=drawn.shape[1]))
     total = np.einsum("bu,suv,bv->bs", drawn, won, drawn, optimize=True)
     resampled = np.divide(total, pairs[:, None], out=np.full(total.shape, np.nan), where=pairs[:, None] > 0)
-    return _score([float(roc_auc_score(novel, score)) for score in scores], resampled, seeds)
+    return _score([float(roc_auc_score(novel, score)) for score in scores], resampled, seeds, drawn.shape[1])
 
 
 def _won_by_units(score: FloatArray, novel: Mask, unit: IntArray, n_units: int) -> FloatArray:
@@ -211,7 +211,7 @@ def _share(alarm: Mask, chosen: Mask, unit: IntArray, drawn: IntArray, seeds: In
     total = drawn @ np.bincount(unit[chosen], minlength=n_units)
     raised = drawn @ hits.T
     resampled = np.divide(raised, total[:, None], out=np.full(raised.shape, np.nan), where=total[:, None] > 0)
-    return _score([float(row[chosen].mean()) for row in alarm], resampled, seeds)
+    return _score([float(row[chosen].mean()) for row in alarm], resampled, seeds, drawn.shape[1])
 
 
 def _false_positives(scores: FloatArray, novel: Mask, unit: IntArray, drawn: IntArray, seeds: IntArray) -> Score:
@@ -220,11 +220,11 @@ def _false_positives(scores: FloatArray, novel: Mask, unit: IntArray, drawn: Int
         return [false_positive_rate_95(novel, score, weight) if whole else np.nan for score in scores]
 
     resampled = np.array([resample(times[unit].astype(float)) for times in drawn])
-    return _score([false_positive_rate_95(novel, score) for score in scores], resampled, seeds)
+    return _score([false_positive_rate_95(novel, score) for score in scores], resampled, seeds, drawn.shape[1])
 
 
-def _score(per_seed: list[float], resampled: FloatArray, seeds: IntArray) -> Score:
+def _score(per_seed: list[float], resampled: FloatArray, seeds: IntArray, n_units: int) -> Score:
     """Percentile interval of (resample, seed) values over drawn seeds, as `diagnose.metrics.score_with_interval`."""
     means = np.take_along_axis(resampled, seeds, axis=1).mean(axis=1)
-    low, high = np.nanquantile(means, [0.025, 0.975])
-    return Score(mean=float(np.mean(per_seed)), low=float(low), high=float(high), per_seed=tuple(per_seed))
+    low, high = percentile_interval(means, n_units)
+    return Score(mean=float(np.mean(per_seed)), low=low, high=high, per_seed=tuple(per_seed))

@@ -5,6 +5,7 @@ from __future__ import annotations
 from collections.abc import Mapping
 from typing import Any
 
+from diagnose.judged import interval_text
 from diagnose.novelty_metrics import FALSE_ALARMS, LEAST_VALIDATION, TRUE_POSITIVES
 from gensig.page import Section, Table
 
@@ -121,4 +122,4 @@ def _table(result: Mapping[str, Any]) -> Table:
 
 
 def _cell(score: Mapping[str, Any] | None) -> str:
-    return "-" if score is None else f"{score['mean']:.2f} [{score['low']:.2f}, {score['high']:.2f}]"
+    return "-" if score is None else interval_text(score)

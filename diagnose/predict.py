@@ -12,8 +12,10 @@ from numpy.typing import NDArray
 
 from diagnose.calibration import probabilities
 from diagnose.turns import packed_turns, turn_set, wants_turns
+from diagnose.verdict import class_text, score_text, verdict
 from diagnose.windows import Segments, WindowSet, plan_windows
 from gensig.errors import ConfigError
+from gensig.signals.mesh_motion import in_hertz
 from gensig.signals.recording import Recording, RecordingFile, read_file, recording_of, without_unit
 from gensig.signals.resampling import rate_change
 
@@ -109,11 +111,11 @@ def predict_recording(
     reasons = reasons_unlike(description, source, tracked, beyond)
     names, rate = description.class_names, description.sampling_rate_hz
     said = {name: values[0] for name, values in predict_heads(model, windows).items()}
+    by_class = dict(zip(names, overall.tolist(), strict=True))
     return {
         "recording": source.file,
-        "class": names[int(overall.argmax())],
-        "probability": float(overall.max()),
-        "probabilities": dict(zip(names, overall.tolist(), strict=True)),
+        **verdict(by_class, description.test_score),
+        "probabilities": by_class,
         "severity": float(said["severity"][overall.argmax()]) if "severity" in said else None,
         "gear": GEARS[int(said["gear"].argmax())] if "gear" in said else None,
         "out_of_distribution": None if beyond is None and not reasons else bool(reasons),
@@ -156,8 +158,8 @@ def windows_of(
 
 def summary(result: dict[str, Any]) -> str:
     """One line for people."""
-    said = f"{result['recording']}: {result['class']}, probability {result['probability']:.2f}"
-    if result["severity"] is not None and result["gear"] not in (None, "none"):
+    said = f"{result['recording']}: {class_text(result)}"
+    if result["severity"] is not None and result["gear"] not in (None, "none") and not result["undecided"]:
         said += f", severity {result['severity']:.2f} on the {result['gear']}"
     if tracking := result["order_tracking"]:
         low, high = tracking["speed_range_rpm"]
@@ -168,8 +170,8 @@ def summary(result: dict[str, Any]) -> str:
     if result["out_of_distribution"]:
         return f"{said}; OUT OF DISTRIBUTION, do not rely on the class: {'; '.join(result['reasons'])}"
     if beyond is None:
-        return f"{said}; no out-of-distribution flag: the model stores none, train it again"
-    return f"{said}; like the training data ({beyond} of {n_windows} windows beyond it)"
+        return f"{said}; no out-of-distribution flag: the model stores none, train it again; {score_text(result)}"
+    return f"{said}; like the training data ({beyond} of {n_windows} windows beyond it); {score_text(result)}"
 
 
 def reasons_unlike(
@@ -188,7 +190,8 @@ def reasons_unlike(
             if speed and not low * (1 - SPEED_TOLERANCE) <= speed <= high * (1 + SPEED_TOLERANCE)
         ]
         if outside:
-            reasons.append(f"{outside[-1]:g} r/min is outside the {low:.0f} to {high:.0f} r/min of the training")
+            hint = in_hertz(outside[-1]) if low <= 60.0 * outside[-1] <= high else ""
+            reasons.append(f"{outside[-1]:g} r/min is outside the {low:.0f} to {high:.0f} r/min of the training{hint}")
     if source.teeth is not None and description.n_teeth is not None and source.teeth != description.n_teeth:
         given, known = ("/".join(map(str, teeth)) for teeth in (source.teeth, description.n_teeth))
         reasons.append(f"the gears have {given} teeth, those of the training {known}")

@@ -12,6 +12,7 @@ from diagnose.answer_tables import write_tables
 from diagnose.controls_text import controls_section
 from diagnose.figures import confusion_figure, reliability_figure, scores_figure
 from diagnose.heads import heads_notes
+from diagnose.metrics import LEAST_UNITS
 from diagnose.novelty_report import novelty_sections
 from diagnose.protocols import MEANING
 from diagnose.report_text import (
@@ -20,6 +21,7 @@ from diagnose.report_text import (
     answer_card,
     caveats,
     confusions,
+    few_machines,
     recall_table,
     score_cell,
     trust_table,
@@ -51,6 +53,13 @@ def result_table(metrics: Mapping[str, Any]) -> list[str]:
         label = f"*{name}* (LEAKY: not a result)" if number in table.quiet else f"**{name}**"
         lines.append("| " + " | ".join([label, *cells]) + " |")
     return lines
+
+
+def without_interval(metrics: Mapping[str, Any]) -> list[str]:
+    """Why scores stand there without an interval, once, and of which protocols."""
+    units = {name: one["n_units"]["test"] for name, one in {**metrics["protocols"], **metrics["novelty"]}.items()}
+    few = {name: n_units for name, n_units in units.items() if n_units < LEAST_UNITS}
+    return [f"{', '.join(few)}: {few_machines(min(few.values()))}"] if few else []
 
 
 def _score_table(metrics: Mapping[str, Any]) -> Table:

@@ -7,6 +7,8 @@ from typing import Any
 
 import numpy as np
 
+from diagnose.judged import interval_text
+from diagnose.metrics import LEAST_UNITS, is_above
 from diagnose.novelty_report import novelty_caveats
 from gensig.page import Card, Table
 
@@ -54,20 +56,22 @@ def score_cell(method: Mapping[str, Any] | None) -> str:
     value = method["balanced_accuracy"]
     if isinstance(value, float):
         return f"{value:.2f}"
-    return f"{value['mean']:.2f} [{value['low']:.2f}, {value['high']:.2f}]"
+    return interval_text(value)
 
 
 def answer_card(name: str, result: Mapping[str, Any], model: str, meaning: str) -> Card:
     """One protocol's score against chance, the best baseline and the shuffled labels."""
     methods = result["methods"]
     score, chance = methods[model]["balanced_accuracy"], methods["chance"]["balanced_accuracy"]
-    value, spread = f"{score['mean']:.2f}", f"{score['low']:.2f} to {score['high']:.2f}"
+    value, spread = f"{score['mean']:.2f}", _spread(score)
     if result["leaky"]:
         title, meaning = f"{name} (LEAKY)", _sentence(meaning)
         return Card(title=title, value=value, spread=spread, verdict="not a result", meaning=meaning, mark="quiet")
-    above = score["low"] > chance
+    above = is_above(score, chance)
     verdict = [f"{'above chance' if above else 'not distinguishable from chance'} ({chance:.2f})"]
-    if others := {key: methods[key]["balanced_accuracy"]["mean"] for key in RIVALS if key in methods}:
+    if score["low"] is None:
+        verdict = [f"no verdict against chance ({chance:.2f}): too few machines"]
+    elif others := {key: methods[key]["balanced_accuracy"]["mean"] for key in RIVALS if key in methods}:
         best = max(others, key=lambda key: others[key])
         # an interval that holds the other's mean tells the two apart neither way
         better, worse = score["low"] > others[best], score["high"] < others[best]
@@ -76,13 +80,14 @@ def answer_card(name: str, result: Mapping[str, Any], model: str, meaning: str) 
     leak = False
     if "oracle" in methods:
         share, best = result["over_oracle"]["balanced_accuracy"], methods["oracle"]["balanced_accuracy"]
-        spread_of_share = f"{share['low']:.2f} to {share['high']:.2f}"
-        verdict.append(f"{share['mean']:.2f} ({spread_of_share}) of the oracle ({best['mean']:.2f})")
+        verdict.append(f"{share['mean']:.2f} ({_spread(share)}) of the oracle ({best['mean']:.2f})")
     for key, control in MUST_BE_AT_CHANCE.items():
         if key in methods:
             found = methods[key]["balanced_accuracy"]
-            above_chance = found["low"] > chance
+            above_chance = is_above(found, chance)
             leak |= above_chance
+            if found["low"] is None:
+                continue
             verdict.append(
                 f"{control} ABOVE chance ({found['mean']:.2f}): look for a leak"
                 if above_chance
@@ -91,6 +96,10 @@ def answer_card(name: str, result: Mapping[str, Any], model: str, meaning: str) 
     mark = "good" if above and not leak else "bad"
     text = _sentence(meaning if meaning.startswith("tested") else f"tested {meaning}")
     return Card(title=name, value=value, spread=spread, verdict="; ".join(verdict), meaning=text, mark=mark)
+
+
+def _spread(score: Mapping[str, Any]) -> str:
+    return "too few machines" if score["low"] is None else f"{score['low']:.2f} to {score['high']:.2f}"
 
 
 def _sentence(text: str) -> str:
@@ -153,12 +162,22 @@ def trust_table(clean: Mapping[str, Any]) -> Table:
     return Table(head=head, rows=rows)
 
 
+def few_machines(n_units: int) -> str:
+    """Why there is no interval."""
+    return (
+        f"{n_units} test unit(s) are too few machines for an interval, {LEAST_UNITS} are the least and {FEW_UNITS} "
+        "advisable: a score of so few says little of others."
+    )
+
+
 def caveats(metrics: Mapping[str, Any]) -> list[str]:
     """What a reader must know before using the scores."""
     lines = ["Simulated vibration. A score here says nothing yet about measured machines."]
     for name, result in metrics["protocols"].items():
         n_units = result["n_units"]["test"]
-        if n_units < FEW_UNITS and not result["leaky"]:
+        if n_units < LEAST_UNITS:
+            lines.append(f"{name}: {few_machines(n_units)}")
+        elif n_units < FEW_UNITS and not result["leaky"]:
             lines.append(
                 f"{name}: only {n_units} test unit(s). The interval shows the spread of these units and is too "
                 f"narrow for new ones; at least {FEW_UNITS} are advisable."

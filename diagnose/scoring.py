@@ -14,6 +14,7 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 from numpy.typing import NDArray
 
+from diagnose.judged import interval_text
 from diagnose.study import is_leaky, score_predictions
 from diagnose.windows import Task, subset_segments, task_of
 from gensig.dataset.layout import PLAN, SPLITS
@@ -192,6 +193,5 @@ def score_table(result: Mapping[str, Any]) -> list[str]:
             *((f"{name} (shipped)", score) for name, score in shipped.get(protocol, {}).items()),
         ]
         for name, score in rows:
-            value = f"{score['mean']:.3f} [{score['low']:.3f}, {score['high']:.3f}]"
-            lines.append(f"| {protocol} | {name} | {value} | {result['chance'][protocol]:.3f} |")
+            lines.append(f"| {protocol} | {name} | {interval_text(score, '.3f')} | {result['chance'][protocol]:.3f} |")
     return lines

@@ -156,7 +156,9 @@ def run_study(
             target = folder / "models" / f"{prediction.protocol}-seed{prediction.seed}"
             parts = [part for part in (prediction.domain, prediction.healthy) if part is not None]
             known = {name: tensor for part in parts for name, tensor in part.tensors().items()}
-            save_model(target, prediction.weights | known, model_description(task, settings, prediction))
+            described = model_description(task, settings, prediction)
+            described = replace(described, test_score=test_score(task, prediction, settings.n_bootstrap))
+            save_model(target, prediction.weights | known, described)
     own = without_sham(predictions)
     write_predictions(folder / "predictions.csv", task, own)
     if novelty:
@@ -220,6 +222,18 @@ def score_predictions(
         name: float(share) for name, share in zip(task.class_names, recall(total), strict=True) if np.isfinite(share)
     }
     return {**scores, "confusion": total.tolist(), "recall": shares}
+
+
+def test_score(task: Task, prediction: Prediction, n_bootstrap: int) -> dict[str, Any]:
+    """What is stored with a network of what it scored: balanced accuracy with its interval, chance, and on how much."""
+    scores = score_predictions(task, [(prediction.record, prediction.predicted)], n_bootstrap)["balanced_accuracy"]
+    return {
+        "balanced_accuracy": {key: scores[key] for key in ("mean", "low", "high")},
+        "chance": 1.0 / int(np.unique(task.labels()[prediction.record]).size),
+        "n_records": int(prediction.record.size),
+        "n_units": int(np.unique(np.asarray(task.dataset.column("unit_id"))[prediction.record]).size),
+        "leaky": is_leaky(prediction.protocol),
+    }
 
 
 def _confusion(task: Task, runs: Sequence[tuple[NDArray[np.integer], NDArray[np.integer]]]) -> NDArray[np.int64]:

@@ -66,5 +66,5 @@ def write_scores(out: str | Path, protocols: Mapping[str, Any]) -> None:
                     score = scores.get(name)
                     parts = {"mean": score} if isinstance(score, float) else score or {}
                     for part in ("mean", "low", "high"):
-                        if part in parts:
+                        if parts.get(part) is not None:
                             writer.add_scalar(f"{name}/{method}/{part}", parts[part], 0)

@@ -5,6 +5,7 @@ from __future__ import annotations
 import csv
 import math
 from pathlib import Path
+from typing import TextIO
 
 import numpy as np
 from numpy.typing import NDArray
@@ -30,7 +31,7 @@ def read_table(key: str, file: str, *, least_rows: int) -> tuple[list[str], Arra
         if path.stat().st_size > MOST_BYTES:
             raise ConfigError(f"{where} is larger than {MOST_BYTES // 1_000_000} MB; cut it")
         with path.open(newline="", encoding="utf-8-sig") as stream:
-            names = [name.strip() for name in next(csv.reader(stream), [])]
+            names = _header(where, stream)
             values = np.loadtxt(stream, delimiter=",", ndmin=2, dtype=np.float64)
     except (OSError, UnicodeDecodeError, csv.Error) as error:
         reason = error.strerror if isinstance(error, OSError) else "it is no text in UTF-8"
@@ -46,6 +47,30 @@ def read_table(key: str, file: str, *, least_rows: int) -> tuple[list[str], Arra
         row, column = bad[0]
         raise ConfigError(f"{where}: row {row + 2}, column {names[column]} is no finite number")
     return names, np.ascontiguousarray(values.T)
+
+
+def _header(where: str, stream: TextIO) -> list[str]:
+    """Names of the columns; refuses what is no header of commas."""
+    line = stream.readline()
+    for separator, called in ((";", "';'"), ("\t", "tabs")):
+        if separator in line:
+            raise ConfigError(
+                f"{where}: its columns are separated by {called}: save it with commas, decimals with points"
+            )
+    names = [name.strip() for name in next(csv.reader([line]), [])]
+    if any(map(_is_number, names)):
+        raise ConfigError(
+            f"{where}: its first line holds numbers, not names; put a line before it that names each column, for "
+            "instance time_s,housing"
+        )
+    return names
+
+
+def _is_number(text: str) -> bool:
+    try:
+        return math.isfinite(float(text))
+    except ValueError:
+        return False
 
 
 def check_columns(key: str, file: str, found: list[str], wanted: list[str]) -> None:

@@ -65,7 +65,10 @@ def run(words: Sequence[str]) -> int:
     print(f"channels {', '.join(result['channel_names'])}")
     for name in ("balanced_accuracy", "macro_f1"):
         score = result[name]
-        print(f"{name} {score['mean']:.3f}, 95 % interval over units {score['low']:.3f} to {score['high']:.3f}")
+        spread = "no 95 % interval: too few machines"
+        if score["low"] is not None:
+            spread = f"95 % interval over units {score['low']:.3f} to {score['high']:.3f}"
+        print(f"{name} {score['mean']:.3f}, {spread}")
     for name, share in result["recall"].items():
         print(f"recall {name} {share:.3f}")
     if out is not None:

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from argparse import ArgumentParser, Namespace
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
 from typing import TYPE_CHECKING, Any
 
 from diagnose.commands.parser import Parser, verb_parser
@@ -42,7 +42,9 @@ def parser() -> Parser:
 
 def add_arguments(parser: ArgumentParser) -> None:
     """What can be typed behind the verb."""
-    parser.add_argument("recording", metavar="RECORDING", help=".csv, .wav, .npy, .npz, .h5, .hdf5 or .mat")
+    parser.add_argument(
+        "recording", metavar="RECORDING", nargs="+", help="one or more: .csv, .wav, .npy, .npz, .h5, .hdf5 or .mat"
+    )
     parser.add_argument("--model", required=True, metavar="DIR", help="folder that diagnose train wrote below models/")
     parser.add_argument("--sampling-rate", type=float, metavar="HZ", help="samples a second, where the file is silent")
     parser.add_argument("--speed-rpm", type=float, metavar="RPM", help="of the driving shaft: was it trained at such?")
@@ -61,55 +63,71 @@ def add_arguments(parser: ArgumentParser) -> None:
 
 def run(words: Sequence[str]) -> int:
     """Print class probabilities; the exit status tells of a recording unlike the training data."""
-    arguments = parser().parse_args(words)
-    from diagnose.model_io import load_domain, load_model, read_description
-    from diagnose.predict import Source, predict_recording, summary
+    arguments = parser().parse_intermixed_args(words)
+    from diagnose.predict import Source
 
-    source = Source(
-        file=arguments.recording,
-        sampling_rate=arguments.sampling_rate,
-        speed_rpm=arguments.speed_rpm,
-        teeth=None if arguments.teeth is None else tuple(arguments.teeth),
-        tacho=arguments.tacho,
-        pulses_per_turn=arguments.pulses_per_turn,
-        as_recorded=arguments.as_recorded,
-        to_speed_rpm=arguments.to_speed,
-        channels=None if arguments.channels is None else tuple(arguments.channels),
-        unit=arguments.unit,
-        array=arguments.array,
-    )
-    if read_description(arguments.model).remaining_life is not None:
-        result, line = _predict_life(arguments, source)
-    else:
-        for option in ("torque_nm", "life_time_h"):
-            if getattr(arguments, option) is not None:
-                raise ConfigError(f"--{option.replace('_', '-')} is for models of remaining life; leave it out")
-        model, description = load_model(arguments.model)
-        result = predict_recording(model, description, load_domain(arguments.model, description), source)
-        line = summary(result)
+    sources = [
+        Source(
+            file=recording,
+            sampling_rate=arguments.sampling_rate,
+            speed_rpm=arguments.speed_rpm,
+            teeth=None if arguments.teeth is None else tuple(arguments.teeth),
+            tacho=arguments.tacho,
+            pulses_per_turn=arguments.pulses_per_turn,
+            as_recorded=arguments.as_recorded,
+            to_speed_rpm=arguments.to_speed,
+            channels=None if arguments.channels is None else tuple(arguments.channels),
+            unit=arguments.unit,
+            array=arguments.array,
+        )
+        for recording in arguments.recording
+    ]
+    answers = _answers(arguments)
+    results = []
+    for source in sources:
+        result, line = answers(source)
+        results.append({"model": arguments.model, **result})
+        if not arguments.json:
+            print(line, flush=True)
     if arguments.json:
         import json
 
-        print(json.dumps({"model": arguments.model, **result}, indent=2, allow_nan=False))
-    else:
-        print(line)
-    return OUT_OF_DISTRIBUTION if result["out_of_distribution"] else 0
+        print(json.dumps(results[0] if len(results) == 1 else results, indent=2, allow_nan=False))
+    return OUT_OF_DISTRIBUTION if any(result["out_of_distribution"] for result in results) else 0
 
 
-def _predict_life(arguments: Namespace, source: Source) -> tuple[dict[str, Any], str]:
-    """Everything that is said of a remaining life, and the line for people."""
+def _answers(arguments: Namespace) -> Callable[[Source], tuple[dict[str, Any], str]]:
+    """What answers for a recording: everything that is said of it, and the line for people."""
+    from diagnose.model_io import load_domain, load_model, read_description
+    from diagnose.predict import predict_recording, summary
+
+    if read_description(arguments.model).remaining_life is not None:
+        return _life_answers(arguments)
+    for option in ("torque_nm", "life_time_h"):
+        if getattr(arguments, option) is not None:
+            raise ConfigError(f"--{option.replace('_', '-')} is for models of remaining life; leave it out")
+    model, description = load_model(arguments.model)
+    domain = load_domain(arguments.model, description)
+
+    def answer(source: Source) -> tuple[dict[str, Any], str]:
+        result = predict_recording(model, description, domain, source)
+        return result, summary(result)
+
+    return answer
+
+
+def _life_answers(arguments: Namespace) -> Callable[[Source], tuple[dict[str, Any], str]]:
+    """The same of a remaining life."""
     from diagnose.life_io import load_life_model
     from diagnose.life_predict import life_summary, predict_life
     from diagnose.model_io import load_domain
 
     model, description, facts = load_life_model(arguments.model)
-    result = predict_life(
-        model,
-        description,
-        facts,
-        load_domain(arguments.model, description),
-        source,
-        torque_nm=arguments.torque_nm,
-        life_time_h=arguments.life_time_h,
-    )
-    return result, life_summary(result)
+    domain = load_domain(arguments.model, description)
+    told = {"torque_nm": arguments.torque_nm, "life_time_h": arguments.life_time_h}
+
+    def answer(source: Source) -> tuple[dict[str, Any], str]:
+        result = predict_life(model, description, facts, domain, source, **told)
+        return result, life_summary(result)
+
+    return answer

@@ -90,7 +90,7 @@ def _train_one(config: dict[str, Any]) -> None:
     from diagnose.novelty_report import novelty_tables
     from diagnose.progress import progress
     from diagnose.protocols import choose_protocols
-    from diagnose.report import result_table, write_report
+    from diagnose.report import result_table, without_interval, write_report
     from diagnose.study import plan_study, run_study, settings_for, task_from
     from gensig.dataset.reader import open_dataset
 
@@ -104,7 +104,7 @@ def _train_one(config: dict[str, Any]) -> None:
     with progress(len(jobs)) as on_done:
         metrics = run_study(task, settings, out, protocols=protocols, jobs=jobs, on_done=on_done)
     page = write_report(out, metrics)
-    print("\n".join([*result_table(metrics), *novelty_tables(metrics["novelty"])]))
+    print("\n".join([*result_table(metrics), *novelty_tables(metrics["novelty"]), *without_interval(metrics)]))
     print(f"report: {page}")
 
 

@@ -16,6 +16,7 @@ from gensig.errors import ConfigError
 from gensig.page import Charts, Section, Select, Switch, interactive_page
 from gensig.report import tables
 from gensig.report.examples import Choice, choose, envelope_band, example, usable_top
+from gensig.report.levels import VELOCITY, level_table, loudness, velocity_rms
 from gensig.report.measured_ranges import at_measured_rate, beside_measurements
 from gensig.report.packing import pack_floats
 from gensig.report.rotation import Rotation, read_rotation
@@ -83,7 +84,7 @@ def report_text(data: Dataset, per_class: int | None) -> tuple[str, str]:
     units = dict(zip(data.channel_names, tables.channel_units(data), strict=True))
     own_units = [units[name] for name in chosen.channels]
     drawn = some_records(data, MOST_ROWS)
-    measured = measure(data, rotation, chosen.channels, at_measured_rate)
+    measured = measure(data, rotation, chosen.channels, _further)
     compared = beside_measurements(data, measured, own_units)
     content = _content(data, chosen, rotation, own_units, drawn, measured, compared)
     name = plain(data.folder.resolve().name)
@@ -92,7 +93,7 @@ def report_text(data: Dataset, per_class: int | None) -> tuple[str, str]:
         *tables.contents(data),
         _signals(data, chosen, rotation, content["examples"]),
         _parameters(data, content["drawn"]),
-        _indicators(data, chosen, measured, content["measured"]),
+        _indicators(data, chosen, measured, content["measured"], own_units),
         *([_lives(content["lives"])] if "lives" in content else []),
         _beside(compared, own_units),
         tables.splits(data),
@@ -150,7 +151,7 @@ def _signals(data: Dataset, chosen: Choice, rotation: Rotation, examples: list[d
         text = plain(f"{one['class']}, severity {severity}, {one['unit']}, {one['record']}")
         groups.setdefault(plain(one["class"]), []).append((str(number), text))
     last = groups[list(groups)[-1]]
-    first = last[-1 if has_lives(data) else len(last) // 2][0]
+    first = groups["healthy"][0][0] if "healthy" in groups else last[-1 if has_lives(data) else len(last) // 2][0]
     orders = [("hz", "Hz and ms")] + [(name, f"orders: {words}") for name, words in rotation.references]
     zooms = [("all", "usable band")]
     if any(name == "mesh" for name, _ in orders):
@@ -225,16 +226,28 @@ def _parameters(data: Dataset, table: dict[str, Any]) -> Section:
     )  # fmt: skip
 
 
-def _indicators(data: Dataset, chosen: Choice, measured: Measured, table: dict[str, Any]) -> Section:
+def _further(signal: np.ndarray, sampling_rate: float) -> dict[str, np.ndarray]:
+    """What is measured beside the condition indicators, by channel."""
+    return {**at_measured_rate(signal, sampling_rate), VELOCITY: velocity_rms(signal, sampling_rate)}
+
+
+def _indicators(
+    data: Dataset, chosen: Choice, measured: Measured, table: dict[str, Any], units: Sequence[str]
+) -> Section:
     known = [(name, label) for name, label in INDICATORS if np.isfinite(measured.values[name]).any()]
     along = [(name, column_label(name)) for name in ALONG if name in table["columns"]]
     text = [f"{_of(len(measured.records), data)}. Averages over turns are taken at the mean speed; where it varies, "
             "FM4 and sideband ratios say less."]  # fmt: skip
     if not known:
         return Section(title="Condition indicators", text=["No record tells one."])
+    levels = level_table(data, measured, chosen.channels, units)
+    if levels is not None:
+        text += ["Below: medians of each class, levels as machine monitoring states them.",
+                 *loudness(data, measured, chosen.channels, units)]  # fmt: skip
     return Section(
         title="Condition indicators",
         text=text,
+        table=levels,
         charts=Charts(
             name="indicators",
             label="Choice of indicator",

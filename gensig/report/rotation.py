@@ -22,7 +22,7 @@ class Rotation:
     mesh : (record,)      of the mesh
     drive : (record,)     turns of the driving shaft a second
     n_teeth : by gear of `GEARS`, those that are known
-    gear : (record,)      that carries the fault, "" where none does
+    gear : (record,)      whose turn a fault repeats with, "" where there is none or every tooth has it
     """
 
     mesh: NDArray[np.floating]
@@ -41,7 +41,7 @@ class Rotation:
         return {name: float(value) if np.isfinite(value) and value > 0.0 else None for name, value in values.items()}
 
     def fault_gear(self, index: int) -> str:
-        """The gear that carries the fault, where its frequency is known; else ""."""
+        """The gear once a turn of which the fault meshes, where its frequency is known; else ""."""
         gear = str(self.gear[index])
         return gear if gear in self.n_teeth else ""
 
@@ -67,9 +67,12 @@ def read_rotation(data: Dataset) -> Rotation:
         if isinstance(number, (int, np.integer)) and number > 0:
             n_teeth[gear] = int(number)
     names = data.column_names
+    faulty = data.column("fault_gear") if "fault_gear" in names else np.full(data.n_records, "")
+    if "fault_tooth" in names:  # -1: a fault of all teeth, such as wear, has no turn of its own
+        faulty = np.where(data.column("fault_tooth") == -1, "", faulty)
     return Rotation(
         mesh=data.column("mesh_frequency_hz") if "mesh_frequency_hz" in names else unknown,
         drive=data.column("speed_rpm") / 60.0,
         n_teeth=n_teeth,
-        gear=data.column("fault_gear") if "fault_gear" in names else np.full(data.n_records, ""),
+        gear=faulty,
     )

@@ -25,6 +25,7 @@ LEAST_LINE_DB = 6.0  # ... by this much above what is around it,
 FALSE_ALARM = 1e-6  # and by more than noise would at one line with this probability
 TURNS_A_SEGMENT = 4  # of the slower gear, so that its sidebands are told from the mesh
 LEAST_TURNS = 8
+LOW_SPEED_RPM = 100.0  # assumed: a stated speed below is asked back
 FOLLOWED = 0.4  # share of the slower shaft's frequency up to which the speed is followed
 PASSES = (1, 2, 4, 8)  # harmonics followed in each round: a coarse phase first, then a fine one
 
@@ -96,7 +97,7 @@ def find_motion(
     if turns < least_turns:
         raise ConfigError(
             f"too short: {recording.duration:.3g} s are {turns:.1f} turns of the slower gear, at least {least_turns:g} "
-            f"are needed; {longer}"
+            f"are needed; {longer}{in_hertz(speed_rpm)}"
         )
     mesh, line_db = _search(recording, teeth, nominal, highest)
     least = _least_line_db(turns)
@@ -104,9 +105,16 @@ def find_motion(
     if not np.any(heard <= FIRST_HARMONICS):
         raise ConfigError(
             f"no sign of the mesh: none of its first {FIRST_HARMONICS} harmonics within {100 * SEARCH:g} % of "
-            f"{nominal:.5g} Hz stands {least:.1f} dB above its surroundings; check {options}"
+            f"{nominal:.5g} Hz stands {least:.1f} dB above its surroundings; check {options}{in_hertz(speed_rpm)}"
         )
     return _follow(recording, teeth, mesh, heard, line_db)
+
+
+def in_hertz(speed_rpm: float) -> str:
+    """A question behind a message, where a speed in r/min looks like one in Hz."""
+    if speed_rpm > LOW_SPEED_RPM:
+        return ""
+    return f"; is {speed_rpm:g} r/min in Hz? Then say {60.0 * speed_rpm:.5g}"
 
 
 def _least_line_db(turns: float) -> float:

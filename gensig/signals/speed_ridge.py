@@ -10,7 +10,7 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from gensig.errors import ConfigError
-from gensig.signals.mesh_motion import SEARCH, Teeth, find_motion
+from gensig.signals.mesh_motion import SEARCH, Teeth, find_motion, in_hertz
 from gensig.signals.recording import Recording
 
 FloatArray = NDArray[np.floating]
@@ -60,7 +60,7 @@ def wandering_mesh_cycles(
     if turns < LEAST_TURNS:
         raise ConfigError(
             f"too short: {recording.duration:.3g} s are {turns:.1f} turns of the slower gear, at least {LEAST_TURNS} "
-            f"are needed; {longer}"
+            f"are needed; {longer}{in_hertz(speed_rpm)}"
         )
     time, course = mesh_frequency_course(recording.acceleration, rate, fewest, mesh, search=SEARCH, highest=highest)
     samples = np.arange(n_samples)

@@ -40,8 +40,8 @@
     const node = document.getElementById("plot-" + name), ink = dark.matches ? "#e6edf3" : "#1b1f24", grid = dark.matches ? "#333b44" : "#e3e8ed";
     const axis = { gridcolor: grid, zerolinecolor: grid, linecolor: grid, automargin: true, exponentformat: "none" };
     const full = {
-      margin: { l: 60, r: 12, t: 8, b: 44 }, paper_bgcolor: "rgba(0,0,0,0)", plot_bgcolor: "rgba(0,0,0,0)",
-      font: { color: ink, size: 12 }, legend: { orientation: "h", y: 1.02, yanchor: "bottom", x: 0 }, hovermode: "closest",
+      margin: { l: 60, r: 12, t: 32, b: 44 }, paper_bgcolor: "rgba(0,0,0,0)", plot_bgcolor: "rgba(0,0,0,0)",
+      font: { color: ink, size: 12 }, legend: { orientation: "h", yref: "container", y: 0, yanchor: "bottom", x: 0 }, hovermode: "closest",
       dragmode: coarse.matches ? false : "zoom", ...layout,
       xaxis: { ...axis, ...layout.xaxis }, yaxis: { ...axis, exponentformat: layout.yaxis.type === "log" ? "power" : "none", ...layout.yaxis },
     };

@@ -69,6 +69,16 @@ def test_it_loads_and_fits(page: Any) -> None:
     assert page.evaluate("document.querySelectorAll('img, svg a').length") == 0  # no text became markup
 
 
+def test_legends_are_clear_of_the_toolbar(page: Any) -> None:
+    """Below the drawing, whose upper edge leaves room for the toolbar."""
+    box = "([plot, part]) => document.querySelector(`#plot-${plot} ${part}`).getBoundingClientRect().toJSON()"
+    legend, drawing, whole = (
+        page.evaluate(box, ["indicators", part]) for part in (".legend", ".nsewdrag", ".main-svg")
+    )
+    assert drawing["bottom"] <= legend["top"] <= legend["bottom"] <= whole["bottom"] + 1
+    assert drawing["top"] - whole["top"] >= 28  # height of the toolbar
+
+
 def test_record_channel_and_comparison(page: Any) -> None:
     form = "#signals-controls"
     for value in ("0", "4"):

@@ -18,9 +18,10 @@ from gensig.dataset.verify import verify as verify_folder
 from gensig.errors import ConfigError, DatasetError
 from gensig.report.document import write_report
 from gensig.report.examples import choose
+from gensig.report.levels import level_table, loudness, velocity_rms
 from gensig.report.packing import STEP_DB, pack_amplitude, pack_signal
-from gensig.report.rotation import Rotation
-from gensig.report.values import some_records
+from gensig.report.rotation import Rotation, read_rotation
+from gensig.report.values import Measured, some_records
 from gensig.signals.spectrum import amplitude_spectrum
 
 HOSTILE = "</script><img src=x onerror=alert(1)>&amp;"
@@ -293,3 +294,50 @@ def test_values_that_are_not_finite_are_refused(made: tuple[Path, Page], monkeyp
     monkeypatch.setattr(Dataset, "signals", lambda *args, **more: read(*args, **more) * np.float32(np.nan))
     with pytest.raises(DatasetError, match="not finite"):
         write_report(made[0], made[0].parent / "other.html")
+
+
+def test_it_opens_on_a_healthy_record(made: tuple[Path, Page]) -> None:
+    page = made[1]
+    (number,) = [int(a["value"]) for a in page.all("option") if "selected" in a and a["value"].isdigit()][:1]
+    assert page.data["examples"][number]["class"] == "healthy"
+
+
+def test_a_fault_of_all_teeth_has_no_frequency_of_its_own(made: tuple[Path, Page]) -> None:
+    with open_dataset(made[0]) as data:
+        before = read_rotation(data)
+        faulty = np.flatnonzero(data.column("label") > 0)
+        assert before.fault_gear(faulty[0]) == "pinion"
+        data.column = lambda name, of=data.column: np.full_like(of(name), -1) if name == "fault_tooth" else of(name)
+        assert read_rotation(data).fault_gear(faulty[0]) == ""
+
+
+def test_velocity_of_a_tone_is_its_acceleration_over_its_frequency() -> None:
+    time = np.arange(51200) / 51200.0
+    tones = np.stack([3.0 * np.sin(2 * np.pi * f * time + 0.3) for f in (100.25, 950.5, 5.0, 1500.0)])
+    velocity = velocity_rms(tones, 51200.0)
+    expected = [3.0 / np.sqrt(2.0) / (2 * np.pi * f) for f in (100.25, 950.5)]
+    np.testing.assert_allclose(velocity[:2], expected, rtol=2e-3)
+    assert velocity[2:].max() < 0.02 * 3.0 / (2 * np.pi * 10.0)  # outside of 10 to 1000 Hz
+    faded = 40.0 * np.cos(2 * np.pi * 3000.7 * time)  # neither end of it is 0: nothing of it leaks below 1 kHz
+    assert velocity_rms(faded[None], 51200.0)[0] < 1e-6
+
+
+def test_levels_are_stated_in_g_and_mm_s_and_loud_ones_are_named(made: tuple[Path, Page]) -> None:
+    with open_dataset(made[0]) as data:
+        measured = Measured(
+            records=np.arange(2),
+            values={"rms": np.array([[97.0, 1.0], [98.1665, 1.0]])},
+            further={"velocity_rms": np.array([[2e-3, 1.0], [4e-3, 1.0]])},
+        )
+        data.column = lambda name, of=data.column: np.array(["healthy", "crack"]) if name == "label_name" else of(name)
+        units = ["m/s^2", "rad/s"]
+        table = level_table(data, measured, ["case", "shaft"], units)
+        assert table is not None
+        assert list(map(list, table.rows)) == [
+            ["healthy", "case", "97", "9.89", "2"], ["crack", "case", "98.2", "10", "4"]
+        ]  # fmt: skip
+        (line,) = loudness(data, measured, ["case", "shaft"], units)
+        assert line.startswith("Louder than most published housings: crack. Above 10 g")
+        measured.further["velocity_rms"][0, 0] = 12e-3
+        assert "housings: healthy, crack." in loudness(data, measured, ["case", "shaft"], units)[0]
+        assert level_table(data, measured, ["case", "shaft"], ["rad/s", "rad/s"]) is None

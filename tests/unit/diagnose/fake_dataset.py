@@ -7,8 +7,8 @@ import numpy as np
 
 N_TEETH = {"n_teeth_pinion": 23, "n_teeth_wheel": 84}
 CLASSES = ("healthy", "crack", "pitting", "missing_tooth")
-IMPULSE = {"healthy": 0.0, "crack": 1.0, "pitting": 1.8, "missing_tooth": 5.0}
-CARRIER_HZ = {"healthy": 4000.0, "crack": 3000.0, "pitting": 6000.0, "missing_tooth": 4500.0}
+IMPULSE = {"healthy": 0.0, "crack": 1.0, "pitting": 1.8, "missing_tooth": 5.0, "wear": 3.0}
+CARRIER_HZ = {"healthy": 4000.0, "crack": 3000.0, "pitting": 6000.0, "missing_tooth": 4500.0, "wear": 1500.0}
 
 
 class FakeDataset:

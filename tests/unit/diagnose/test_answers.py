@@ -190,7 +190,7 @@ def test_window_length_shows_what_later_windows_bring(shown, verdict):
 
 @pytest.fixture
 def study():
-    """A data set of 20 units, 4 of them tested, and a network and a baseline that know some of the answers."""
+    """A data set of 20 units, 5 of them tested, and a network and a baseline that know some of the answers."""
     dataset = FakeDataset(n_units=20, records_per_unit=16)
     task = task_of(dataset, window_samples=800, stride_samples=800, normalise="rms")
     settings = settings_from(compose("train", ["data=x", "out=y", "n_bootstrap=100"]))
@@ -253,6 +253,21 @@ def test_every_part_is_there_and_can_be_written(study, tmp_path):
     detection_figure(tmp_path / "b.png", answers)
     window_length_figure(tmp_path / "c.png", {"by_unit": answers})
     assert all((tmp_path / name).stat().st_size > 5000 for name in ("a.png", "b.png", "c.png"))
+
+
+def test_a_class_of_few_records_says_how_few(study, tmp_path):
+    task, settings, runs = study
+    found = protocol_answers(task, settings, runs)["detection"]["cnn"]["classes"]["crack"]
+    assert f"of {found['n_records']} records of 5 machines found" in found["summary"]
+    assert "not told" not in found["summary"]
+    runs = [dataclasses.replace(run, record=run.record[:24], log_probability=run.log_probability[:24], windows=None)
+            for run in runs]  # fmt: skip
+    answers = protocol_answers(task, settings, runs)
+    few = answers["detection"]["cnn"]["classes"]["crack"]
+    assert few["n_records"] < 10
+    assert "[too few machines] of 6 records of 2 machines found" in few["summary"]
+    assert "from what severity on is not told: a curve needs 10 records of 3 severities" in few["summary"]
+    detection_figure(tmp_path / "few.png", answers)
 
 
 def test_parts_without_ground_are_left_out(study, tmp_path):

@@ -23,7 +23,7 @@ FAST = [
 
 
 def fake(**changes):
-    return FakeDataset(**{"n_units": 8, "records_per_unit": 8, "duration": 0.5, **changes})
+    return FakeDataset(**{"n_units": 16, "records_per_unit": 4, "duration": 0.5, **changes})
 
 
 @pytest.fixture
@@ -114,7 +114,7 @@ def test_the_table_shows_the_leaky_protocol_last_and_says_so(trained):
 def test_the_page_stands_alone_and_says_what_matters(trained):
     page = (trained / "report.html").read_text()
     text = visible_text(page)
-    for word in ("CNN", "indicators", "RMS threshold", "label shuffle", "chance", "Caveats", "2 test unit(s)"):
+    for word in ("CNN", "indicators", "RMS threshold", "label shuffle", "chance", "Caveats", "4 test unit(s)"):
         assert word in text
     assert text.index("by_unit") < text.index("random_window_leaky (LEAKY)") < text.index("Which faults are found")
     assert "1-NN" not in text
@@ -175,7 +175,7 @@ def test_evaluate_repeats_the_test_score_of_its_seed(trained, data, capsys, tmp_
 def test_evaluate_on_another_data_set_takes_all_records(trained, data, capsys):
     data["other"] = fake(seed=9)
     assert main(["evaluate", "data=other", f"model_dir={trained / 'models' / 'by_unit-seed0'}"]) == 0
-    assert capsys.readouterr().out.startswith("64 records of 8 unit(s): all records")
+    assert capsys.readouterr().out.startswith("64 records of 16 unit(s): all records")
 
 
 @pytest.mark.parametrize(

@@ -26,7 +26,7 @@ FAST = [
     "protocols=[by_unit]", "window_samples=1200", "stride_samples=1000", "epochs=2", "seeds=[0]", "n_bootstrap=200",
     "n_threads=1", "model.widths=[8,16]", "model.kernels=[32,5]", "model.strides=[8,4]", "baselines=[rms_threshold]",
 ]  # fmt: skip
-SMALL = {"n_units": 8, "records_per_unit": 8, "duration": 0.5}
+SMALL = {"n_units": 16, "records_per_unit": 4, "duration": 0.5}
 HOWTO = Path(__file__).parents[3] / "docs" / "howto" / "controls.md"
 
 
@@ -155,7 +155,7 @@ def test_the_place_in_the_file_is_probed():
 
 def test_a_leak_is_found_and_where_there_is_none_the_probe_is_at_chance():
     """The fake set deals its classes in turn, so that the place tells all; dealt at random it tells nothing."""
-    dataset = FakeDataset(**{**SMALL, "n_units": 24})
+    dataset = FakeDataset(**{**SMALL, "n_units": 24, "records_per_unit": 8})
     task = make_task(dataset)
 
     def share(**options):

@@ -1,6 +1,6 @@
 """Scores in closed form, intervals over units, indicators and baselines."""
 
-from dataclasses import replace
+from dataclasses import asdict, replace
 
 import numpy as np
 import pytest
@@ -10,7 +10,19 @@ from threadpoolctl import threadpool_limits
 
 from diagnose.baselines import indicator_model, rms_threshold
 from diagnose.features import FEATURES, GEARS, INDICATORS, FeatureTable, feature_table, indicators
-from diagnose.metrics import balanced_accuracy, confusion_by_unit, macro_f1, over_records, recall, score_with_interval
+from diagnose.metrics import (
+    LEAST_UNITS,
+    balanced_accuracy,
+    confusion_by_unit,
+    is_above,
+    macro_f1,
+    over_records,
+    ratio_with_interval,
+    recall,
+    score_with_interval,
+)
+from diagnose.report import without_interval
+from diagnose.report_text import score_cell
 from diagnose.windows import SUBSETS, subset_segments, task_of
 from gensig.errors import DatasetError
 
@@ -61,6 +73,29 @@ def test_interval_is_over_units_not_over_records():
         widths.append(score.high - score.low)
     assert_allclose(widths, [widths[0]] * 2, rtol=1e-12)
     assert widths[0] == pytest.approx(2 * 1.96 * np.sqrt(0.25 / 10), abs=0.1)
+
+
+@pytest.mark.parametrize("n_units", [1, 2, 3, 4])
+def test_few_units_have_no_interval(n_units):
+    """Two that agree would say 0.50 [0.50, 0.50]."""
+    confusion = np.ones((1, n_units, 2, 2), dtype=int)
+    score = score_with_interval("balanced_accuracy", confusion, n_bootstrap=100, rng=np.random.default_rng(0))
+    ratio = ratio_with_interval(
+        "balanced_accuracy", confusion, confusion, n_bootstrap=100, rng=np.random.default_rng(0)
+    )
+    for found in (asdict(score), ratio):
+        assert (found["low"] is None) == (found["high"] is None) == (n_units < LEAST_UNITS)
+        assert not is_above(found, 2.0)
+    assert score_cell({"balanced_accuracy": asdict(score)}).startswith(
+        "0.50 [too few machines]" if n_units < LEAST_UNITS else "0.50 [0.50"
+    )
+
+
+def test_why_there_is_no_interval_is_said_once():
+    few, many = ({"n_units": {"test": n}} for n in (2, 12))
+    (line,) = without_interval({"protocols": {"by_unit": few, "cross_speed": few, "cross_snr": many}, "novelty": {}})
+    assert line.startswith("by_unit, cross_speed: 2 test unit(s) are too few machines for an interval, 4 are the least")
+    assert without_interval({"protocols": {"by_unit": many}, "novelty": {}}) == []
 
 
 def test_interval_covers_the_truth_about_as_often_as_it_says():

@@ -91,7 +91,7 @@ def test_a_fault_in_name_only_is_not_found(studies, protocol):
 @pytest.fixture
 def labelled():
     """Task and a way to score its test records."""
-    task = task_from(OpenDataset(), settings_of())
+    task = task_from(OpenDataset(n_units=16), settings_of())
     record = np.unique(subset_segments(task, "healthy_only", "test").record)
     novel = task.labels()[record] > 0
 

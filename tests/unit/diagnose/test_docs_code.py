@@ -6,7 +6,7 @@ from pathlib import Path
 import numpy as np
 import pytest
 import torch
-from fake_dataset import FakeDataset
+from fake_dataset import CLASSES, FakeDataset
 
 import gensig.dataset.reader
 from diagnose.cli import main
@@ -27,8 +27,9 @@ def one_thread():
     torch.set_num_threads(before)
 
 
-def test_a_model_of_ones_own_learns_and_is_judged_on_unseen_units(monkeypatch, capsys):
-    data = FakeDataset(n_units=16, records_per_unit=8, duration=0.5, noise=0.2)
+@pytest.mark.parametrize("classes", [CLASSES, (*CLASSES, "wear")])
+def test_a_model_of_ones_own_learns_and_is_judged_on_unseen_units(classes, monkeypatch, capsys):
+    data = FakeDataset(n_units=16, records_per_unit=8, duration=0.5, noise=0.2, classes=classes)
     monkeypatch.setattr(gensig.dataset.reader, "open_dataset", lambda path, **_: data)
     code = python_of("train_your_model.md")
     assert len(code.strip().splitlines()) <= 30
@@ -37,6 +38,7 @@ def test_a_model_of_ones_own_learns_and_is_judged_on_unseen_units(monkeypatch, c
     shown = capsys.readouterr().out
     score = float(shown.rsplit(":", 1)[1])
     assert score > 0.45  # chance is 0.25
+    assert shown.count(" of 8: training loss") == 8
     units = data.column("unit_id")
     train = names["train"].record
     assert not set(units[train]) & set(units[names["record"]])

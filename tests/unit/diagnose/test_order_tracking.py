@@ -207,6 +207,7 @@ def test_what_cannot_be_tracked_is_refused_in_one_line(model, tmp_path, capsys):
         ([*words, "--teeth", "2", "84"], "--teeth 2 84: a gear has 4 to 1000 teeth"),
         ([*noisy, "--teeth", *TEETH, "--speed-rpm", "1500"], "sign of the mesh"),
         ([*short, "--teeth", *TEETH, "--speed-rpm", "1200"], "turns of the slower gear, at least 4 are needed"),
+        ([*short, "--teeth", *TEETH, "--speed-rpm", "24.46"], "is 24.46 r/min in Hz? Then say 1467.6"),
         ([*noisy, "--teeth", "40", "84", "--speed-rpm", "1500"], "sidebands look like the mesh"),
         ([*noisy, "--teeth", *TEETH, "--speed-rpm", "15000"], "lies above 5000 Hz"),
     ]:

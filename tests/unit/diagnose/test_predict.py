@@ -23,6 +23,7 @@ from diagnose.domain import band_levels
 from diagnose.model_io import load_domain, load_model
 from diagnose.predict import Source, predict_recording
 from diagnose.train import predict_windows
+from diagnose.verdict import class_text, score_text, verdict
 from diagnose.windows import Segments, load_windows, task_of
 
 RATE = 12800
@@ -171,10 +172,55 @@ def test_the_stated_speed_is_held_beside_those_of_the_training(model, tmp_path, 
     assert "\n" not in line
 
 
+SCORE = {
+    "balanced_accuracy": {"mean": 0.8, "low": 0.6, "high": 0.9}, "chance": 0.25, "n_records": 64, "n_units": 8,
+    "leaky": False,
+}  # fmt: skip
+
+
+def test_the_class_is_said_beside_the_next_one_and_the_models_own_score():
+    clear = {"healthy": 0.61, "crack": 0.3, "pitting": 0.09}
+    said = {**verdict(clear, SCORE), "adaptation": None}
+    assert class_text(said) == "healthy, probability 0.61, next crack 0.30"
+    whole = "this model: balanced accuracy 0.80 [0.60, 0.90] on 8 machines it never saw, chance 0.25"
+    assert score_text(said) == whole
+    assert score_text({**said, "adaptation": {}}).replace(", before it was adapted", "") == whole
+    assert "LEAKY" in score_text({**said, "model_test_score": {**SCORE, "leaky": True}})
+    close = verdict({"healthy": 0.35, "crack": 0.3, "pitting": 0.26, "missing_tooth": 0.09}, SCORE)
+    assert (close["undecided"], close["class"], close["runner_up"]) == (True, "healthy", "crack")
+    assert class_text(close) == "undecided, healthy 0.35 or crack 0.30 (the two are less than 0.10 apart)"
+    for low in (0.2, None):
+        weak = {**SCORE, "balanced_accuracy": {"mean": 0.35, "low": low, "high": low and 0.5}}
+        said = verdict(clear, weak)
+        assert said["undecided_because"] == ["the model was not shown to be better than chance"]
+        assert class_text(said).startswith("undecided, healthy 0.61 or crack 0.30 (the model was not shown")
+    assert not verdict(clear, None)["undecided"]  # an older model
+
+
+def test_a_model_stores_what_it_scored_and_several_recordings_are_answered(model, tmp_path, capsys):
+    dataset = fake()
+    files = [str(array(tmp_path / f"{k}.npz", dataset.signals(record))) for k, record in enumerate(held_out(dataset))]
+    metrics = json.loads(Path(model).parents[1].joinpath("metrics.json").read_text())["protocols"]["by_unit"]
+    stored = load_model(model)[1].test_score
+    assert stored["balanced_accuracy"]["mean"] == metrics["methods"]["cnn"]["balanced_accuracy"]["mean"]
+    assert stored["n_units"] == metrics["n_units"]["test"] < 4
+    assert stored["balanced_accuracy"]["low"] is None
+    capsys.readouterr()
+    strange = str(array(tmp_path / "noise.npz", np.random.default_rng(0).standard_normal((2, 6400))))
+    assert main(["predict", files[0], "--model", model, files[1]]) == 0
+    lines = capsys.readouterr().out.splitlines()
+    assert [line.partition(": ")[0] for line in lines] == files[:2]
+    assert all("undecided" in line and "[too few machines] on" in line for line in lines)
+    assert main(["predict", "--model", model, "--json", files[0], strange]) == 3
+    first, second = json.loads(capsys.readouterr().out)
+    assert (first["out_of_distribution"], second["out_of_distribution"]) == (False, True)
+    assert first["model_test_score"] == stored
+
+
 def older(model, folder):
     """The model as a version before the flag wrote it."""
     description = json.loads(Path(model, "model.json").read_text())
-    for key in ("speed_rpm_range", "out_of_distribution"):
+    for key in ("speed_rpm_range", "out_of_distribution", "test_score"):
         del description[key]
     (folder / "model.json").write_text(json.dumps({**description, "model_schema_version": 1}))
     tensors = load_file(f"{model}/model.safetensors")
@@ -188,7 +234,9 @@ def test_an_older_model_predicts_and_says_that_it_has_no_flag(model, tmp_path, c
     old = older(model, tmp_path)
     capsys.readouterr()
     assert main(["predict", "--model", old, file, "--speed-rpm", "9999"]) == 0
-    assert "no out-of-distribution flag" in capsys.readouterr().out
+    shown = capsys.readouterr().out
+    assert "no out-of-distribution flag" in shown
+    assert "stores no test score" in shown
     assert predicted(old, file)["out_of_distribution"] is None
     assert predicted(old, file)["probabilities"] == predicted(model, file)["probabilities"]
 

@@ -17,7 +17,7 @@ from diagnose.windows import subset_segments, task_of
 
 @pytest.fixture
 def dataset(tmp_path, monkeypatch):
-    found = FakeDataset()
+    found = FakeDataset(n_units=16, records_per_unit=4)
     found.folder = tmp_path / "data"
     (found.folder / "splits").mkdir(parents=True)
     (found.folder / "plan.csv").write_text("record_id\n")
@@ -129,7 +129,7 @@ def test_a_benchmark_shows_its_own_results_beside(dataset, tmp_path, monkeypatch
 def test_other_noise_of_the_same_strength_is_another_signal(dataset):
     benchmark = frozen(dataset)
     assert benchmark.differences(dataset) == []
-    other = FakeDataset(seed=dataset.seed)
+    other = FakeDataset(n_units=16, records_per_unit=4, seed=dataset.seed)
     other.folder = dataset.folder
     noise = np.random.default_rng(5).standard_normal((1, other.n_samples))
     clean = other.signals

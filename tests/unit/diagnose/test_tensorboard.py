@@ -24,7 +24,7 @@ FAST = [
 def studies(tmp_path_factory):
     """The same study with the log, in two processes, and without it, in this one."""
     folder = tmp_path_factory.mktemp("studies")
-    data = FakeDataset(n_units=12, records_per_unit=4, duration=0.3)
+    data = FakeDataset(n_units=16, records_per_unit=4, duration=0.3)
     with pytest.MonkeyPatch.context() as patch:
         patch.setattr(gensig.dataset.reader, "open_dataset", lambda path: data)
         for name, options in (("with", ["n_threads=2", "tensorboard=true"]), ("without", ["n_threads=1"])):

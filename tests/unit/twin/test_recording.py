@@ -36,6 +36,21 @@ class TestRead:
             assert found.sampling_rate == pytest.approx(RATE, rel=1e-9)
             assert_allclose(found.acceleration, centred, rtol=0, atol=1e-7)
 
+    @pytest.mark.parametrize(
+        ("text", "message"),
+        [
+            ("time_s;a\n0,0;0,5\n", "separated by ';': save it with commas, decimals with points"),
+            ("0.000000;0.228867\n0.1;0.2\n", "separated by ';'"),
+            ("time_s\ta\n0\t1\n", "separated by tabs"),
+            ("0.000000,0.228867\n0.1,0.2\n", "its first line holds numbers, not names"),
+            ("time_s,-1.5e-3\n0.1,0.2\n", "its first line holds numbers, not names"),
+        ],
+    )
+    def test_tables_without_a_header_or_commas_are_refused(self, text, message, tmp_path):
+        (tmp_path / "r.csv").write_text(text)
+        with pytest.raises(ConfigError, match=re.escape(message)):
+            read_recording(str(tmp_path / "r.csv"), rate=RATE)
+
     def test_units(self, tmp_path):
         file = timed(tmp_path / "u.csv", names=("case_g", "lid_m_per_s2"))
         found = read_recording(file)

@@ -1,0 +1,76 @@
+"""How loud the records are, in the units of machine monitoring: what to hold beside a machine of one's own."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+
+import numpy as np
+from numpy.typing import NDArray
+
+from gensig.dataset.card import plain
+from gensig.dataset.reader import Dataset
+from gensig.page import Table
+from gensig.report.values import Measured
+from gensig.signals.recording import STANDARD_GRAVITY
+
+FloatArray = NDArray[np.floating]
+
+VELOCITY = "velocity_rms"
+BAND = (10.0, 1000.0)  # Hz, of broad-band velocity in ISO 20816-1 and -3
+HARMFUL_VELOCITY = 11.0e-3  # m/s, zone boundary C/D of ISO 20816-3 for large machines on flexible supports
+LOUD_ACCELERATION = 10.0 * STANDARD_GRAVITY  # assumed: published housings of sound gears stay below
+
+
+def velocity_rms(signal: FloatArray, sampling_rate: float) -> FloatArray:
+    """RMS velocity in `BAND`, m/s, (channel,), of accelerations in m/s^2, (channel, sample).
+
+    Integrated in the spectrum, under a Hann window so that the steps at the ends do not leak into low frequencies.
+    """
+    from scipy.signal import periodogram
+
+    frequency, density = periodogram(signal, sampling_rate, window="hann")
+    held = (frequency >= BAND[0]) & (frequency <= BAND[1])
+    power = density[..., held] / (2.0 * np.pi * frequency[held]) ** 2
+    return np.asarray(np.sqrt(power.sum(axis=-1) * frequency[1]))
+
+
+def level_table(data: Dataset, measured: Measured, channels: Sequence[str], units: Sequence[str]) -> Table | None:
+    """Medians of each class and accelerometer; None where there is no acceleration in m/s^2."""
+    rows = [
+        (plain(name), plain(channel), f"{rms:.3g}", f"{rms / STANDARD_GRAVITY:.3g}", f"{1e3 * velocity:.3g}")
+        for name, channel, rms, velocity in _medians(data, measured, channels, units)
+    ]
+    head = ("class", "channel", "RMS, m/s²", "RMS, g", "velocity RMS 10 to 1000 Hz, mm/s")
+    return Table(head=head, rows=rows) if rows else None
+
+
+def loudness(data: Dataset, measured: Measured, channels: Sequence[str], units: Sequence[str]) -> list[str]:
+    """One sentence where a level is beyond what housings of machines in service show; empty elsewhere."""
+    medians = _medians(data, measured, channels, units)
+    loud = [row for row in medians if row[2] > LOUD_ACCELERATION or row[3] > HARMFUL_VELOCITY]
+    if not loud:
+        return []
+    names = ", ".join(dict.fromkeys(plain(name) for name, *_ in loud))
+    return [
+        f"Louder than most published housings: {names}. Above {LOUD_ACCELERATION / STANDARD_GRAVITY:g} g, or above "
+        f"{1e3 * HARMFUL_VELOCITY:g} mm/s, from which ISO 20816-3 expects damage of large machines on flexible "
+        "supports. Compare shapes and ratios between classes with measurements, not levels; noise is relative to the "
+        "signal, so that it is as loud."
+    ]
+
+
+def _medians(
+    data: Dataset, measured: Measured, channels: Sequence[str], units: Sequence[str]
+) -> list[tuple[str, str, float, float]]:
+    """(class, channel, RMS in m/s^2, velocity in m/s), those that are known."""
+    label = data.column("label_name")[measured.records]
+    rms, velocity = measured.values["rms"], measured.further.get(VELOCITY)
+    if velocity is None:
+        return []
+    return [
+        (name, channel, float(np.nanmedian(rms[mine, place])), float(np.nanmedian(velocity[mine, place])))
+        for name in data.class_names
+        if (mine := label == name).any()
+        for place, channel in enumerate(channels)
+        if units[place] == "m/s^2"
+    ]
