@@ -20,7 +20,7 @@ from gensig.dataset.manifest import (
     record_failed_shard,
     record_shard,
 )
-from gensig.dataset.plan import PlanRows
+from gensig.dataset.plan import Plan, PlanRows
 from gensig.dataset.receipts import collect_receipts, read_receipt, receipt_path, write_receipt
 from gensig.dataset.run_log import log
 from gensig.dataset.schema import SAMPLE_TYPES
@@ -59,13 +59,8 @@ class Progress:
     reason: str
 
 
-def begin_folder(config: dict[str, Any], overrides: Sequence[str], out: Path) -> int:
-    """Plan a data set and make its folder, ready for ``run_folder``; nothing is touched if anything is wrong.
-
-    Returns
-    -------
-    number of shards
-    """
+def begin_folder(config: dict[str, Any], overrides: Sequence[str], out: Path) -> Plan:
+    """Plan a data set and make its folder, ready for ``run_folder``; nothing is touched if anything is wrong."""
     for key, allowed in (("compression", COMPRESSIONS), ("sample_type", SAMPLE_TYPES)):
         if config["dataset"][key] not in allowed:
             raise ConfigError(f"dataset.{key} = {config['dataset'][key]!r}; allowed: {', '.join(allowed)}")
@@ -83,7 +78,7 @@ def begin_folder(config: dict[str, Any], overrides: Sequence[str], out: Path) ->
         generator_version=__version__,
     )
     log(out, f"gensig {__version__}: {plan.n_records} records in {plan.n_shards} shards are planned")
-    return plan.n_shards
+    return plan
 
 
 def run_folder(

@@ -37,6 +37,12 @@ def one_line_warnings(program: str) -> Iterator[None]:
         yield
 
 
+def note(*texts: str) -> None:
+    """One line each, as a warning: said once however often it is true."""
+    for text in texts:
+        warnings.warn(text, stacklevel=2)
+
+
 class ShardProgress:
     """Progress over records: a bar on a terminal, a line every few seconds elsewhere, nothing when quiet."""
 

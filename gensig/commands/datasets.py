@@ -11,7 +11,7 @@ from typing import TYPE_CHECKING, Any
 
 import yaml
 
-from gensig.commands.console import ShardProgress
+from gensig.commands.console import ShardProgress, note
 from gensig.compose import job_folders, override_keys, sweep
 from gensig.config import Request, read_request
 from gensig.dataset.atomic import read_text
@@ -24,6 +24,7 @@ from gensig.dataset.verify import verify as verify_folder
 from gensig.errors import ConfigError
 
 if TYPE_CHECKING:
+    from gensig.dataset.plan import Plan
     from gensig.execution.base import Executor
 
 
@@ -54,12 +55,15 @@ def generate(arguments: Namespace) -> int:
 
 def _generate_one(request: Request, out: Path, executor: Executor, arguments: Namespace) -> int:
     from gensig.generation import begin_folder, run_folder
+    from gensig.plan_notes import plan_notes
 
     begin = time.monotonic()
-    n_shards = begin_folder(request.config, request.overrides, out)
-    n_records = read_manifest(out).n_records
+    table = begin_folder(request.config, request.overrides, out)
     if not arguments.quiet:
-        print(f"{out}: making {n_records} records in {n_shards} shard(s)", file=sys.stderr, flush=True)
+        note(*request.notes, *plan_notes(request.config, table))
+    n_records = table.n_records
+    if not arguments.quiet:
+        print(f"{out}: making {n_records} records in {table.n_shards} shard(s)", file=sys.stderr, flush=True)
     with ShardProgress(quiet=arguments.quiet, n_records=n_records) as progress:
         outcome = run_folder(out, executor=executor, on_shard=progress)
     return _closing_line(out, outcome, n_records, time.monotonic() - begin, arguments)
@@ -184,6 +188,7 @@ def _closing_line(
 def plan(arguments: Namespace) -> int:
     """Dry run: how many records, how many bytes, how long; with --freeze the folder is made, ready for array jobs."""
     from gensig.generation import begin_folder
+    from gensig.plan_notes import plan_notes
     from gensig.prediction import predict
 
     request = read_request(arguments.overrides, config_dir=arguments.config_dir)
@@ -193,7 +198,12 @@ def plan(arguments: Namespace) -> int:
             raise ConfigError("--freeze makes a folder: give out=DIR, one that does not exist or is empty")
         begin_folder(request.config, request.overrides, Path(str(out)).expanduser())
         print(f"{out} is planned; gensig resume {out} makes it here, tasks with executor=slurm as an array job")
-    for name, value in predict(request.config).items():
+
+    def say(table: Plan, n_timed: int) -> None:
+        note(*request.notes, *plan_notes(request.config, table))
+        print(f"making {n_timed} of {table.n_records} records to time them", file=sys.stderr, flush=True)
+
+    for name, value in predict(request.config, on_plan=say).items():
         print(f"{name:<11}{value}")
     return 0
 
