@@ -12,6 +12,7 @@ from typing import Any
 
 from gensig.dataset.beginning import create_folder
 from gensig.dataset.compression import COMPRESSIONS, creation_options
+from gensig.dataset.failures import commonest, failure_reasons
 from gensig.dataset.joining import joined_folder
 from gensig.dataset.layout import PLAN, ShardEntry, read_manifest, shard_path
 from gensig.dataset.manifest import (
@@ -153,6 +154,8 @@ def run_folder(
 
 def _close(out: Path) -> None:
     """Close the folder; the log is closed with it, and takes no line afterwards."""
+    if reasons := failure_reasons(out):
+        log(out, f"{len(reasons)} of {read_manifest(out).n_records} records failed: {commonest(reasons)}")
     log(out, "every shard is done; closing")
     finalize(out)
 

@@ -16,6 +16,7 @@ from gensig.compose import job_folders, override_keys, sweep
 from gensig.config import Request, read_request
 from gensig.dataset.atomic import read_text
 from gensig.dataset.beginning import refuse_used
+from gensig.dataset.failures import commonest, failure_reasons
 from gensig.dataset.inspection import inspect as inspect_path
 from gensig.dataset.joining import joined_folder
 from gensig.dataset.layout import CONFIG_BYTES_LIMIT, MANIFEST, OVERRIDES
@@ -90,8 +91,7 @@ def _generate_share(executor: Executor, arguments: Namespace) -> int:
     if problems:
         print("gensig: this task's share is incomplete; the same command tries again", file=sys.stderr)
         return 1
-    if n_failed:
-        print(f"gensig: {n_failed} of {n_records} records failed and are marked so", file=sys.stderr)
+    _say_failed(out, n_failed, n_records)
     if not arguments.quiet:
         print(f"{out}: {n_records} records of this task in {time.monotonic() - begin:.1f} s; gensig finalize {out}")
     return 0
@@ -104,7 +104,14 @@ def _asked(out: Path, overrides: Sequence[str], config_dir: str | None = None) -
         return None
     keys = {_key(word) for word in words}
     begun = [word for word in _recorded_words(out) if not _is_free(word) and _key(word) not in keys]
-    return read_request([*begun, *words], config_dir=config_dir).config
+    try:
+        return read_request([*begun, *words], config_dir=config_dir).config
+    except ConfigError as error:
+        if config_dir is not None:
+            raise
+        raise ConfigError(
+            f"{out} goes on with what it was begun with, and only executor.* may change: leave out {' '.join(words)}"
+        ) from error
 
 
 def _key(word: str) -> str:
@@ -139,8 +146,9 @@ def resume(arguments: Namespace) -> int:
     if manifest.is_complete:
         if asked is not None:
             joined_folder(out, asked=asked)
+        _say_failed(out, manifest.n_failed, manifest.n_records)
         print(f"{out} is complete: {manifest.n_records} records")
-        return 0
+        return 1 if manifest.n_failed else 0
     begin = time.monotonic()
     with ShardProgress(quiet=arguments.quiet, n_records=manifest.n_records) as progress:
         outcome = run_folder(out, executor=executor, on_shard=progress, asked=asked)
@@ -163,8 +171,7 @@ def finalize(arguments: Namespace) -> int:
 
         n_failed = close_folder(out)
     n_records = manifest.n_records
-    if n_failed:
-        print(f"gensig: {n_failed} of {n_records} records failed and are marked so in {out}", file=sys.stderr)
+    _say_failed(out, n_failed, n_records)
     print(f"{out} is complete: {n_records} records")
     return 1 if n_failed else 0
 
@@ -178,11 +185,16 @@ def _closing_line(
     if problems:
         print(f"gensig: {out} is incomplete; gensig resume {out} tries the missing shards again", file=sys.stderr)
         return 1
-    if n_failed:
-        print(f"gensig: {n_failed} of {n_records} records failed and are marked so in {out}", file=sys.stderr)
+    _say_failed(out, n_failed, n_records)
     if not arguments.quiet:
         print(f"{out}: {n_records} records in {seconds:.1f} s; gensig inspect {out} describes them")
     return 1 if n_failed else 0
+
+
+def _say_failed(out: Path, n_failed: int, n_records: int) -> None:
+    if n_failed:
+        why = f": {commonest(reasons)}" if (reasons := failure_reasons(out)) else ""
+        print(f"gensig: {n_failed} of {n_records} records failed and are marked so in {out}{why}", file=sys.stderr)
 
 
 def plan(arguments: Namespace) -> int:
@@ -218,7 +230,8 @@ def reproduce(arguments: Namespace) -> int:
     found = reproduce_records(Path(arguments.folder), arguments.records)
     for name, (recorded, present) in found.other.items():
         print(f"made with {name} {recorded or 'unknown'}, here is {present or 'unknown'}")
-    print(f"{found.n_equal} of {found.n_records} records have the same bits")
+    again = f"; {found.n_failed} failed again for the same reason and hold no signal" if found.n_failed else ""
+    print(f"{found.n_equal} of {found.n_records} records have the same bits{again}")
     if found.worst:
         print(f"largest difference {found.largest:.2g} of the record's RMS, in {found.worst}")
         accepted = f"{ACCEPTED:g} is accepted" if found.other else "here every bit must agree"

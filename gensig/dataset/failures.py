@@ -18,18 +18,23 @@ def commonest(reasons: Iterable[str]) -> str:
     'torque 3 N m: no end (2 of 3)'
     """
     kept = list(reasons)
-    kinds = Counter(_NUMBER.sub("#", reason) for reason in kept)
-    kind, n = kinds.most_common(1)[0]
-    first = next(reason for reason in kept if _NUMBER.sub("#", reason) == kind)
+    kind, n = Counter(map(without_numbers, kept)).most_common(1)[0]
+    first = next(reason for reason in kept if without_numbers(reason) == kind)
     return first if n == len(kept) else f"{first} ({n} of {len(kept)})"
 
 
+def without_numbers(reason: str) -> str:
+    """What two records have in common that failed for the same reason."""
+    return _NUMBER.sub("#", reason)
+
+
 def failure_reasons(folder: Path) -> list[str]:
-    """`status_reason` of every failed record of the shards that are done."""
+    """`status_reason` of every failed record of the shards that are done; [] where a shard does not tell it."""
     found: list[str] = []
     for index, entry in enumerate(read_manifest(folder).shards):
         if entry.state == "done" and entry.n_failed:
             with open_shard(shard_path(folder, index), folder=folder) as file:
-                failed = read_rows(file["status"]) == "failed"
-                found += read_rows(file["status_reason"])[failed].tolist()
+                if "status_reason" in file:
+                    failed = read_rows(file["status"]) == "failed"
+                    found += read_rows(file["status_reason"])[failed].tolist()
     return found
