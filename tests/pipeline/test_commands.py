@@ -100,7 +100,11 @@ def test_own_config_dir_adds_options(tmp_path: Path, capsys: pytest.CaptureFixtu
         "kind: crack\ngear: wheel\ntooth: 1\ncrack_depth_mm: 2\ncrack_angle_deg: 60\ncrack_start: gamma_mid\nvary: {}\n"
     )
     assert main(["stiffness", "fault=deep", "--config-dir", str(tmp_path)]) == 0
-    assert "faulty pair loses" in capsys.readouterr().out
+    said = capsys.readouterr().out
+    assert "faulty pair loses" in said
+    found = re.search(r"single pair, highest +(\S+) N/m sound, (\S+) N/m faulty", said)
+    assert found is not None
+    assert 0.5 < float(found[2]) / float(found[1]) < 1.0
 
 
 BAD = {

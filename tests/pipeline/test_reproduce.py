@@ -103,7 +103,9 @@ def read_one(path: Path) -> dict[str, np.ndarray]:
 
 
 @pytest.mark.parametrize("noise", ["healthy_twin", "record"])
-def test_record_and_twin_differ_by_the_fault_alone(reference: Path, tmp_path: Path, noise: str) -> None:
+def test_record_and_twin_differ_by_the_fault_alone(
+    reference: Path, tmp_path: Path, noise: str, capsys: pytest.CaptureFixture[str]
+) -> None:
     folder = reference
     if noise == "record":
         folder = make(tmp_path / "data", *SET, "sensing.snr_reference=record", "sensing.snr_db=20")
@@ -113,6 +115,9 @@ def test_record_and_twin_differ_by_the_fault_alone(reference: Path, tmp_path: Pa
     words = ["simulate", "--from", str(folder), "--record", str(faulty), "--output"]
     assert main([*words, str(tmp_path / "again.h5")]) == 0
     assert main([*words, str(tmp_path / "twin.h5"), "--twin"]) == 0
+    said = capsys.readouterr().out
+    assert f"healthy twin of r{faulty:06d} (crack)\nspeed" in said
+    assert f"class crack, severity {read_one(tmp_path / 'again.h5')['severity']:.3f}\nspeed" in said
     again, twin = read_one(tmp_path / "again.h5"), read_one(tmp_path / "twin.h5")
     for name, values in stored.items():
         assert np.array_equal(again[name], values), name
