@@ -44,11 +44,16 @@ def note(*texts: str) -> None:
 
 
 class ShardProgress:
-    """Progress over records: a bar on a terminal, a line every few seconds elsewhere, nothing when quiet."""
+    """Progress over records: a bar on a terminal, a line every few seconds elsewhere, nothing when quiet.
 
-    def __init__(self, *, quiet: bool, n_records: int) -> None:
+    Records count when their shard is whole. Until the first is, ``n_at_work`` of ``n_shards`` that are to be made
+    tell what is going on.
+    """
+
+    def __init__(self, *, quiet: bool, n_records: int, n_shards: int, n_at_work: int) -> None:
         self.quiet = quiet
         self.n_records = n_records
+        self.at_work = f"{min(n_at_work, n_shards)} of {n_shards} shards at work, counted when whole"
         self._last: Progress | None = None
         self._begin = self._last_time = time.monotonic()
         self._bar: Any = None
@@ -109,7 +114,7 @@ class ShardProgress:
         last = self._last
         seconds = self._last_time - self._begin
         if last is None or not last.n_made or seconds <= 0.0:
-            return f"{time.monotonic() - self._begin:.0f} s"
+            return f"{time.monotonic() - self._begin:.0f} s; {self.at_work}"
         rate = last.n_made / seconds
         left = max(0.0, (last.n_records - last.n_done) / rate - (time.monotonic() - self._last_time))
         failed = f", {last.n_failed} failed" if last.n_failed else ""

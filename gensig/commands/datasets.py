@@ -65,9 +65,13 @@ def _generate_one(request: Request, out: Path, executor: Executor, arguments: Na
     n_records = table.n_records
     if not arguments.quiet:
         print(f"{out}: making {n_records} records in {table.n_shards} shard(s)", file=sys.stderr, flush=True)
-    with ShardProgress(quiet=arguments.quiet, n_records=n_records) as progress:
+    with _progress(arguments, executor, n_records, table.n_shards) as progress:
         outcome = run_folder(out, executor=executor, on_shard=progress)
     return _closing_line(out, outcome, n_records, time.monotonic() - begin, arguments)
+
+
+def _progress(arguments: Namespace, executor: Executor, n_records: int, n_shards: int) -> ShardProgress:
+    return ShardProgress(quiet=arguments.quiet, n_records=n_records, n_shards=n_shards, n_at_work=executor.n_processes)
 
 
 def _generate_share(executor: Executor, arguments: Namespace) -> int:
@@ -81,8 +85,9 @@ def _generate_share(executor: Executor, arguments: Namespace) -> int:
         )
     begin = time.monotonic()
     manifest = read_manifest(out)
-    n_records = sum(manifest.shards[index].rows for index in executor.share(range(len(manifest.shards))))
-    with ShardProgress(quiet=arguments.quiet, n_records=n_records) as progress:
+    mine = executor.share(range(len(manifest.shards)))
+    n_records = sum(manifest.shards[index].rows for index in mine)
+    with _progress(arguments, executor, n_records, len(mine)) as progress:
         n_failed, problems = run_folder(
             out, executor=executor, on_shard=progress, asked=_asked(out, arguments.overrides, arguments.config_dir)
         )
@@ -150,7 +155,8 @@ def resume(arguments: Namespace) -> int:
         print(f"{out} is complete: {manifest.n_records} records")
         return 1 if manifest.n_failed else 0
     begin = time.monotonic()
-    with ShardProgress(quiet=arguments.quiet, n_records=manifest.n_records) as progress:
+    n_left = len(manifest.shards) - manifest.n_done
+    with _progress(arguments, executor, manifest.n_records, n_left) as progress:
         outcome = run_folder(out, executor=executor, on_shard=progress, asked=asked)
     return _closing_line(out, outcome, manifest.n_records, time.monotonic() - begin, arguments)
 
