@@ -30,11 +30,12 @@ class Request:
     """A composed configuration and the overrides as typed.
 
     ``config`` holds plain values only; its ``classes`` maps every class of the plan to its fault option, so that the
-    folder of a data set needs no package to be understood.
+    folder of a data set needs no package to be understood. ``notes`` say what of an option's plan the overrides undo.
     """
 
     config: dict[str, Any]
     overrides: tuple[str, ...]
+    notes: tuple[str, ...] = ()
 
 
 def read_request(overrides: Sequence[str], *, config_dir: str | Path | None = None) -> Request:
@@ -63,6 +64,7 @@ def read_request(overrides: Sequence[str], *, config_dir: str | Path | None = No
 
     clear_fault_vary = "fault.vary" in typed and not fault_vary
     unused = {*fault_words, *(f"fault.{key}" for key in fault_vary)}
+    pinned: dict[str, None] = {}
 
     def class_fault(name: str | None) -> dict[str, Any]:
         words = [word for word in others if name is None or not word.startswith("fault=")]
@@ -75,6 +77,7 @@ def read_request(overrides: Sequence[str], *, config_dir: str | Path | None = No
         unused.difference_update(f"fault.{key}" for key in fault_vary if key in fault)
         option = {} if clear_fault_vary else fault.get("vary") or {}
         vary = {**option, **{key: spec for key, spec in fault_vary.items() if key in fault}}
+        pinned.update({f"fault.{key}": None for key in vary if f"fault.{key}" in mine})
         return {**fault, "vary": {key: spec for key, spec in vary.items() if f"fault.{key}" not in mine}}
 
     selected = _with_whole_parts(class_fault(None), config_dir)
@@ -84,13 +87,20 @@ def read_request(overrides: Sequence[str], *, config_dir: str | Path | None = No
         classes = {name: _with_whole_parts(class_fault(name), config_dir) for name in names}
     if unused:
         raise ConfigError(_no_such_fault_key(sorted(unused)[0], selected))
+    notes = []
+    if plan["classes"] and plan["classes"] != names:
+        notes.append(f"fault={names[0]} replaces plan.classes [{', '.join(map(str, plan['classes']))}]")
     plan["classes"] = names
     plan_option = {} if "plan.vary" in typed and not plan_vary else plan["vary"] or {}
-    plan["vary"] = {key: value for key, value in {**plan_option, **plan_vary}.items() if key not in typed}
+    plan_vary = {**plan_option, **plan_vary}
+    plan["vary"] = {key: value for key, value in plan_vary.items() if key not in typed}
+    pinned.update({key: None for key in plan_vary if key in typed})
+    if pinned:
+        notes.append(f"pinned, no longer varied: {', '.join(f'{key} = {typed[key]}' for key in pinned)}")
     config = {**base, "fault": selected, "classes": classes}
     _reset_derived(config, set(typed) | set(plan["vary"]))
     settle_courses(config, typed)
-    return Request(config=config, overrides=as_typed)
+    return Request(config=config, overrides=as_typed, notes=tuple(notes))
 
 
 def _fault_option(overrides: Sequence[str], config_dir: str | Path | None) -> dict[str, Any]:

@@ -12,6 +12,7 @@ from typing import Any
 
 from gensig.dataset.beginning import create_folder
 from gensig.dataset.compression import COMPRESSIONS, creation_options
+from gensig.dataset.failures import commonest, failure_reasons
 from gensig.dataset.joining import joined_folder
 from gensig.dataset.layout import PLAN, ShardEntry, read_manifest, shard_path
 from gensig.dataset.manifest import (
@@ -20,7 +21,7 @@ from gensig.dataset.manifest import (
     record_failed_shard,
     record_shard,
 )
-from gensig.dataset.plan import PlanRows
+from gensig.dataset.plan import Plan, PlanRows
 from gensig.dataset.receipts import collect_receipts, read_receipt, receipt_path, write_receipt
 from gensig.dataset.run_log import log
 from gensig.dataset.schema import SAMPLE_TYPES
@@ -59,13 +60,8 @@ class Progress:
     reason: str
 
 
-def begin_folder(config: dict[str, Any], overrides: Sequence[str], out: Path) -> int:
-    """Plan a data set and make its folder, ready for ``run_folder``; nothing is touched if anything is wrong.
-
-    Returns
-    -------
-    number of shards
-    """
+def begin_folder(config: dict[str, Any], overrides: Sequence[str], out: Path) -> Plan:
+    """Plan a data set and make its folder, ready for ``run_folder``; nothing is touched if anything is wrong."""
     for key, allowed in (("compression", COMPRESSIONS), ("sample_type", SAMPLE_TYPES)):
         if config["dataset"][key] not in allowed:
             raise ConfigError(f"dataset.{key} = {config['dataset'][key]!r}; allowed: {', '.join(allowed)}")
@@ -83,7 +79,7 @@ def begin_folder(config: dict[str, Any], overrides: Sequence[str], out: Path) ->
         generator_version=__version__,
     )
     log(out, f"gensig {__version__}: {plan.n_records} records in {plan.n_shards} shards are planned")
-    return plan.n_shards
+    return plan
 
 
 def run_folder(
@@ -158,6 +154,8 @@ def run_folder(
 
 def _close(out: Path) -> None:
     """Close the folder; the log is closed with it, and takes no line afterwards."""
+    if reasons := failure_reasons(out):
+        log(out, f"{len(reasons)} of {read_manifest(out).n_records} records failed: {commonest(reasons)}")
     log(out, "every shard is done; closing")
     finalize(out)
 
@@ -278,8 +276,11 @@ def root_attributes(config: Mapping[str, Any], system: PairMachine) -> dict[str,
         "n_teeth_wheel": pair.wheel.n_teeth,
         "normal_module_mm": from_si("normal_module_mm", pair.pinion.normal_module),
         "pressure_angle_deg": from_si("pressure_angle_deg", pair.pinion.pressure_angle),
-        "face_width_mm": from_si("face_width_mm", pair.pinion.face_width),
+        "helix_angle_deg": from_si("helix_angle_deg", pair.pinion.helix_angle),
+        "face_width_pinion_mm": from_si("face_width_mm", pair.pinion.face_width),
+        "face_width_wheel_mm": from_si("face_width_mm", pair.wheel.face_width),
         "center_distance_mm": from_si("center_distance_mm", pair.center_distance),
         "transverse_contact_ratio": pair.transverse_contact_ratio,
+        "overlap_ratio": pair.overlap_ratio,
         "config_json": json.dumps({**config, "out": None, "executor": None}, sort_keys=True),
     }

@@ -5,14 +5,17 @@ from __future__ import annotations
 import math
 import tempfile
 import time
+import warnings
 from collections import Counter
-from collections.abc import Mapping
+from collections.abc import Callable, Mapping, Sequence
 from pathlib import Path
 from typing import Any
 
+from gensig.dataset.failures import commonest
 from gensig.dataset.plan import Plan, plan_text
 from gensig.execution.base import read_n_workers
 from gensig.generation import block_length, open_shard
+from gensig.plan_notes import n_different
 from gensig.planning import describe_design, make_plan
 from gensig.records import Record, forget_twins, simulate_records
 
@@ -22,11 +25,21 @@ BESIDE, BESIDE_A_SHARD, BESIDE_A_RECORD, BESIDE_A_CLASS = 42_000, 3_000, 380, 40
 CLOSING = 2.0  # s for index, cards and figures, most of it the import of matplotlib
 
 
-def predict(config: Mapping[str, Any]) -> dict[str, str]:
+class FailedRecordsWarning(UserWarning):
+    """Records that a plan was timed with failed, as others of the data set will."""
+
+
+def predict(
+    config: Mapping[str, Any], *, on_plan: Callable[[Plan, int], None] = lambda _plan, _n_timed: None
+) -> dict[str, str]:
     """Facts of a data set that is not made yet, by name, as text.
 
     A block of its first records is simulated and stored in a temporary folder. Time is that of a machine like this one
     with as many workers; start-up is counted for the workers of this machine.
+
+    Parameters
+    ----------
+    on_plan : called with the plan and the number of records that will be made, before the first of them is
     """
     started = time.process_time()  # what a process spends before its first record
     begin = time.monotonic()
@@ -34,6 +47,7 @@ def predict(config: Mapping[str, Any]) -> dict[str, str]:
     planning = time.monotonic() - begin
     first = table.rows(0)[: block_length(config)]
     probe = [table.record(int(index)) for index in first]
+    on_plan(table, len(probe))
     begin = time.monotonic()
     simulate_records(config, probe[:1])  # compiles, or loads what was compiled
     workers = min(_n_processes(config), table.n_shards)
@@ -42,6 +56,7 @@ def predict(config: Mapping[str, Any]) -> dict[str, str]:
     forget_twins()
     begin = time.monotonic()
     records = simulate_records(config, probe)
+    _warn_of_failed(records)
     n_bytes = _stored_bytes(config, table, records)
     seconds = time.monotonic() - begin
     rounds = math.ceil(table.n_shards / workers)
@@ -52,8 +67,10 @@ def predict(config: Mapping[str, Any]) -> dict[str, str]:
     return {
         "records": f"{table.n_records}",
         "classes": ", ".join(f"{name} {count}" for name, count in classes.items()),
-        "units": f"{len(set(table.columns['unit_id']))}",
-        "conditions": f"{len(set(table.columns['condition_id']))}",
+        "units": f"{n_different(table, 'unit_id')}",
+        "specimens": f"{n_different(table, 'specimen_id')} (sets of gears)",
+        "gearboxes": f"{n_different(table, 'gearbox_id')}",
+        "conditions": f"{n_different(table, 'condition_id')}",
         "design": describe_design(config),
         "repeats": f"{config['plan']['n_repeats']}",
         "shards": f"{table.n_shards} of at most {max(table.shard_sizes())} records",
@@ -61,6 +78,16 @@ def predict(config: Mapping[str, Any]) -> dict[str, str]:
         "time": f"about {max(1, round(total))} s on {workers} worker(s), from {seconds / len(probe):.3g} s a record "
         "measured now",
     }
+
+
+def _warn_of_failed(records: Sequence[Record]) -> None:
+    reasons = [str(one.values["status_reason"]) for one in records if one.values.get("status") == "failed"]
+    if reasons:
+        warnings.warn(
+            f"{len(reasons)} of {len(records)} records made to time the plan failed: {commonest(reasons)}",
+            FailedRecordsWarning,
+            stacklevel=3,
+        )
 
 
 def _n_processes(config: Mapping[str, Any]) -> int:

@@ -12,12 +12,13 @@ import numpy as np
 from numpy.typing import NDArray
 
 from gensig.dataset.environment import environment
+from gensig.dataset.failures import without_numbers
 from gensig.dataset.guard import open_shard, read_rows
 from gensig.dataset.joining import joined_folder
 from gensig.dataset.layout import PLAN, Manifest, shard_path
 from gensig.dataset.plan import Plan, read_plan
 from gensig.dataset.quantization import quantized, read_signal
-from gensig.dataset.schema import SCALES
+from gensig.dataset.schema import SCALES, stored_reason
 from gensig.errors import ConfigError, DatasetError, SimulationError
 from gensig.records import Record, simulate_record, simulate_records
 from gensig.rows import record_system, row_clean, row_instrument, row_noisy, row_run, row_values, shaken
@@ -36,6 +37,7 @@ class Reproduction:
     ----------
     n_records : int          records made again
     n_equal : int            of them, those with the same bits
+    n_failed : int           of them, those that failed and failed again for the same reason: they hold no signal
     largest : float          largest difference of a sample over its channel's RMS; inf where one failed and one did not
     worst : str              the record that has it, '' when all are equal
     n_refused : int          records that differ by more than is accepted
@@ -44,6 +46,7 @@ class Reproduction:
 
     n_records: int
     n_equal: int
+    n_failed: int
     largest: float
     worst: str
     n_refused: int
@@ -66,18 +69,20 @@ def reproduce(folder: Path, n_records: int) -> Reproduction:
     other = {name: (recorded[name], str(here[name])) for name in DECIDING if recorded[name] != str(here[name])}
     chosen = np.unique(np.linspace(0, plan.n_records - 1, min(n_records, plan.n_records)).round().astype(int))
     differences: dict[str, float] = {}
-    refused = 0
+    refused, n_failed = 0, 0
     for start in range(0, len(chosen), BLOCK):
         rows = [plan.record(int(index)) for index in chosen[start : start + BLOCK]]
         for row, record in zip(rows, simulate_records(config, rows), strict=True):
             difference, count = _difference(folder, row, record)
+            n_failed += difference == 0.0 and record.values.get("status") == "failed"
             if difference > 0.0:
                 differences[str(row["record_id"])] = difference
                 refused += not other or difference > ACCEPTED + count
     worst = max(differences, key=lambda name: differences[name], default="")
     return Reproduction(
         n_records=len(chosen),
-        n_equal=len(chosen) - len(differences),
+        n_equal=len(chosen) - len(differences) - n_failed,
+        n_failed=n_failed,
         largest=differences.get(worst, 0.0),
         worst=worst,
         n_refused=refused,
@@ -145,7 +150,8 @@ def _difference(folder: Path, row: Mapping[str, Any], record: Record) -> tuple[f
         if failed != (record.values.get("status") == "failed"):
             return np.inf, 0.0
         if failed:
-            return 0.0, 0.0
+            reasons = [stored_reason(record.values["status_reason"]), str(read_rows(file["status_reason"])[place])]
+            return (0.0 if len(set(map(without_numbers, reasons))) == 1 else np.inf), 0.0
         for name, scale_name in SCALES.items():
             if name not in file:
                 continue

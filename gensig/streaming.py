@@ -13,7 +13,7 @@ from numpy.typing import ArrayLike, NDArray
 
 from gensig.dataset.plan import Plan
 from gensig.dataset.protocols import make_splits, why_left_out
-from gensig.dataset.schema import COLUMNS, DEFAULTS
+from gensig.dataset.schema import DEFAULTS, stored_reason
 from gensig.dataset.splits import SUBSETS
 from gensig.dynamics._vector import n_lanes
 from gensig.errors import ConfigError, DatasetError
@@ -196,6 +196,5 @@ def _simulate(config: Mapping[str, Any], rows: Sequence[Mapping[str, Any]]) -> l
 def _as_stored(record: Record) -> Record:
     """The record with the values that a shard fills in, and its reason as long as a shard holds it."""
     values = {**DEFAULTS, **record.values}
-    n_bytes = COLUMNS["status_reason"].n_bytes
-    values["status_reason"] = str(values["status_reason"]).encode("ascii", "backslashreplace")[:n_bytes].decode()
+    values["status_reason"] = stored_reason(values["status_reason"])
     return replace(record, values=values)

@@ -38,12 +38,23 @@ def one_line_warnings(program: str) -> Iterator[None]:
         yield
 
 
-class ShardProgress:
-    """Progress over records: a bar on a terminal, a line every few seconds elsewhere, nothing when quiet."""
+def note(*texts: str) -> None:
+    """One line each, as a warning: said once however often it is true."""
+    for text in texts:
+        warnings.warn(text, stacklevel=2)
 
-    def __init__(self, *, quiet: bool, n_records: int) -> None:
+
+class ShardProgress:
+    """Progress over records: a bar on a terminal, a line every few seconds elsewhere, nothing when quiet.
+
+    Records count when their shard is whole. Until the first is, ``n_at_work`` of ``n_shards`` that are to be made
+    tell what is going on.
+    """
+
+    def __init__(self, *, quiet: bool, n_records: int, n_shards: int, n_at_work: int) -> None:
         self.quiet = quiet
         self.n_records = n_records
+        self.at_work = f"{min(n_at_work, n_shards)} of {n_shards} shards at work, counted when whole"
         self._last: Progress | None = None
         self._begin = self._last_time = time.monotonic()
         self._bar: Any = None
@@ -105,7 +116,8 @@ class ShardProgress:
         seconds = self._last_time - self._begin
         if last is None or not last.n_made or seconds <= 0.0:
             waited = time.monotonic() - self._begin
-            return f"{waited:.0f} s" + ("; the first run compiles for a minute or two" if waited > LONG_SECONDS else "")
+            first = "; the first run compiles for a minute or two" if waited > LONG_SECONDS else ""
+            return f"{waited:.0f} s; {self.at_work}{first}"
         rate = last.n_made / seconds
         left = max(0.0, (last.n_records - last.n_done) / rate - (time.monotonic() - self._last_time))
         failed = f", {last.n_failed} failed" if last.n_failed else ""

@@ -11,11 +11,12 @@ from typing import TYPE_CHECKING, Any
 
 import yaml
 
-from gensig.commands.console import ShardProgress
+from gensig.commands.console import ShardProgress, note
 from gensig.compose import job_folders, override_keys, sweep
 from gensig.config import Request, read_request
 from gensig.dataset.atomic import read_text
 from gensig.dataset.beginning import refuse_used
+from gensig.dataset.failures import commonest, failure_reasons
 from gensig.dataset.inspection import inspect as inspect_path
 from gensig.dataset.joining import joined_folder
 from gensig.dataset.layout import CONFIG_BYTES_LIMIT, MANIFEST, OVERRIDES
@@ -24,6 +25,7 @@ from gensig.dataset.verify import verify as verify_folder
 from gensig.errors import ConfigError
 
 if TYPE_CHECKING:
+    from gensig.dataset.plan import Plan
     from gensig.execution.base import Executor
 
 
@@ -54,15 +56,22 @@ def generate(arguments: Namespace) -> int:
 
 def _generate_one(request: Request, out: Path, executor: Executor, arguments: Namespace) -> int:
     from gensig.generation import begin_folder, run_folder
+    from gensig.plan_notes import plan_notes
 
     begin = time.monotonic()
-    n_shards = begin_folder(request.config, request.overrides, out)
-    n_records = read_manifest(out).n_records
+    table = begin_folder(request.config, request.overrides, out)
     if not arguments.quiet:
-        print(f"{out}: making {n_records} records in {n_shards} shard(s)", file=sys.stderr, flush=True)
-    with ShardProgress(quiet=arguments.quiet, n_records=n_records) as progress:
+        note(*request.notes, *plan_notes(request.config, table))
+    n_records = table.n_records
+    if not arguments.quiet:
+        print(f"{out}: making {n_records} records in {table.n_shards} shard(s)", file=sys.stderr, flush=True)
+    with _progress(arguments, executor, n_records, table.n_shards) as progress:
         outcome = run_folder(out, executor=executor, on_shard=progress)
     return _closing_line(out, outcome, n_records, time.monotonic() - begin, arguments)
+
+
+def _progress(arguments: Namespace, executor: Executor, n_records: int, n_shards: int) -> ShardProgress:
+    return ShardProgress(quiet=arguments.quiet, n_records=n_records, n_shards=n_shards, n_at_work=executor.n_processes)
 
 
 def _generate_share(executor: Executor, arguments: Namespace) -> int:
@@ -76,8 +85,9 @@ def _generate_share(executor: Executor, arguments: Namespace) -> int:
         )
     begin = time.monotonic()
     manifest = read_manifest(out)
-    n_records = sum(manifest.shards[index].rows for index in executor.share(range(len(manifest.shards))))
-    with ShardProgress(quiet=arguments.quiet, n_records=n_records) as progress:
+    mine = executor.share(range(len(manifest.shards)))
+    n_records = sum(manifest.shards[index].rows for index in mine)
+    with _progress(arguments, executor, n_records, len(mine)) as progress:
         n_failed, problems = run_folder(
             out, executor=executor, on_shard=progress, asked=_asked(out, arguments.overrides, arguments.config_dir)
         )
@@ -86,8 +96,7 @@ def _generate_share(executor: Executor, arguments: Namespace) -> int:
     if problems:
         print("gensig: this task's share is incomplete; the same command tries again", file=sys.stderr)
         return 1
-    if n_failed:
-        print(f"gensig: {n_failed} of {n_records} records failed and are marked so", file=sys.stderr)
+    _say_failed(out, n_failed, n_records)
     if not arguments.quiet:
         print(f"{out}: {n_records} records of this task in {time.monotonic() - begin:.1f} s; gensig finalize {out}")
     return 0
@@ -100,7 +109,14 @@ def _asked(out: Path, overrides: Sequence[str], config_dir: str | None = None) -
         return None
     keys = {_key(word) for word in words}
     begun = [word for word in _recorded_words(out) if not _is_free(word) and _key(word) not in keys]
-    return read_request([*begun, *words], config_dir=config_dir).config
+    try:
+        return read_request([*begun, *words], config_dir=config_dir).config
+    except ConfigError as error:
+        if config_dir is not None:
+            raise
+        raise ConfigError(
+            f"{out} goes on with what it was begun with, and only executor.* may change: leave out {' '.join(words)}"
+        ) from error
 
 
 def _key(word: str) -> str:
@@ -135,10 +151,12 @@ def resume(arguments: Namespace) -> int:
     if manifest.is_complete:
         if asked is not None:
             joined_folder(out, asked=asked)
+        _say_failed(out, manifest.n_failed, manifest.n_records)
         print(f"{out} is complete: {manifest.n_records} records")
-        return 0
+        return 1 if manifest.n_failed else 0
     begin = time.monotonic()
-    with ShardProgress(quiet=arguments.quiet, n_records=manifest.n_records) as progress:
+    n_left = len(manifest.shards) - manifest.n_done
+    with _progress(arguments, executor, manifest.n_records, n_left) as progress:
         outcome = run_folder(out, executor=executor, on_shard=progress, asked=asked)
     return _closing_line(out, outcome, manifest.n_records, time.monotonic() - begin, arguments)
 
@@ -159,8 +177,7 @@ def finalize(arguments: Namespace) -> int:
 
         n_failed = close_folder(out)
     n_records = manifest.n_records
-    if n_failed:
-        print(f"gensig: {n_failed} of {n_records} records failed and are marked so in {out}", file=sys.stderr)
+    _say_failed(out, n_failed, n_records)
     print(f"{out} is complete: {n_records} records")
     return 1 if n_failed else 0
 
@@ -174,16 +191,22 @@ def _closing_line(
     if problems:
         print(f"gensig: {out} is incomplete; gensig resume {out} tries the missing shards again", file=sys.stderr)
         return 1
-    if n_failed:
-        print(f"gensig: {n_failed} of {n_records} records failed and are marked so in {out}", file=sys.stderr)
+    _say_failed(out, n_failed, n_records)
     if not arguments.quiet:
         print(f"{out}: {n_records} records in {seconds:.1f} s; gensig inspect {out} describes them")
     return 1 if n_failed else 0
 
 
+def _say_failed(out: Path, n_failed: int, n_records: int) -> None:
+    if n_failed:
+        why = f": {commonest(reasons)}" if (reasons := failure_reasons(out)) else ""
+        print(f"gensig: {n_failed} of {n_records} records failed and are marked so in {out}{why}", file=sys.stderr)
+
+
 def plan(arguments: Namespace) -> int:
     """Dry run: how many records, how many bytes, how long; with --freeze the folder is made, ready for array jobs."""
     from gensig.generation import begin_folder
+    from gensig.plan_notes import plan_notes
     from gensig.prediction import predict
 
     request = read_request(arguments.overrides, config_dir=arguments.config_dir)
@@ -193,7 +216,12 @@ def plan(arguments: Namespace) -> int:
             raise ConfigError("--freeze makes a folder: give out=DIR, one that does not exist or is empty")
         begin_folder(request.config, request.overrides, Path(str(out)).expanduser())
         print(f"{out} is planned; gensig resume {out} makes it here, tasks with executor=slurm as an array job")
-    for name, value in predict(request.config).items():
+
+    def say(table: Plan, n_timed: int) -> None:
+        note(*request.notes, *plan_notes(request.config, table))
+        print(f"making {n_timed} of {table.n_records} records to time them", file=sys.stderr, flush=True)
+
+    for name, value in predict(request.config, on_plan=say).items():
         print(f"{name:<11}{value}")
     return 0
 
@@ -208,7 +236,8 @@ def reproduce(arguments: Namespace) -> int:
     found = reproduce_records(Path(arguments.folder), arguments.records)
     for name, (recorded, present) in found.other.items():
         print(f"made with {name} {recorded or 'unknown'}, here is {present or 'unknown'}")
-    print(f"{found.n_equal} of {found.n_records} records have the same bits")
+    again = f"; {found.n_failed} failed again for the same reason and hold no signal" if found.n_failed else ""
+    print(f"{found.n_equal} of {found.n_records} records have the same bits{again}")
     if found.worst:
         print(f"largest difference {found.largest:.2g} of the record's RMS, in {found.worst}")
         accepted = f"{ACCEPTED:g} is accepted" if found.other else "here every bit must agree"

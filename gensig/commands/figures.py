@@ -24,11 +24,13 @@ COLOURS = (SOUND, FAULTY, THIRD, FOURTH, "#56B4E9", GREY)
 ENVELOPE_BAND_HZ = (5000.0, 19000.0)
 
 
-def plot_stiffness(system: PairMachine, curves: StiffnessCurves, faults: Sequence[Fault], path: Path) -> None:
-    """Single pair, mesh over one revolution, load sharing and compliance terms."""
+def plot_stiffness(
+    system: PairMachine, curves: StiffnessCurves, faults: Sequence[Fault], path: Path, *, sound: StiffnessCurves
+) -> None:
+    """Single pair, mesh over one revolution and as it is when ``sound``, load sharing and compliance terms."""
     figure, axes = pyplot.subplots(2, 2, figsize=(11, 7.2), layout="constrained")
     _single_pair(axes[0, 0], curves, faults)
-    _mesh(axes[0, 1], system, curves, faults)
+    _mesh(axes[0, 1], system, curves, faults, sound)
     _load_sharing(axes[1, 0], system, curves, faults)
     _terms(axes[1, 1], curves)
     pair, of_what = system.pair, f" of the {system.torque_of}" if system.torque_of else ""
@@ -62,13 +64,20 @@ def _single_pair(axes: Any, curves: StiffnessCurves, faults: Sequence[Fault]) ->
     axes.legend()
 
 
-def _mesh(axes: Any, system: PairMachine, curves: StiffnessCurves, faults: Sequence[Fault]) -> None:
-    axes.plot(np.degrees(curves.roll_angle), curves.mesh_stiffness / 1e8, color=SOUND, linewidth=0.9)
+def _mesh(
+    axes: Any, system: PairMachine, curves: StiffnessCurves, faults: Sequence[Fault], sound: StiffnessCurves
+) -> None:
+    angle = np.degrees(curves.roll_angle)
     if faults:
-        angle = _fault_angle(system, faults[0])
-        axes.axvspan(
-            angle, angle + _contact_angle(system, faults[0]), color=FAULTY, alpha=0.2, label=f"{faults[0].kind}"
-        )
+        # A sound mesh has the period of a tooth, so that its turn of the pinion fits a turn of the wheel too.
+        without = np.resize(sound.mesh_stiffness, angle.shape)
+        axes.plot(angle, without / 1e8, color=GREY, linewidth=0.7, label="sound")
+    label = f"with {faults[0].kind}" if faults else None
+    axes.plot(angle, curves.mesh_stiffness / 1e8, color=SOUND, linewidth=0.9, label=label)
+    if faults:
+        begin = _fault_angle(system, faults[0])
+        end = begin + _contact_angle(system, faults[0])
+        axes.axvspan(begin, end, color=FAULTY, alpha=0.2, label="its tooth in contact")
         axes.legend(loc="lower right")
     axes.set(
         title="Mesh stiffness over one revolution",
@@ -107,22 +116,32 @@ def _terms(axes: Any, curves: StiffnessCurves) -> None:
     axes.legend(fontsize="x-small", ncols=3, loc="lower right")
 
 
-def plot_record(system: PairMachine, acceleration: NDArray[np.float32], values: dict[str, Any], path: Path) -> None:
-    """Signal, spectrum and envelope spectrum of the most telling channel, shaft and mesh frequencies marked."""
+def plot_record(
+    system: PairMachine,
+    acceleration: NDArray[np.float32],
+    values: dict[str, Any],
+    path: Path,
+    *,
+    name: str | None = None,
+) -> None:
+    """Signal, spectrum and envelope spectrum of the most telling channel, shaft and mesh frequencies marked.
+
+    ``name`` is that of the record in the title; None takes its class and severity.
+    """
     from gensig.signals.envelope import envelope_spectrum
     from gensig.signals.spectrum import amplitude_spectrum
 
     names = system.sensing.channel_names
-    name = "pinion_y" if "pinion_y" in names else names[0]
-    signal = acceleration[names.index(name)].astype(np.float64)
+    channel = "pinion_y" if "pinion_y" in names else names[0]
+    signal = acceleration[names.index(channel)].astype(np.float64)
     rate = system.sensing.sampling_rate
-    unit = channel_unit(name).replace("^2", "$^2$")
-    what = "speed less the nominal one" if name.endswith(SPEED) else "acceleration"
+    unit = channel_unit(channel).replace("^2", "$^2$")
+    what = "speed less the nominal one" if channel.endswith(SPEED) else "acceleration"
     shaft, mesh = values["speed_rpm"] / 60.0, values["mesh_frequency_hz"]
     figure, axes = pyplot.subplots(3, 1, figsize=(11, 8.5), layout="constrained")
     shown = min(len(signal), int(5.0 * rate / shaft))
     axes[0].plot(np.arange(shown) / rate, signal[:shown], color=SOUND, linewidth=0.5)
-    axes[0].set(title=f"{name}, first turns of the pinion", xlabel="time, s", ylabel=f"{what}, {unit}")
+    axes[0].set(title=f"{channel}, first turns of the pinion", xlabel="time, s", ylabel=f"{what}, {unit}")
     frequency, amplitude = amplitude_spectrum(signal, rate)
     axes[1].semilogy(frequency / 1e3, np.maximum(amplitude, 1e-9), color=SOUND, linewidth=0.5)
     for harmonic in range(1, int(0.39 * rate / mesh) + 1):
@@ -145,10 +164,8 @@ def plot_record(system: PairMachine, acceleration: NDArray[np.float32], values: 
         xlabel="frequency, Hz",
         ylabel=f"amplitude, {unit}",
     )
-    figure.suptitle(
-        f"{values['label_name']}, severity {values['severity']:.2f}: {values['speed_rpm']:.1f} r/min, "
-        f"{values['torque_nm']:.3g} N m"
-    )
+    title = name or f"{values['label_name']}, severity {values['severity']:.2f}"
+    figure.suptitle(f"{title}: {values['speed_rpm']:.1f} r/min, {values['torque_nm']:.3g} N m")
     save(figure, path)
 
 

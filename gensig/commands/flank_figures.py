@@ -59,9 +59,13 @@ def plot_sliced_stiffness(
     single: Array,
     path: Path,
     *,
+    sound: TransmissionError,
     faulty: Array | None = None,
 ) -> None:
-    """Stiffness of one pair along its way, faulty too, and of the mesh over two periods or all that see a fault."""
+    """Stiffness of one pair along its way, faulty too, and of the mesh over two periods or all that see a fault.
+
+    ``sound`` is the mesh without the fault, drawn beside it.
+    """
     figure, axes = pyplot.subplots(1, 2, figsize=(11, 4.2), layout="constrained")
     axes[0].plot(position / system.pair.base_pitch, single / 1e9, color=SOUND, label="sound")
     if faulty is not None:
@@ -72,7 +76,14 @@ def plot_sliced_stiffness(
         xlabel="position of the first slice, base pitches",
         ylabel="stiffness, 10$^9$ N/m",
     )
-    axes[1].plot(*_over_periods(system, result, result.contact.stiffness / 1e9), color=SOUND)
+    stiffness = result.contact.stiffness
+    if faulty is not None:
+        without = np.resize(sound.contact.stiffness, stiffness.shape) / 1e9
+        axes[1].plot(*_over_periods(system, result, without), color=GREY, linewidth=0.8, label="sound")
+    colour, label = (SOUND, "sound") if faulty is None else (COLOURS[1], "faulty")
+    axes[1].plot(*_over_periods(system, result, stiffness / 1e9), color=colour, label=label)
+    if faulty is not None:
+        axes[1].legend()
     axes[1].set(title="Mesh", xlabel="mesh periods", ylabel="stiffness, 10$^9$ N/m")
     figure.suptitle(_title(system))
     save(figure, path)

@@ -12,7 +12,7 @@ import numpy as np
 
 from gensig.commands.console import one_line_warnings
 from gensig.commands.heat_report import heat_content, heat_report, print_heat
-from gensig.commands.output import check_outputs, write_outputs
+from gensig.commands.output import check_outputs, highest, write_outputs
 from gensig.commands.reading import read_watched
 from gensig.errors import ConfigError
 from gensig.faults.registry import read_faults
@@ -128,7 +128,7 @@ def sliced_stiffness(config: Mapping[str, Any], arguments: Namespace) -> int:
         from gensig.commands.heat_figures import plot_heat
 
         if hot is None:
-            plot_sliced_stiffness(system, result, position, single, path, faulty=faulty)
+            plot_sliced_stiffness(system, result, position, single, path, faulty=faulty, sound=sound)
         else:
             plot_heat(hot, path)
 
@@ -137,7 +137,7 @@ def sliced_stiffness(config: Mapping[str, Any], arguments: Namespace) -> int:
           f"{system.pair.overlap_ratio:.4f} overlap, {system.pair.total_contact_ratio:.4f} total")  # fmt: skip
     print(f"mesh stiffness, mean       {stiffness.mean():.4e} N/m")
     print(f"mesh stiffness, range      {stiffness.min():.4e} .. {stiffness.max():.4e} N/m")
-    print(f"single pair, highest       {single.max():.4e} N/m")
+    print(f"single pair, highest       {highest(single, faulty)}")
     if faulty is not None:
         lost = 1e2 * (1.0 - stiffness / np.tile(sound.contact.stiffness, result.n_periods))
         print(f"mesh periods               {result.n_periods}, the first faulty tooth enters at roll 0")

@@ -10,6 +10,7 @@ from pathlib import Path
 from typing import Any
 
 import numpy as np
+from numpy.typing import NDArray
 
 from gensig.commands.console import replaced_file
 from gensig.errors import ConfigError
@@ -75,3 +76,9 @@ def plain(value: Any) -> Any:
     if isinstance(value, list | tuple):
         return [plain(one) for one in value]
     return None if isinstance(value, float) and not math.isfinite(value) else value
+
+
+def highest(sound: NDArray[np.float64], faulty: NDArray[np.float64] | None) -> str:
+    """The highest stiffness of a pair, and of the faulty one where there is one."""
+    both = "" if faulty is None else f" sound, {faulty.max():.4e} N/m faulty"
+    return f"{sound.max():.4e} N/m{both}"

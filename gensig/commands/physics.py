@@ -11,7 +11,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from gensig.commands.console import replaced_file
-from gensig.commands.output import FIGURE_TYPES, check_file, check_outputs, write_outputs
+from gensig.commands.output import FIGURE_TYPES, check_file, check_outputs, highest, write_outputs
 from gensig.commands.reading import read_watched
 from gensig.config import read_request
 from gensig.errors import ConfigError
@@ -54,7 +54,7 @@ def stiffness(arguments: Namespace) -> int:
     def draw(path: Path) -> None:
         from gensig.commands.figures import plot_stiffness
 
-        plot_stiffness(system, curves, faults, path)
+        plot_stiffness(system, curves, faults, path, sound=system.stiffness_curves() if faults else curves)
 
     write_outputs(arguments, content, draw)
     _print_stiffness(content, curves)
@@ -92,7 +92,7 @@ def _print_stiffness(content: dict[str, Any], curves: StiffnessCurves) -> None:
     print(f"base pitch                 {content['base_pitch_mm']:.5f} mm")
     print(f"mesh stiffness, mean       {content['mesh_stiffness_mean_n_per_m']:.4e} N/m")
     print(f"mesh stiffness, range      {curves.mesh_stiffness.min():.4e} .. {curves.mesh_stiffness.max():.4e} N/m")
-    print(f"single pair, highest       {curves.single_pair_stiffness.max():.4e} N/m")
+    print(f"single pair, highest       {highest(curves.single_pair_stiffness, curves.faulty_pair_stiffness)}")
     if curves.faulty_pair_stiffness is not None:
         loss = 1e2 * (1.0 - curves.faulty_pair_stiffness / curves.single_pair_stiffness)
         gap = np.array(content["faulty_pair_gap_um"])
@@ -138,11 +138,12 @@ def _simulate_again(arguments: Namespace) -> int:
         raise ConfigError("--from needs --record I, the number or id of a record")
     config, row = recorded_row(Path(arguments.folder), arguments.record)
     record = simulate_twin(config, row) if arguments.twin else simulate_record(config, row)
-    return _show(config, record, arguments)
+    name = f"healthy twin of {row['record_id']} ({row['label_name']})" if arguments.twin else None
+    return _show(config, record, arguments, name)
 
 
-def _show(config: dict[str, Any], record: Record, arguments: Namespace) -> int:
-    """Write, plot and describe one record."""
+def _show(config: dict[str, Any], record: Record, arguments: Namespace, name: str | None = None) -> int:
+    """Write, plot and describe one record, by its class and severity where it has no other name."""
     if record.values.get("status") == "failed":
         print(f"gensig: {record.values['status_reason']}", file=sys.stderr)
         return 1
@@ -153,7 +154,8 @@ def _show(config: dict[str, Any], record: Record, arguments: Namespace) -> int:
         from gensig.commands.figures import plot_record
 
         with replaced_file(arguments.plot) as path:
-            plot_record(system, record.signals["acceleration"], record.values, path)
+            plot_record(system, record.signals["acceleration"], record.values, path, name=name)
+    print(name or f"class {record.values['label_name']}, severity {record.values['severity']:.3f}")
     _print_record(system, record.signals["acceleration"], record.values)
     return 0
 
@@ -180,7 +182,6 @@ def _write_record(config: dict[str, Any], system: PairMachine, record: Record, o
 def _print_record(system: PairMachine, acceleration: NDArray[np.float32], values: dict[str, Any]) -> None:
     from gensig.signals.indicators import crest_factor, kurtosis, rms
 
-    print(f"class {values['label_name']}, severity {values['severity']:.3f}")
     print(f"speed {values['speed_rpm']:.3f} r/min, mesh frequency {values['mesh_frequency_hz']:.2f} Hz")
     print(f"{'channel':<16}{'RMS':>12} {'':<8}{'kurtosis':>12}{'crest':>12}")
     table = zip(

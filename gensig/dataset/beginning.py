@@ -19,6 +19,7 @@ from gensig.dataset.layout import (
     SPLITS,
     Manifest,
     ShardEntry,
+    read_manifest,
     shard_name,
     write_manifest,
 )
@@ -107,9 +108,22 @@ def refuse_used(out: Path) -> None:
     """Raise DatasetError where a folder exists and holds something, other than a beginning that was killed."""
     if out.is_dir():
         if any(out.iterdir()) and not _is_killed_beginning(out):
-            raise DatasetError(f"{out} exists and is not empty; choose another out=DIR or empty it first")
+            raise DatasetError(f"{out} {_what_it_holds(out)}")
     elif out.exists() or out.is_symlink():
         raise DatasetError(f"{out} exists and is no folder; choose another out=DIR")
+
+
+def _what_it_holds(out: Path) -> str:
+    """What stands in the way of a new data set, and what to do."""
+    try:
+        manifest = read_manifest(out)
+    except DatasetError:
+        return "exists and is not empty; choose another out=DIR or empty it first"
+    if manifest.is_complete:
+        return f"is not empty: a complete data set of {manifest.n_records} records; choose another out=DIR"
+    kind = "an interrupted" if manifest.n_done else "a planned"
+    done = f"{manifest.n_made} of {manifest.n_records} records done"
+    return f"is not empty: {kind} data set, {done}; `gensig resume {out}` finishes it, another out=DIR begins one"
 
 
 def _make_folders(folders: Sequence[Path], made: list[Path]) -> None:

@@ -15,7 +15,9 @@ from gensig.dataset.layout import CARD, CROISSANT, SHARDS
 from gensig.dataset.reader import Dataset, open_dataset
 
 GEOMETRY = (
-    "n_teeth_pinion", "n_teeth_wheel", "normal_module_mm", "pressure_angle_deg", "helix_angle_deg", "usable_band_hz",
+    "n_teeth_pinion", "n_teeth_wheel", "normal_module_mm", "pressure_angle_deg", "helix_angle_deg",
+    "face_width_pinion_mm", "face_width_wheel_mm", "center_distance_mm", "transverse_contact_ratio", "overlap_ratio",
+    "usable_band_hz",
 )  # fmt: skip
 
 LOAD = """```python
@@ -133,7 +135,7 @@ def _facts(data: Dataset) -> list[tuple[object, ...]]:
         ("sampling rate", f"{data.sampling_rate:g} Hz"),
         ("channels", channels),
     ]
-    rows += [(name, data.attributes[name]) for name in GEOMETRY if name in data.attributes]
+    rows += [(name, rounded(data.attributes[name])) for name in GEOMETRY if name in data.attributes]
     rows += [
         (name, len(np.unique(data.column(column))))
         for name, column in (("units", "unit_id"), ("specimens", "specimen_id"), ("gearboxes", "gearbox_id"))
@@ -172,6 +174,11 @@ def _splits(data: Dataset) -> list[tuple[object, ...]]:
 def torque_words(data: Dataset) -> str:
     """Whose torque `torque_nm` is: a drive line's is that of its load, whichever mesh its records follow."""
     return f"torque of the {plain(data.attributes.get('torque_of', 'driving shaft'))}"
+
+
+def rounded(value: object) -> object:
+    """A number to the fourth decimal, anything else as it is."""
+    return round(value, 4) if isinstance(value, float) else value
 
 
 def value_range(values: np.ndarray, unit: str) -> str:

@@ -39,12 +39,20 @@ def _folder(folder: Path) -> str:
     manifest = read_manifest(folder)
     lines = [
         f"{_show(folder)}: data set, format version {manifest.schema_version}, {manifest.state}",
+        *_how_to_finish(folder, manifest),
         *_manifest_lines(folder, manifest),
     ]
     if manifest.n_done:
         with open_dataset(folder, allow_incomplete=True) as data:
             lines += _dataset_lines(data)
     return "\n".join(lines) + "\n"
+
+
+def _how_to_finish(folder: Path, manifest: Manifest) -> list[str]:
+    if manifest.is_complete:
+        return []
+    done = f"{manifest.n_made} of {manifest.n_records} records"
+    return [f"  done         {done}; `gensig resume {_show(folder)}` finishes it"]
 
 
 def _manifest_lines(folder: Path, manifest: Manifest) -> list[str]:

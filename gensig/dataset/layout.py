@@ -92,6 +92,11 @@ class Manifest:
         return sum(entry.state == "done" for entry in self.shards)
 
     @property
+    def n_made(self) -> int:
+        """Number of records in the finished shards."""
+        return sum(entry.rows for entry in self.shards if entry.state == "done")
+
+    @property
     def n_failed(self) -> int:
         """Number of failed records in the finished shards."""
         return sum(entry.n_failed for entry in self.shards)

@@ -6,7 +6,7 @@ wrong side of its unit is in no subset.
 """
 
 import functools
-from collections.abc import Callable
+from collections.abc import Callable, Collection
 from dataclasses import dataclass
 
 import numpy as np
@@ -60,14 +60,19 @@ def make_splits(plan: Plan, seed: int) -> dict[str, SplitTable]:
     return {name: table for name, table in _outcomes(plan, seed) if isinstance(table, SplitTable)}
 
 
-def why_left_out(plan: Plan, seed: int) -> dict[str, str]:
-    """Protocol -> one line that says why this plan cannot have it, for those that `make_splits` leaves out."""
-    return {name: reason for name, reason in _outcomes(plan, seed) if isinstance(reason, str)}
+def why_left_out(plan: Plan, seed: int, names: Collection[str] | None = None) -> dict[str, str]:
+    """Protocol -> one line that says why this plan cannot have it, for those that `make_splits` leaves out.
+
+    ``names`` are the protocols to ask about, None all of them.
+    """
+    return {name: reason for name, reason in _outcomes(plan, seed, names) if isinstance(reason, str)}
 
 
-def _outcomes(plan: Plan, seed: int) -> list[tuple[str, Outcome]]:
+def _outcomes(plan: Plan, seed: int, names: Collection[str] | None = None) -> list[tuple[str, Outcome]]:
     found: list[tuple[str, Outcome]] = []
     for name, protocol in PROTOCOLS.items():
+        if names is not None and name not in names:
+            continue
         sequence = np.random.SeedSequence(seed, spawn_key=(protocol.stream,))
         rng = np.random.Generator(np.random.Philox(sequence))
         missing = [column for column in ("label", *protocol.apart) if column not in plan.columns]

@@ -241,6 +241,11 @@ def kind_of(name: str) -> str | None:
     return "int" if np.dtype(column.dtype).kind == "i" else "float"
 
 
+def stored_reason(reason: str | float) -> str:
+    """`status_reason` as far as a shard holds it."""
+    return str(reason).encode("ascii", "backslashreplace")[: COLUMNS["status_reason"].n_bytes].decode()
+
+
 def unit_in_file(column: Column, attributes: Mapping[str, Any]) -> str:
     """Unit of a column in a data set with these root attributes: rotations among the channels are in rad/s^2."""
     units = (

@@ -26,6 +26,7 @@ from gensig.dataset.schema import (
     SCHEMA_VERSION,
     SIGNALS,
     Column,
+    stored_reason,
     unit_in_file,
 )
 from gensig.errors import DatasetError
@@ -287,7 +288,7 @@ def _encoded(column: Column, value: str | int | float) -> bytes | int | float:
             if not isinstance(value, str) or "\0" in value:
                 raise TypeError
             if column.name == "status_reason":
-                return value.encode("ascii", "backslashreplace")[: column.n_bytes]
+                return stored_reason(value).encode("ascii")
             encoded = value.encode("ascii")
             if len(encoded) > column.n_bytes:
                 raise OverflowError

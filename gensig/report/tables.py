@@ -9,7 +9,7 @@ from pathlib import Path
 import numpy as np
 
 from gensig.dataset.atomic import read_text
-from gensig.dataset.card import CAVEATS, GEOMETRY, plain, torque_words, value_range
+from gensig.dataset.card import CAVEATS, GEOMETRY, plain, rounded, torque_words, value_range
 from gensig.dataset.layout import CONFIG, CONFIG_BYTES_LIMIT, OVERRIDES
 from gensig.dataset.protocols import PROTOCOLS
 from gensig.dataset.reader import Dataset
@@ -23,6 +23,11 @@ IN_WORDS = {
     "normal_module_mm": "normal module, mm",
     "pressure_angle_deg": "pressure angle, degrees",
     "helix_angle_deg": "helix angle, degrees",
+    "face_width_pinion_mm": "face width of the pinion, mm",
+    "face_width_wheel_mm": "face width of the wheel, mm",
+    "center_distance_mm": "centre distance, mm",
+    "transverse_contact_ratio": "transverse contact ratio",
+    "overlap_ratio": "overlap ratio",
     "usable_band_hz": "usable band, Hz",
 }
 
@@ -178,7 +183,7 @@ def _file(path: Path) -> str:
 def _shown(value: object) -> str:
     if isinstance(value, (list, tuple, np.ndarray)):
         return " to ".join(f"{part:g}" if isinstance(part, (int, float)) else plain(part) for part in value)
-    return plain(value)
+    return plain(rounded(value))
 
 
 def _number(value: float) -> str:

@@ -1,6 +1,7 @@
 """Verbs as a user types them: what they write, and one clear line for every mistake."""
 
 import json
+import re
 from pathlib import Path
 
 import h5py
@@ -79,15 +80,18 @@ def test_simulate_writes_one_record(tmp_path: Path, suffix: str) -> None:
 def test_plan_predicts_without_writing(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
     words = ["plan", "experiment=quickstart", "operating.duration_s=0.05", f"out={tmp_path / 'x'}"]
     assert main(words) == 0
-    said = capsys.readouterr().out
+    said, notes = capsys.readouterr()
     assert "records    400" in said
     assert "healthy 100" in said
+    assert re.fullmatch(r"making \d+ of 400 records to time them\n", notes)
     assert not (tmp_path / "x").exists()
 
 
 def test_typed_fault_narrows_the_classes(capsys: pytest.CaptureFixture[str]) -> None:
     assert main(["plan", "experiment=quickstart", "fault=crack", "operating.duration_s=0.02"]) == 0
-    assert "crack 400" in capsys.readouterr().out
+    said, notes = capsys.readouterr()
+    assert "crack 400" in said
+    assert "gensig: note: fault=crack replaces plan.classes [healthy, crack, pitting, missing_tooth]\n" in notes
 
 
 def test_own_config_dir_adds_options(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
@@ -96,7 +100,11 @@ def test_own_config_dir_adds_options(tmp_path: Path, capsys: pytest.CaptureFixtu
         "kind: crack\ngear: wheel\ntooth: 1\ncrack_depth_mm: 2\ncrack_angle_deg: 60\ncrack_start: gamma_mid\nvary: {}\n"
     )
     assert main(["stiffness", "fault=deep", "--config-dir", str(tmp_path)]) == 0
-    assert "faulty pair loses" in capsys.readouterr().out
+    said = capsys.readouterr().out
+    assert "faulty pair loses" in said
+    found = re.search(r"single pair, highest +(\S+) N/m sound, (\S+) N/m faulty", said)
+    assert found is not None
+    assert 0.5 < float(found[2]) / float(found[1]) < 1.0
 
 
 BAD = {

@@ -212,6 +212,30 @@ def test_resume_with_another_identity_is_refused(
     assert {path: path.read_bytes() for path in begun.rglob("*") if path.is_file()} == before
 
 
+def test_what_was_begun_says_how_it_is_finished(begun: Path, capsys: pytest.CaptureFixture[str]) -> None:
+    how = f"2 of 6 records done; `gensig resume {begun}` finishes it"
+    assert main(["generate", *TINY, f"out={begun}"]) == 2
+    assert how in capsys.readouterr().err
+    assert main(["inspect", str(begun)]) == 0
+    assert how.replace(" done", "") in capsys.readouterr().out
+
+
+def test_a_change_is_refused_where_the_options_it_began_with_are_not_known(
+    tmp_path: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    own = tmp_path / "own" / "experiment"
+    own.mkdir(parents=True)
+    (own / "mine.yaml").write_text("# @package _global_\nseed: 1\n")
+    out = tmp_path / "data"
+    words = ["--config-dir", str(own.parent), "experiment=mine", *TINY]
+    assert main(["plan", "--freeze", *words, f"out={out}"]) == 0
+    capsys.readouterr()
+    assert resume(out, "seed=2") == 2
+    (line,) = capsys.readouterr().err.splitlines()
+    assert line.endswith("only executor.* may change: leave out seed=2")
+    assert resume(out) == 0
+
+
 def test_a_change_is_named_before_any_shard_is_done(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
     out = tmp_path / "data"
     assert main(["plan", "--freeze", *TINY, f"out={out}"]) == 0

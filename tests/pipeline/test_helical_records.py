@@ -36,6 +36,12 @@ def test_a_set_is_whole_and_every_record_is_found_good(helical: Path, capsys: py
         assert tuple(data.channel_names) == ("pinion_y", "pinion_z", "wheel_y", "wheel_z")
         assert set(data.column("label_name")) == {"healthy", "crack", "pitting", "chipped", "missing_tooth"}
         assert set(data.column("status")) == {"ok"}
+        pair = read_system(read_request(list(SMALL)).config).pair
+        ratio = pair.overlap_ratio
+        assert data.attributes["overlap_ratio"] == ratio
+        told = {"helix_angle_deg": 18.0, "face_width_wheel_mm": 14.0, "overlap_ratio": round(ratio, 4)}
+        card = (helical / "README.md").read_text().replace("\\", "")
+        assert [f"| {name} | {value} |" in card for name, value in told.items()] == [True] * 3
         assert set(data.column("integration_check")) == {"error"}
         assert data.column("integration_error").max() <= 1e-3
         level = np.array([np.square(data.signals(k)).mean(axis=1) for k in range(data.n_records)])

@@ -28,14 +28,16 @@ def test_plain_lines_come_every_few_seconds_even_before_a_shard(
     monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
 ) -> None:
     monkeypatch.setattr(console, "LINE_SECONDS", 0.05)
-    with ShardProgress(quiet=False, n_records=100) as progress:
+    with ShardProgress(quiet=False, n_records=100, n_shards=17, n_at_work=3) as progress:
         time.sleep(0.3)
         before = capsys.readouterr().err.splitlines()
         progress(STATE)
         time.sleep(0.3)
     after = capsys.readouterr().err.splitlines()
     assert len(before) >= 2
-    assert all(re.fullmatch(r"0 of 100 records, 0 s", line) for line in before)
+    assert all(
+        re.fullmatch(r"0 of 100 records, 0 s; 3 of 17 shards at work, counted when whole", line) for line in before
+    )
     assert len(after) >= 2
     assert all(
         re.fullmatch(r"60 of 100 records, [0-9.]+ records/s, 8\.0 MB, 0 s left, 2 failed", line) for line in after
@@ -50,7 +52,8 @@ def test_a_long_wait_for_the_first_record_is_explained() -> None:
 
 def test_rate_and_time_left_are_those_of_this_run() -> None:
     """Records that were there before a resume were not made by it."""
-    progress = ShardProgress(quiet=True, n_records=100)
+    progress = ShardProgress(quiet=True, n_records=100, n_shards=1, n_at_work=2)
+    assert progress.facts() == "0 s; 1 of 1 shards at work, counted when whole"
     progress._begin -= 20.0
     progress(STATE)
     assert progress.facts() == "2.0 records/s, 8.0 MB, 20 s left, 2 failed"

@@ -1,13 +1,14 @@
 """Records made once more from a data set: the same bits, and a twin that differs by the fault alone."""
 
 import json
+import re
 import shutil
 from pathlib import Path
 
 import h5py
 import numpy as np
 import pytest
-from small_sets import make
+from small_sets import TINY, make
 
 from gensig.cli import main
 
@@ -77,13 +78,34 @@ def test_all_that_is_stored_is_compared(
     assert "in r000002" in said
 
 
+def test_records_that_failed_are_told_apart(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
+    """Half of the conditions ask for steps that are too long; all that says so names the reason."""
+    out = tmp_path / "data"
+    vary = "plan.vary={operating.drive_frequency_hz:{distribution:choice,values:[1,1e6]}}"
+    words = ["generate", *TINY, "dataset.records_per_shard=4", vary, "executor.n_workers=1", f"out={out}"]
+    failed = r"(\d) of 6 records failed.*: solver.oversampling = 5 makes internal steps of .* at least \d+"
+    assert main(words) == 1
+    found = re.search(failed, capsys.readouterr().err)
+    assert found is not None
+    n_failed = int(found[1])
+    assert 0 < n_failed < 6
+    assert re.search(failed, (out / "run.log").read_text())
+    for verb in ("resume", "finalize"):
+        assert main([verb, str(out)]) == 1
+        assert re.search(failed, capsys.readouterr().err)
+    again = f"{6 - n_failed} of 6 records have the same bits; {n_failed} failed again for the same reason"
+    assert reproduce(out, capsys) == (0, f"{again} and hold no signal\n")
+
+
 def read_one(path: Path) -> dict[str, np.ndarray]:
     with h5py.File(path) as file:
         return {name: file[name][0] for name in file if isinstance(file[name], h5py.Dataset)}
 
 
 @pytest.mark.parametrize("noise", ["healthy_twin", "record"])
-def test_record_and_twin_differ_by_the_fault_alone(reference: Path, tmp_path: Path, noise: str) -> None:
+def test_record_and_twin_differ_by_the_fault_alone(
+    reference: Path, tmp_path: Path, noise: str, capsys: pytest.CaptureFixture[str]
+) -> None:
     folder = reference
     if noise == "record":
         folder = make(tmp_path / "data", *SET, "sensing.snr_reference=record", "sensing.snr_db=20")
@@ -93,6 +115,9 @@ def test_record_and_twin_differ_by_the_fault_alone(reference: Path, tmp_path: Pa
     words = ["simulate", "--from", str(folder), "--record", str(faulty), "--output"]
     assert main([*words, str(tmp_path / "again.h5")]) == 0
     assert main([*words, str(tmp_path / "twin.h5"), "--twin"]) == 0
+    said = capsys.readouterr().out
+    assert f"healthy twin of r{faulty:06d} (crack)\nspeed" in said
+    assert f"class crack, severity {read_one(tmp_path / 'again.h5')['severity']:.3f}\nspeed" in said
     again, twin = read_one(tmp_path / "again.h5"), read_one(tmp_path / "twin.h5")
     for name, values in stored.items():
         assert np.array_equal(again[name], values), name

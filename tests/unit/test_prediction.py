@@ -6,8 +6,10 @@ from pathlib import Path
 import pytest
 
 import gensig
+from gensig import records
 from gensig.config import read_request
-from gensig.prediction import predict
+from gensig.errors import SimulationError
+from gensig.prediction import FailedRecordsWarning, predict
 
 CLASSES = "plan.classes=[healthy,crack,pitting,missing_tooth]"
 SPEEDS = "plan.vary={operating.speed_rpm: {distribution: choice, values: [1200, 1800, 2400]}}"
@@ -47,4 +49,13 @@ def test_what_a_grid_holds_is_told() -> None:
     assert told["records"] == "24"
     assert told["classes"].count(" 6") == 4
     assert (told["units"], told["conditions"], told["repeats"]) == ("2", "6", "1")
+    assert (told["specimens"], told["gearboxes"]) == ("2 (sets of gears)", "1")
     assert told["design"].startswith("grid of operating.speed_rpm 3; drawn: crack.tooth, crack.crack_depth_mm")
+
+
+def test_records_that_fail_while_they_are_timed_are_told(monkeypatch: pytest.MonkeyPatch) -> None:
+    whole = records.simulate_with_lead_in
+    monkeypatch.setattr(records, "simulate_with_lead_in", lambda runs: [*whole(runs)[:-1], SimulationError("it grew")])
+    config = read_request(["operating.duration_s=0.02", "plan.n_records=2", "executor.n_workers=1"]).config
+    with pytest.warns(FailedRecordsWarning, match="^1 of 2 records made to time the plan failed: it grew$"):
+        predict(config)
