@@ -48,11 +48,13 @@ def predict(config: Mapping[str, Any]) -> dict[str, str]:
     whole = seconds * max(table.shard_sizes()) / len(probe)
     spread = table.n_records / max(table.shard_sizes()) / workers
     total = start_up + CLOSING + whole * (rounds if rounds < 2 * spread else spread)
+    n_gearboxes, n_specimens = (len(set(table.columns[f"{name}_id"])) for name in ("gearbox", "specimen"))
     classes = Counter(str(name) for name in table.columns["label_name"])
     return {
         "records": f"{table.n_records}",
         "classes": ", ".join(f"{name} {count}" for name, count in classes.items()),
         "units": f"{len(set(table.columns['unit_id']))}",
+        "gearboxes": f"{n_gearboxes}, each with {n_specimens} set{'s' * (n_specimens > 1)} of gears",
         "conditions": f"{len(set(table.columns['condition_id']))}",
         "design": describe_design(config),
         "repeats": f"{config['plan']['n_repeats']}",

@@ -197,6 +197,24 @@ def new(parser: argparse.ArgumentParser) -> None:
     parser.add_argument("--addendum", type=float, metavar="X", help="of the teeth, over the module (default: 1)")
     stiffness = "radial stiffness of what holds each gear (default: of ball bearings and shafts)"
     parser.add_argument("--supports", type=float, nargs="+", metavar="N_PER_M", help=stiffness)
+    parser.add_argument(
+        "--experiment",
+        choices=("plain", "realistic"),
+        default="plain",
+        help="what the plan is made on: clean signals at the bearings, or as measured (default: plain)",
+    )
+    parser.add_argument("--rate", type=float, metavar="HZ", help="samples a second (default: 51200)")
+    parser.add_argument("--duration", type=float, metavar="S", help="of a record (default: at least 10 turns)")
+    parser.add_argument("--grade", type=int, metavar="N", help="of ISO 1328 (default: that of the experiment)")
+    parser.add_argument("--classes", nargs="+", metavar="FAULT", help="healthy and faults (default: five)")
+    parser.add_argument("--sensors", nargs="+", metavar="NAME", help="on the housing, with --experiment realistic")
+    ends = ("LOW", "HIGH")
+    parser.add_argument(
+        "--speed-range", type=float, nargs=2, metavar=ends, help="shares of the rated speed (default: 0.5 1.2)"
+    )
+    parser.add_argument(
+        "--torque-range", type=float, nargs=2, metavar=ends, help="shares of the rated torque (default: 0.3 1.2)"
+    )
     parser.add_argument("--dir", default="configs", help="folder of your options (default: configs)")
     parser.add_argument("--json", action="store_true", help="print what was derived as JSON")
 

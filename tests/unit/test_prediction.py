@@ -47,4 +47,5 @@ def test_what_a_grid_holds_is_told() -> None:
     assert told["records"] == "24"
     assert told["classes"].count(" 6") == 4
     assert (told["units"], told["conditions"], told["repeats"]) == ("2", "6", "1")
+    assert told["gearboxes"] == "1, each with 2 sets of gears"
     assert told["design"].startswith("grid of operating.speed_rpm 3; drawn: crack.tooth, crack.crack_depth_mm")
