@@ -95,6 +95,7 @@ def tune_damper(parser: argparse.ArgumentParser) -> None:
     """Arguments of tune-damper."""
     overrides(parser)
     parser.add_argument("--out", required=True, metavar="FILE", help="option to write: DIR/system/NAME.yaml")
+    parser.add_argument("--force", action="store_true", help="replace the file of --out")
     parser.add_argument("--mesh", type=int, nargs=2, required=True, metavar="N", help="nodes of its two gears")
     parser.add_argument("--nodes", type=int, nargs="+", metavar="N", help="with a damper each (default: the gears)")
     parser.add_argument("--most-inertia", type=float, metavar="KG_M2", help="of a ring (default: that of its node)")
@@ -111,6 +112,7 @@ def modify_flank(parser: argparse.ArgumentParser) -> None:
     """Arguments of modify-flank."""
     overrides(parser)
     parser.add_argument("--out", required=True, metavar="FILE", help="option to write: DIR/modification/NAME.yaml")
+    parser.add_argument("--force", action="store_true", help="replace the file of --out")
     parser.add_argument(
         "--torques", type=float, nargs="+", metavar="NM", help="of the pinion (default: the configured)"
     )
@@ -132,6 +134,7 @@ def wear_life(parser: argparse.ArgumentParser) -> None:
     parser.add_argument("--torques", type=float, nargs="+", metavar="NM", help="of the map (default: 1/4 to 3/2)")
     parser.add_argument("--speeds", type=float, nargs="+", metavar="RPM", help="of the map (default: 1/4 to twice)")
     parser.add_argument("--out", metavar="FILE", help="write the worn flanks as an option: DIR/fault/NAME.yaml")
+    parser.add_argument("--force", action="store_true", help="replace the file of --out")
 
 
 def simulate(parser: argparse.ArgumentParser) -> None:
@@ -141,6 +144,7 @@ def simulate(parser: argparse.ArgumentParser) -> None:
     parser.add_argument("--record", metavar="I", help="with --from: number or id of the record")
     parser.add_argument("--twin", action="store_true", help="with --from: the same without its faults, noise included")
     parser.add_argument("--output", metavar="FILE", help="write the record: .h5 (a shard of one record) or .csv")
+    parser.add_argument("--force", action="store_true", help="replace the file of --output")
     parser.add_argument("--plot", metavar="FILE", help="write a figure: signal, spectrum, envelope spectrum")
 
 
