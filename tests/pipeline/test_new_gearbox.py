@@ -126,7 +126,14 @@ def test_the_measured_one_of_the_page_prints_what_the_page_shows(tmp_path, monke
     assert [line for line in pages[place + 3].code.strip().splitlines() if line not in printed] == []
 
 
-@pytest.mark.parametrize("helix", [(), ("--helix", "20")], ids=["spur", "helical"])
+REALISTIC = ("--experiment", "realistic", "--rate", "16000", "--classes", "healthy", "wear")
+
+
+@pytest.mark.parametrize(
+    "helix",
+    [(), ("--helix", "20"), REALISTIC, ("--helix", "20", *REALISTIC)],
+    ids=["spur", "helical", "measured", "helical measured"],
+)
 def test_the_printed_commands_work_as_printed(helix, tmp_path, monkeypatch, capsys):
     monkeypatch.chdir(tmp_path)
     assert main(["new", "gearbox", "mine", *SHEET, *helix]) == 0
@@ -135,7 +142,9 @@ def test_the_printed_commands_work_as_printed(helix, tmp_path, monkeypatch, caps
     cheap = ["operating.duration_s=0.1", "mesh.n_slices=8"]
     assert main([*simulate, *cheap]) == 0
     said = capsys.readouterr().out.partition("mesh frequency ")[2]
-    assert float(said.split()[0]) == pytest.approx(500.0, rel=1e-3)
+    assert float(said.split()[0]) == pytest.approx(
+        500.0, rel=2e-2 if "realistic" in helix else 1e-3
+    )  # speed that wanders
     assert (tmp_path / "mine.png").stat().st_size > 10_000
     assert main([*generate, *cheap, "plan.n_records=10", "plan.n_units=2", "executor.n_workers=1"]) == 0
     assert main(report) == 0
