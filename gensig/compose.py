@@ -17,7 +17,7 @@ from hydra.core.global_hydra import GlobalHydra
 from hydra.core.override_parser.overrides_parser import OverridesParser
 from hydra.core.override_parser.types import QuotedString
 from hydra.errors import HydraException
-from omegaconf import OmegaConf
+from omegaconf import ListConfig, OmegaConf
 from omegaconf.errors import OmegaConfBaseException
 
 from gensig import nearest, option_files
@@ -88,9 +88,27 @@ def override_keys(overrides: Sequence[str]) -> dict[str, str]:
     keys: dict[str, str] = {}
     for override in _parse(overrides):
         if override.is_sweep_override():
-            raise ConfigError(f"{override.input_line}: several values need -m (one data set for each)")
+            raise ConfigError(
+                f"{override.input_line}: several values need -m (one data set for each){_one_value(override)}"
+            )
         keys[str(override.key_or_group)] = override.get_value_element_as_str()
     return keys
+
+
+def _one_value(override: Any) -> str:
+    """What was perhaps meant by several values: a decimal comma, or a list without its brackets."""
+    key, text = str(override.key_or_group), str(override.input_line).partition("=")[2]
+    parts = [part.strip() for part in text.split(",")]
+    default = None
+    for primary in option_files.PRIMARY:
+        with _hydra():
+            default = OmegaConf.select(hydra_compose(config_name=primary), key) if default is None else default
+    numbers = re.fullmatch(r"[-+]?\d+, ?\d+", text)
+    if isinstance(default, ListConfig) or (default is None and "." in key and not numbers):
+        return f"; or is it a list? Then write '{key}=[{','.join(parts)}]'"
+    if numbers:
+        return f"; or is it a decimal point? Then write {key}={'.'.join(parts)}"
+    return ""
 
 
 def typed_mapping(overrides: Sequence[str], key: str) -> dict[str, Any]:
@@ -164,7 +182,8 @@ def _explain(error: Exception, config_name: str, overrides: Sequence[str], confi
     if found := re.search(r"Could not find '([^']+)'", text):
         group, _, wanted = found.group(1).rpartition("/")
         names = [one.name for one in option_files.options(group, config_dir)] if group else []
-        return f"no option '{wanted}' of {group or 'the configuration'}; {nearest.hint(wanted, names)}"
+        there = option_files.elsewhere(group, wanted) or nearest.hint(wanted, names)
+        return f"no option '{wanted}' of {group or 'the configuration'}; {there}"
     if "mismatched input" in text or "extraneous input" in text or "no viable alternative" in text:
         return f"cannot read the override: {text}"
     if found := re.search(r"Could not override '([^']+)'\. No match in the defaults list", text):

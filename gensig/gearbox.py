@@ -9,11 +9,13 @@ from typing import Any
 
 from gensig.config import read_request
 from gensig.dynamics.bearing_sizes import BearingSize, bearing_for
-from gensig.errors import ConfigError
+from gensig.errors import ConfigError, GensigError
 from gensig.geometry.contact import GearPair
+from gensig.life.root_stress import root_factors
 from gensig.option_writing import option_lines
 from gensig.systems.pair_machine import PairMachine
 from gensig.systems.registry import SIDES, read_pair, read_system
+from gensig.units import to_si
 
 WIDTH_IN_MODULES = 10.0
 BORE_SHARE = 0.4  # of the pinion's pitch diameter
@@ -21,6 +23,7 @@ DAMPING_RATIO = 0.03  # of each gear on its support
 LARGEST_ROUNDING = 0.38  # of the rack's tip, ISO 53-A
 ADDENDUM, CLEARANCE = 1.0, 0.25
 GIVEN = "given"
+MODULES = (0.1, 50.0)  # mm
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -54,6 +57,8 @@ class DataSheet:
         ):
             if wrong := [value for value in values if not (value > 0.0 and math.isfinite(value))]:
                 raise ConfigError(f"{flag} {wrong[0]:g} must be positive")
+        if not MODULES[0] <= self.module <= MODULES[1]:
+            raise ConfigError(f"--module {self.module:g} must lie in {MODULES[0]:g} to {MODULES[1]:g}: it is in mm")
 
     @property
     def is_helical(self) -> bool:
@@ -84,10 +89,32 @@ class GearOption:
         )
         return head + "\n".join(option_lines(self.gear, self.remarks)) + "\n"
 
-    def derived(self) -> dict[str, float]:
-        """What follows from the sheet, by key with its unit."""
-        pair, machine, speed = self.pair, self.machine, self.gear["rated_speed_rpm"]
+    def bearings(self) -> dict[str, str]:
+        """The bearings beside each gear."""
+        return {side: bearing_for(2.0 * self.gear[side]["bore_radius_mm"]).describes for side in SIDES}
+
+    def derived(self) -> dict[str, float | None]:
+        """What follows from the sheet, by key with its unit; None where there is none.
+
+        The root stress is sigma_F0 of ISO 6336-3 of the more stressed gear, without load factors.
+        """
+        pair, machine = self.pair, self.machine
+        speed, torque = self.gear["rated_speed_rpm"], self.gear["rated_torque_nm"]
+        ratio = pair.wheel.n_teeth / pair.pinion.n_teeth
+        force = torque / pair.pinion.pitch_radius
+        width = min(pair.pinion.face_width, pair.wheel.face_width)
+        try:
+            factors = root_factors(pair, allow_extrapolation=True).values()
+            stress = 1e-6 * force * max(one.stress_per_force for one in factors)
+        except GensigError:  # such as a contact ratio below 1, or a thin rim
+            stress = None
         return {
+            "wheel_speed_rpm": speed / ratio,
+            "wheel_torque_nm": torque * ratio,
+            "power_kw": 1e-3 * to_si("speed_rpm", speed) * torque,
+            "pitch_line_speed_m_per_s": to_si("speed_rpm", speed) * pair.pinion.pitch_radius,
+            "tooth_force_per_width_n_per_mm": 1e-3 * force / width,
+            "nominal_root_stress_mpa": stress,
             "center_distance_mm": pair.center_distance * 1e3,
             "transverse_contact_ratio": pair.transverse_contact_ratio,
             **({"overlap_ratio": pair.overlap_ratio} if self.is_helical else {}),
@@ -97,6 +124,7 @@ class GearOption:
             "pinion_inertia_kg_m2": machine.pinion.inertia,
             "wheel_inertia_kg_m2": machine.wheel.inertia,
             "backlash_um": self.gear["backlash_um"],
+            **{f"{side}_bore_mm": 2.0 * self.gear[side]["bore_radius_mm"] for side in SIDES},
         }
 
 

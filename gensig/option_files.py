@@ -20,6 +20,7 @@ from gensig.errors import ConfigError
 from gensig.units import split_unit
 
 PRIMARY = ("generate", "train")
+OWN = "configs"  # folder of a user's own options, unless told otherwise
 # suffix of a key as engineers write the unit; what is not here is written as it is
 WRITTEN = {
     "mpa_sqrt_m": "MPa sqrt(m)", "kg_m2": "kg m2", "w_per_m2k": "W/(m2 K)", "w_per_mk": "W/(m K)",
@@ -209,6 +210,13 @@ def _option_keys(group: str, option: str, package: str, config_dir: str | Path |
             inner, _, place = name.partition("@")
             yield from _option_keys(f"{group}/{inner}", other, f"{package}.{place or inner}", config_dir)
     yield from file.entries("" if file.is_global else f"{package}.")
+
+
+def elsewhere(group: str, option: str) -> str | None:
+    """How to take an option that lies in the folder where gensig new writes, for who forgot to name it."""
+    if not (Path(OWN) / group / f"{option}.yaml").is_file():
+        return None
+    return f"it is in ./{OWN}: add --config-dir {OWN}, in Python config_dir='{OWN}'"
 
 
 def _find(group: str, option: str, config_dir: str | Path | None) -> _File:

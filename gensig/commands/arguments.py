@@ -95,6 +95,7 @@ def tune_damper(parser: argparse.ArgumentParser) -> None:
     """Arguments of tune-damper."""
     overrides(parser)
     parser.add_argument("--out", required=True, metavar="FILE", help="option to write: DIR/system/NAME.yaml")
+    parser.add_argument("--force", action="store_true", help="replace the file of --out")
     parser.add_argument("--mesh", type=int, nargs=2, required=True, metavar="N", help="nodes of its two gears")
     parser.add_argument("--nodes", type=int, nargs="+", metavar="N", help="with a damper each (default: the gears)")
     parser.add_argument("--most-inertia", type=float, metavar="KG_M2", help="of a ring (default: that of its node)")
@@ -111,6 +112,7 @@ def modify_flank(parser: argparse.ArgumentParser) -> None:
     """Arguments of modify-flank."""
     overrides(parser)
     parser.add_argument("--out", required=True, metavar="FILE", help="option to write: DIR/modification/NAME.yaml")
+    parser.add_argument("--force", action="store_true", help="replace the file of --out")
     parser.add_argument(
         "--torques", type=float, nargs="+", metavar="NM", help="of the pinion (default: the configured)"
     )
@@ -132,6 +134,7 @@ def wear_life(parser: argparse.ArgumentParser) -> None:
     parser.add_argument("--torques", type=float, nargs="+", metavar="NM", help="of the map (default: 1/4 to 3/2)")
     parser.add_argument("--speeds", type=float, nargs="+", metavar="RPM", help="of the map (default: 1/4 to twice)")
     parser.add_argument("--out", metavar="FILE", help="write the worn flanks as an option: DIR/fault/NAME.yaml")
+    parser.add_argument("--force", action="store_true", help="replace the file of --out")
 
 
 def simulate(parser: argparse.ArgumentParser) -> None:
@@ -141,6 +144,7 @@ def simulate(parser: argparse.ArgumentParser) -> None:
     parser.add_argument("--record", metavar="I", help="with --from: number or id of the record")
     parser.add_argument("--twin", action="store_true", help="with --from: the same without its faults, noise included")
     parser.add_argument("--output", metavar="FILE", help="write the record: .h5 (a shard of one record) or .csv")
+    parser.add_argument("--force", action="store_true", help="replace the file of --output")
     parser.add_argument("--plot", metavar="FILE", help="write a figure: signal, spectrum, envelope spectrum")
 
 
@@ -197,6 +201,24 @@ def new(parser: argparse.ArgumentParser) -> None:
     parser.add_argument("--addendum", type=float, metavar="X", help="of the teeth, over the module (default: 1)")
     stiffness = "radial stiffness of what holds each gear (default: of ball bearings and shafts)"
     parser.add_argument("--supports", type=float, nargs="+", metavar="N_PER_M", help=stiffness)
+    parser.add_argument(
+        "--experiment",
+        choices=("plain", "realistic"),
+        default="plain",
+        help="what the plan is made on: clean signals at the bearings, or as measured (default: plain)",
+    )
+    parser.add_argument("--rate", type=float, metavar="HZ", help="samples a second (default: 51200)")
+    parser.add_argument("--duration", type=float, metavar="S", help="of a record (default: at least 10 turns)")
+    parser.add_argument("--grade", type=int, metavar="N", help="of ISO 1328 (default: that of the experiment)")
+    parser.add_argument("--classes", nargs="+", metavar="FAULT", help="healthy and faults (default: five)")
+    parser.add_argument("--sensors", nargs="+", metavar="NAME", help="on the housing, with --experiment realistic")
+    ends = ("LOW", "HIGH")
+    parser.add_argument(
+        "--speed-range", type=float, nargs=2, metavar=ends, help="shares of the rated speed (default: 0.5 1.2)"
+    )
+    parser.add_argument(
+        "--torque-range", type=float, nargs=2, metavar=ends, help="shares of the rated torque (default: 0.3 1.2)"
+    )
     parser.add_argument("--dir", default="configs", help="folder of your options (default: configs)")
     parser.add_argument("--json", action="store_true", help="print what was derived as JSON")
 

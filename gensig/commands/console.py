@@ -23,13 +23,14 @@ LONG_SECONDS = 10.0  # without a record: time to say what may take so long
 
 @contextmanager
 def one_line_warnings(program: str) -> Iterator[None]:
-    """Print each different warning once, as one line."""
-    seen: set[str] = set()
+    """Print each different warning once, as one line; of a category with ``once`` only the first."""
+    seen: set[object] = set()
 
-    def show(message: Warning | str, *_details: Any, **_more: Any) -> None:
+    def show(message: Warning | str, category: type[Warning], *_details: Any, **_more: Any) -> None:
         text = " ".join(str(message).split())
-        if text not in seen:
-            seen.add(text)
+        key = category if getattr(category, "once", False) else text
+        if key not in seen:
+            seen.add(key)
             print(f"{program}: note: {text}", file=sys.stderr)
 
     with warnings.catch_warnings():

@@ -34,7 +34,7 @@ def modes(arguments: Namespace) -> int:
         plot_modes(line, found, path)
 
     write_outputs(arguments, content, draw)
-    _print_modes(line, content)
+    _print_modes(line, found, content)
     return 0
 
 
@@ -82,18 +82,31 @@ def mesh_names(line: DriveLine) -> list[str]:
     return [f"{gears[mesh.driving].name} / {gears[mesh.driven].name}" for mesh in line.line.meshes]
 
 
-def _print_modes(line: DriveLine, content: Mapping[str, Any]) -> None:
-    """The lowest modes, each with the nodes that move most."""
-    speed = line.line.speed_ratio
-    print(
-        f"{content['system']}: {len(speed)} inertias, {len(line.line.shafts)} shafts, {len(line.line.meshes)} meshes, "
-        f"{content['n_loops']} loops, {content['n_rigid_modes']} rigid mode(s)"
-    )
+def _print_modes(line: DriveLine, found: Modes, content: Mapping[str, Any]) -> None:
+    """The lowest modes, each with the motions that have most of the kinetic energy, and where a mesh is the spring."""
+    matrices, n_nodes = line.matrices(), len(line.line.nodes)
+    n_lateral = len(matrices.coordinate_names) - n_nodes
+    counts = {
+        "inertias": n_nodes,
+        "lateral motions of gears (y along the line of action, x across it)": n_lateral,
+        "shafts": len(line.line.shafts),
+        "mesh(es)": len(line.line.meshes),
+        "loops": content["n_loops"],
+        "rigid mode(s)": content["n_rigid_modes"],
+    }
+    print(f"{content['system']}: " + ", ".join(f"{count} {what}" for what, count in counts.items() if count))
+    motions = [
+        f"{name} rotation" if n_lateral and k < n_nodes else name for k, name in enumerate(matrices.coordinate_names)
+    ]
     print(f"{'mode':>4} {'Hz':>10} {'damping':>8}  kinetic energy")
     for mode, frequency in enumerate(content["natural_frequencies_hz"][:SHOWN]):
-        share = np.array(content["kinetic_energy_share"][mode])
+        share = found.kinetic_share[mode]
         most = [place for place in np.argsort(-share, kind="stable")[:3] if share[place] > 0.05]
-        where = ", ".join(f"{share[place]:.0%} {content['nodes'][place]}" for place in most)
+        where = ", ".join(f"{share[place]:.0%} {motions[place]}" for place in most)
+        strain = max(content["mesh_strain_energy_share"][mode], default=0.0)
+        where += (
+            "; turns freely" if frequency == 0.0 else f"; {strain:.0%} of the strain in a mesh" if strain > 0.5 else ""
+        )
         print(f"{mode:>4} {frequency:>10.2f} {content['damping_ratio'][mode]:>8.4f}  {where}")
     if len(content["natural_frequencies_hz"]) > SHOWN:
         last = content["natural_frequencies_hz"][-1]

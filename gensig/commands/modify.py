@@ -27,7 +27,7 @@ def modify_flank(arguments: Namespace) -> int:
     if arguments.points < 1:
         raise ConfigError(f"--points {arguments.points}: give 1 for the least ripple alone, 3 or more for a front")
     check_outputs(arguments)
-    target = option_file(arguments.out, GROUP)
+    target = option_file(arguments.out, GROUP, force=arguments.force)
     config = read_watched(arguments)
     with one_line_warnings("gensig"):
         system = sound_pair(config)

@@ -3,22 +3,29 @@
 from __future__ import annotations
 
 import json
-import math
 import shlex
 import sys
+import tempfile
 import warnings
 from argparse import Namespace
 from collections.abc import Callable
 from pathlib import Path
 from typing import Any
 
+from gensig.commands.new_experiment import experiment_text, read_wishes
 from gensig.compose import options
+from gensig.config import read_request
 from gensig.errors import ConfigError
+from gensig.faults.registry import read_faults
 from gensig.gearbox import DataSheet, GearOption, gear_option
 from gensig.option_writing import is_option_name
+from gensig.systems.registry import SIDES, read_system
 
-LEAST_TURNS = 10  # of the pinion in a record at the slowest speed
-SPEED_SHARES, TORQUE_SHARES = (0.5, 1.2), (0.3, 1.2)  # of the rated ones, over which a plan draws
+STRONGEST = 1000.0  # MPa; about twice sigma_Flim of case-hardened steel (ISO 6336-5), which a smooth root bears
+SLACK = 1.0  # MPa of root stress, below which gears do no work
+WIDTHS = (1.0, 25.0)  # modules
+PITCH_LINE_SPEEDS = (0.05, 60.0)  # m/s
+SLOWEST = 30.0  # r/min
 
 # attribute, what to ask, how many numbers, whether it is needed
 QUESTIONS = (
@@ -39,19 +46,27 @@ def new(arguments: Namespace) -> int:
     files = {group: folder / group / f"{name}.yaml" for group in ("gear", "experiment")}
     _check_name(name, files.values())
     _complete(arguments)
+    wishes = read_wishes(arguments)
     option = gear_option(_sheet(arguments))
-    _warn(option)
-    texts = {"gear": option.text(), "experiment": _experiment(option)}
+    texts = {"gear": option.text(), "experiment": experiment_text(option, wishes)}
+    _check_texts(name, texts)
+    for message in doubts(option):
+        warnings.warn(message, stacklevel=2)
     for group, file in files.items():
         file.parent.mkdir(parents=True, exist_ok=True)
         file.write_text(texts[group], encoding="utf-8")
     commands = _commands(folder, name)
     if arguments.json:
-        content = {"files": [str(file) for file in files.values()], "derived": option.derived(), "next": commands}
+        content = {"files": [str(file) for file in files.values()], "derived": option.derived()}
+        content |= {"bearings": option.bearings(), "next": commands}
         print(json.dumps(content))
     else:
         print(f"wrote {' and '.join(str(file) for file in files.values())}; each line there says where it is from")
-        print("derived: " + ", ".join(f"{key} {value:.4g}" for key, value in option.derived().items()))
+        print("with the gears as given it follows:")
+        for key, value in option.derived().items():
+            print(f"  {key:<32}{'-' if value is None else format(value, '.4g')}")
+        for side, bearing in option.bearings().items():
+            print(f"  {side + '_bearings':<32}{bearing}")
         print("next:", *(f"  {command}" for command in commands), sep="\n")
     return 0
 
@@ -124,50 +139,49 @@ def _sheet(arguments: Namespace) -> DataSheet:
     )
 
 
-def _warn(option: GearOption) -> None:
-    ratio = option.pair.transverse_contact_ratio
-    if ratio < 1.0:
-        warnings.warn(
+def doubts(option: GearOption) -> list[str]:
+    """What no pair of steel gears has, or what gensig will not simulate: perhaps another unit was meant."""
+    told, found = option.derived(), []
+    ratio, speed, torque = told["transverse_contact_ratio"], option.gear["rated_speed_rpm"], told["wheel_torque_nm"]
+    if ratio is not None and ratio < 1.0:
+        found.append(
             f"the transverse contact ratio {ratio:.3f} is below 1: the drive is interrupted at every tooth. gensig "
-            "stiffness takes these gears, records are refused; use more teeth or another profile shift",
-            stacklevel=2,
+            "stiffness takes these gears, records are refused; use more teeth or another profile shift"
         )
-    speed = 2.0 * math.pi / 60.0 * option.gear["rated_speed_rpm"] * option.pair.pinion.pitch_radius
-    if speed > 100.0:
-        warnings.warn(f"a pitch line speed of {speed:.0f} m/s; are speed and module right?", stacklevel=2)
+    if speed < SLOWEST:
+        found.append(f"--speed {speed:g}: the pinion turns slower than {SLOWEST:g} r/min; is it r/min, not Hz?")
+    line_speed, (slow, fast) = told["pitch_line_speed_m_per_s"], PITCH_LINE_SPEEDS
+    if line_speed is not None and not slow <= line_speed <= fast:
+        found.append(
+            f"a pitch line speed of {line_speed:.3g} m/s, outside {slow:g} to {fast:g}; are --speed in r/min of the "
+            "pinion and --module in mm?"
+        )
+    for side in SIDES:
+        modules = option.gear[side]["face_width_mm"] / option.gear["normal_module_mm"]
+        if not WIDTHS[0] <= modules <= WIDTHS[1]:
+            found.append(
+                f"the {side} is {modules:.3g} modules wide, outside {WIDTHS[0]:g} to {WIDTHS[1]:g}; are --widths in mm?"
+            )
+    stress = told["nominal_root_stress_mpa"]
+    if stress is not None and not SLACK <= stress <= STRONGEST:
+        why = f"no steel bears more than about {STRONGEST:g}" if stress > STRONGEST else "gears that do no work"
+        found.append(
+            f"a nominal root stress of {stress:.3g} MPa: {why}; are --torque in N m of the pinion (the wheel has "
+            f"{torque:.4g}) and --widths in mm?"
+        )
+    return found
 
 
-def _experiment(option: GearOption) -> str:
-    """A plan over all that the gears are rated for."""
-    name, speed, torque = (option.gear[key] for key in ("name", "rated_speed_rpm", "rated_torque_nm"))
-    duration = max(1.0, math.ceil(10.0 * LEAST_TURNS * 60.0 / (SPEED_SHARES[0] * speed)) / 10.0)
-    helical = "  - override /system: helical_pair\n" if option.is_helical else ""
-    channels = (
-        "[pinion_y, pinion_z, wheel_y, wheel_z]" if option.is_helical else "[pinion_x, pinion_y, wheel_x, wheel_y]"
-    )
-    speeds, torques = (
-        f"low: {shares[0] * rated:.6g}, high: {shares[1] * rated:.6g}"
-        for shares, rated in ((SPEED_SHARES, speed), (TORQUE_SHARES, torque))
-    )
-    return f"""# @package _global_
-# Written by gensig new gearbox: 80 records of {name}, five classes from 8 units. Faults are drawn in shares of a tooth.
-defaults:
-{helical}  - override /gear: {name}
-  - _self_
-
-operating:
-  duration_s: {duration:g}                 # at least {LEAST_TURNS} turns of the pinion at the slowest speed
-sensing:
-  channels: {channels}   # at the bearings
-plan:
-  n_records: 80
-  n_units: 8
-  classes: [healthy, crack, pitting, chipped, missing_tooth]
-  vary:                          # ranges assumed: shares of the rated values
-    operating.speed_rpm: {{distribution: uniform, {speeds}}}
-    operating.torque_nm: {{distribution: uniform, {torques}}}
-    sensing.snr_db: {{distribution: uniform, low: 10, high: 30}}
-"""
+def _check_texts(name: str, texts: dict[str, str]) -> None:
+    """Raise for an experiment that does not compose, before anything is written."""
+    with tempfile.TemporaryDirectory() as folder:
+        for group, text in texts.items():
+            (Path(folder) / group).mkdir()
+            (Path(folder) / group / f"{name}.yaml").write_text(text, encoding="utf-8")
+        request = read_request([f"experiment={name}"], config_dir=folder)
+        for fault in request.config["classes"].values():
+            read_faults(fault)
+        read_system(request.config)
 
 
 def _commands(folder: Path, name: str) -> list[str]:

@@ -10,7 +10,7 @@ from collections.abc import Sequence
 from dataclasses import asdict
 from typing import Any
 
-from gensig import nearest
+from gensig import nearest, option_files
 from gensig.errors import ConfigError
 from gensig.option_files import (
     PRIMARY,
@@ -70,7 +70,8 @@ def _one_option(group: str, option: str, folder: str | None) -> tuple[Any, list[
     _check_group(group, folder)
     found = {one.name: one for one in options(group, folder)}
     if option not in found:
-        raise ConfigError(f"no option '{option}' of {group}; {nearest.hint(option, found)}")
+        there = option_files.elsewhere(group, option) or nearest.hint(option, found)
+        raise ConfigError(f"no option '{option}' of {group}; {there}")
     keys, beside = option_keys(group, option, folder), chosen_beside(group, option, folder)
     about = found[option].about
     listed = [asdict(key) for key in keys]

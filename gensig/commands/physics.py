@@ -11,7 +11,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from gensig.commands.console import replaced_file
-from gensig.commands.output import FIGURE_TYPES, check_file, check_outputs, highest, write_outputs
+from gensig.commands.output import FIGURE_TYPES, check_file, check_new, check_outputs, highest, write_outputs
 from gensig.commands.reading import read_watched
 from gensig.config import read_request
 from gensig.errors import ConfigError
@@ -113,6 +113,7 @@ def simulate(arguments: Namespace) -> int:
 
     check_file("--plot", arguments.plot, FIGURE_TYPES)
     check_file("--output", arguments.output, RECORD_TYPES)
+    check_new("--output", arguments.output, force=arguments.force)
     if arguments.folder is not None:
         return _simulate_again(arguments)
     if arguments.record is not None or arguments.twin:

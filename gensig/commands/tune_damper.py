@@ -53,7 +53,7 @@ class State:
 def tune_damper(arguments: Namespace) -> int:
     """Search, write the line with its dampers as an option of the group ``system``, print both states."""
     check_outputs(arguments)
-    target = option_file(arguments.out, GROUP)
+    target = option_file(arguments.out, GROUP, force=arguments.force)
     config = read_watched(arguments)
     line = read_engine_line(config)
     if line.engine.pressure_decides_torque:

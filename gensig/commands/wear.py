@@ -38,7 +38,7 @@ YIELD_SHARE = 0.6  # of the hardness: a line contact yields below its surface (J
 def wear_life_verb(arguments: Namespace) -> int:
     """Life and wear to JSON, a figure, an option for records, or a summary."""
     check_outputs(arguments)
-    target = None if arguments.out is None else option_file(arguments.out, GROUP)
+    target = None if arguments.out is None else option_file(arguments.out, GROUP, force=arguments.force)
     config = read_watched(arguments)
     with one_line_warnings("gensig"):
         case = read_wear_case(config)

@@ -32,12 +32,15 @@ CHECKED = 0.03  # s at the beginning of a record, integrated again at half the s
 FINEST = 64  # steps per sample that are tried where the error is too large
 SETTLED = 1e-4  # what is left of the start's transient, as a share
 STABILITY_LIMIT = 2.6  # |lambda| h of the classical RK4 on the imaginary axis is 2.83, on the real axis 2.79
+LONG_STEP = 0.5  # of the same, above which the error may exceed 1e-3
 OUT_OF_BOUNDS = 1e6  # m, rad, m/s or rad/s: no machine; a motion that overflows may come back to finite numbers
 MOST_BYTES = 2**28  # of the samples of the records that are simulated side by side
 
 
 class CoarseStepWarning(UserWarning):
     """A step that is stable but too long for the stated error."""
+
+    once = True  # each machine of a plan says it with other numbers
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -260,7 +263,7 @@ def settling_oversampling(dynamics: PairDynamics, solver: Solver, sampling_rate:
     ------
     SimulationError    where even the record's step is too long for the stiffest motion
     """
-    check_step(dynamics, sampling_rate, solver.oversampling)
+    check_step(dynamics, sampling_rate, solver.oversampling, solver.max_error)
     fastest = float(np.abs(dynamics.stiff_rates).max()) / sampling_rate
     return min(solver.oversampling, math.ceil(fastest / (COARSE_STABILITY * STABILITY_LIMIT)))
 
@@ -302,8 +305,11 @@ def check_channels(channels: tuple[str, ...], dofs: tuple[str, ...] = DOFS) -> N
         raise ConfigError(f"sensing.channels: no channel {', '.join(unknown)}; allowed: {', '.join(dofs)}")
 
 
-def check_step(dynamics: PairDynamics, sampling_rate: float, oversampling: int) -> None:
-    """Raise SimulationError for a step that RK4 cannot take, warn of one that is too long to be accurate."""
+def check_step(dynamics: PairDynamics, sampling_rate: float, oversampling: int, max_error: float | None = None) -> None:
+    """Raise SimulationError for a step that RK4 cannot take, warn of a long one where nothing will look at its error.
+
+    With a ``max_error`` records whose error is too large are made again at half the step.
+    """
     rates, step = dynamics.stiff_rates, 1.0 / (sampling_rate * oversampling)
     fastest = float(np.abs(rates).max())
     if fastest * step > STABILITY_LIMIT:
@@ -313,10 +319,12 @@ def check_step(dynamics: PairDynamics, sampling_rate: float, oversampling: int) 
             f"{math.ceil(oversampling * fastest * step / STABILITY_LIMIT)}"
         )
     oscillating = float(np.abs(np.imag(rates)).max())
-    if oscillating * step > 0.5:
+    if max_error is None and oscillating * step > LONG_STEP:
         warnings.warn(
             f"{2 * math.pi / (oscillating * step):.1f} internal steps to a period of the mesh mode at "
-            f"{oscillating / (2 * math.pi):.4g} Hz: the error exceeds 1e-3; raise solver.oversampling",
+            f"{oscillating / (2 * math.pi):.4g} Hz, and solver.max_error = null looks at no error, which may exceed "
+            f"1e-3: raise solver.oversampling to {math.ceil(oversampling * oscillating * step / LONG_STEP)}, or give "
+            "solver.max_error=1e-3",
             CoarseStepWarning,
             stacklevel=2,
         )

@@ -65,7 +65,8 @@ class Sensing:
             if self.noise.band is not None and self.noise.band[1] > 0.5 * self.sampling_rate:
                 raise ConfigError(
                     f"sensing.noise.band_hz ends at {self.noise.band[1]:g} Hz, above half of "
-                    f"sensing.sampling_rate_hz = {self.sampling_rate:g}"
+                    f"sensing.sampling_rate_hz = {self.sampling_rate:g}; give "
+                    f"'sensing.noise.band_hz=[{self.noise.band[0]:g},{0.5 * self.sampling_rate:g}]' or a higher rate"
                 )
             if self.noise.offsets is not None and len(self.noise.offsets) != len(self.channel_names):
                 raise ConfigError(
@@ -141,10 +142,13 @@ class Sensing:
         if turning := [name for name in self.channels if is_turning(name)]:
             raise ConfigError(f"sensing.channels: {turning[0]} is no bearing; a transfer path takes bearing channels")
         highest = usable_band(self.sampling_rate)[1]
+        lowest = self.path.natural_frequency[0] if isinstance(self.path, ModalPath) else 0.0
         if isinstance(self.path, ModalPath) and self.path.natural_frequency[1] > highest:
             raise ConfigError(
                 f"sensing.path.natural_frequency_hz reaches {self.path.natural_frequency[1]:g} Hz, above the usable "
-                f"band of {highest:g} Hz at sensing.sampling_rate_hz = {self.sampling_rate:g}"
+                f"band of {highest:g} Hz at sensing.sampling_rate_hz = {self.sampling_rate:g}; give "
+                + (f"'sensing.path.natural_frequency_hz=[{lowest:g},{highest:g}]' or " if lowest < highest else "")
+                + f"a rate of at least {math.ceil(self.path.natural_frequency[1] / usable_band(1.0)[1])} Hz"
             )
 
     def _check_sensor(self) -> None:

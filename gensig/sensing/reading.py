@@ -49,7 +49,11 @@ def _read_path(values: Any) -> ModalPath | MeasuredPath | None:
     own = {key: value for key, value in values.items() if key != "kind"} if isinstance(values, Mapping) else {}
     if kind == IDENTITY:
         if own:
-            raise ConfigError(f"sensing.path: unknown key '{next(iter(own))}'; kind = identity has no other key")
+            raise ConfigError(
+                f"sensing.path: unknown key '{next(iter(own))}'; kind = identity has no other key. "
+                "Where you did not type it, the file of the experiment sets it for the sensing that it chooses: keep "
+                f"that one, or add '~sensing.path.{next(iter(own))}'"
+            )
         return None
     if kind not in PATHS:
         raise ConfigError(f"sensing.path.kind = {kind!r}; allowed: {', '.join((IDENTITY, *PATHS))}")

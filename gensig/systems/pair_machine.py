@@ -171,7 +171,7 @@ class PairMachine(ABC):
         nominal = Run(system=self, faults=()).dynamics()
         check_channels(sensing.channels, nominal.dofs)
         sensing.check(operating.duration)
-        check_step(nominal, sensing.sampling_rate, self.solver.oversampling)
+        check_step(nominal, sensing.sampling_rate, self.solver.oversampling, self.solver.max_error)
 
     def simulate(
         self,

@@ -58,7 +58,7 @@ def test_contact_ratio_below_one_warns_here_and_is_refused_where_it_must_drive(
 
 
 @pytest.mark.parametrize("suffix", [".h5", ".csv"])
-def test_simulate_writes_one_record(tmp_path: Path, suffix: str) -> None:
+def test_simulate_writes_one_record(tmp_path: Path, suffix: str, capsys: pytest.CaptureFixture[str]) -> None:
     file = tmp_path / f"record{suffix}"
     words = ["simulate", "fault=missing_tooth", "operating.duration_s=0.1", "sensing.channels=[pinion_y,wheel_y]"]
     assert main([*words, "--output", str(file), "--plot", str(tmp_path / "r.png")]) == 0
@@ -74,6 +74,12 @@ def test_simulate_writes_one_record(tmp_path: Path, suffix: str) -> None:
         assert table.dtype.names == ("time_s", "pinion_y_m_per_s2", "wheel_y_m_per_s2")
         assert len(table) == 5120
     assert (tmp_path / "r.png").stat().st_size > 10_000
+    before = file.stat().st_mtime_ns
+    assert main([*words, "--output", str(file)]) == 2
+    assert "is there already; choose another name, or add --force" in capsys.readouterr().err
+    assert file.stat().st_mtime_ns == before
+    assert main([*words, "--output", str(file), "--force"]) == 0
+    assert file.stat().st_mtime_ns > before
     assert not list(tmp_path.glob(".*"))
 
 

@@ -84,6 +84,7 @@ MISTAKES = {
     "gensig generate fault=crakc out=x": "did you mean 'crack'?",
     "gensig generate falt=crack out=x": "did you mean 'fault'",
     "gensig generate plan.classes=[crak] out=x": "did you mean 'crack'?",
+    "gensig generate plan.classes=[worn] out=x": "did you mean 'wear'? there is broken",
     "gensig generate experiment=quikstart out=x": "did you mean 'quickstart'?",
     "gensig generate system=spurpair out=x": "did you mean 'spur_pair'?",
     "gensig generate operating.speed=1200 out=x": "'operating.speed_rpm'",

@@ -46,6 +46,16 @@ def test_the_engine_has_the_frequencies_of_its_printed_tables(tmp_path, capsys):
     assert "28.31" in capsys.readouterr().out
 
 
+def test_a_pair_says_which_way_its_gears_move(capsys):
+    assert main(["modes", "experiment=realistic"]) == 0
+    head, _, *modes = capsys.readouterr().out.splitlines()
+    assert "4 inertias, 4 lateral motions of gears" in head
+    assert modes[0].endswith("turns freely")
+    assert any("% wheel x" in line for line in modes)
+    assert "pinion rotation" in modes[-1]
+    assert modes[-1].endswith("of the strain in a mesh")
+
+
 def test_lateral_motion_adds_22_masses(tmp_path):
     content = modes_of(tmp_path, ENGINE, "system.lateral=true")
     assert len(content["natural_frequencies_hz"]) == 67 + 22

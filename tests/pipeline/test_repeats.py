@@ -41,4 +41,4 @@ def test_repeats_are_stored_and_told_apart(tmp_path: Path, capsys: pytest.Captur
 
 def test_one_record_of_a_plan_with_repeats_can_be_looked_at(tmp_path: Path) -> None:
     for words in (WORDS, ("plan.design=grid", "plan.n_repeats=3", "operating.duration_s=0.02")):
-        assert main(["simulate", *words, "--output", str(tmp_path / "record.csv")]) == 0
+        assert main(["simulate", *words, "--output", str(tmp_path / "record.csv"), "--force"]) == 0

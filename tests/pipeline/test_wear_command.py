@@ -95,6 +95,8 @@ def test_worn_flanks_as_an_option_that_other_commands_take(tmp_path, capsys):
     target.parent.mkdir(parents=True)
     assert main(["wear-life", "wear.threshold_um=20", "--out", str(target)]) == 0
     assert "fault=worn --config-dir" in capsys.readouterr().out
+    assert main(["wear-life", "wear.threshold_um=20", "--out", str(target)]) == 2
+    assert "add --force to replace it" in capsys.readouterr().err
     option = yaml.safe_load(target.read_text())
     assert [part["gear"] for part in option["parts"]] == ["pinion", "wheel"]
     words = ["fault=worn", "--config-dir", str(tmp_path / "mine"), "operating.duration_s=0.1"]

@@ -332,6 +332,32 @@ class TestSweeps:
         with pytest.raises(ConfigError, match="several values need -m"):
             override_keys(["seed=1,2"])
 
+    @pytest.mark.parametrize(
+        ("word", "instead"),
+        [
+            ("operating.torque_nm=55,5", "Then write operating.torque_nm=55.5"),
+            ("protocols=by_unit,cross_specimen", "Then write 'protocols=[by_unit,cross_specimen]'"),
+            ("plan.classes=healthy,crack", "Then write 'plan.classes=[healthy,crack]'"),
+            ("fault=healthy,crack", None),
+            ("operating.speed_rpm=1000,1500,2000", None),
+        ],
+    )
+    def test_what_was_perhaps_meant_by_several_values(self, word, instead):
+        with pytest.raises(ConfigError) as caught:
+            override_keys([word])
+        assert str(caught.value).endswith(instead or "several values need -m (one data set for each)")
+
+    def test_an_option_of_a_forgotten_folder_is_found(self, tmp_path, monkeypatch):
+        monkeypatch.chdir(tmp_path)
+        (tmp_path / "configs" / "gear").mkdir(parents=True)
+        (tmp_path / "configs" / "gear" / "mine.yaml").write_text("{}")
+        with pytest.raises(
+            ConfigError, match=r"no option 'mine' of gear; it is in \./configs: add --config-dir configs"
+        ):
+            read_request(["gear=mine"])
+        with pytest.raises(ConfigError, match="no option 'other' of gear; there is"):
+            read_request(["gear=other"])
+
 
 def test_paper_experiment_means_every_convention_of_the_paper():
     config = read_request(["experiment=paper"]).config

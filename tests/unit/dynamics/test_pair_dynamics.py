@@ -100,9 +100,19 @@ class TestRefusals:
         with pytest.raises(SimulationError, match=f"to at least {enough}$"):
             check_step(dynamics, rate, enough - 1)
 
-    def test_a_coarse_step_is_warned_of(self, xiamen, dynamics_of):
-        with pytest.warns(CoarseStepWarning, match=r"internal steps to a period of the mesh mode .* raise solver"):
-            check_step(dynamics_of(xiamen), 51200.0, 2)
+    def test_a_coarse_step_is_warned_of_where_nothing_looks_at_its_error(self, xiamen, dynamics_of, recwarn):
+        dynamics, rate = dynamics_of(xiamen), 51200.0
+        with pytest.warns(
+            CoarseStepWarning, match=r"internal steps to a period of the mesh mode .* raise solver"
+        ) as seen:
+            check_step(dynamics, rate, 2)
+        enough = int(re.search(r"solver.oversampling to (\d+)", str(seen[0].message))[1])
+        with pytest.warns(CoarseStepWarning):
+            check_step(dynamics, rate, enough - 1)
+        recwarn.clear()
+        check_step(dynamics, rate, enough)
+        check_step(dynamics, rate, 2, max_error=1e-3)
+        assert not recwarn.list
 
     @pytest.mark.parametrize(("precision", "lanes"), [("float64", 8), ("float32", 16)])
     def test_more_than_fits_into_memory(self, precision, lanes):

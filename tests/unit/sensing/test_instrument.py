@@ -129,6 +129,11 @@ def test_gearboxes_differ_and_path_and_sensor_have_their_own_numbers():
         (HOUSING, {"sensors": ["my_rotation"]}, "not ending in 'rotation'"),
         (HOUSING, {"channels": ["pinion_rotation"]}, "sensing.channels: pinion_rotation is no bearing"),
         (HOUSING, {"sampling_rate_hz": 20_000}, "above the usable band of 7812.5 Hz"),
+        (
+            HOUSING,
+            {"sampling_rate_hz": 25_600},
+            "give 'sensing.path.natural_frequency_hz=[300,10000]' or a rate of at least 30720 Hz",
+        ),
         (HOUSING, {"noise__band_hz": [10, 30_000]}, "above half of sensing.sampling_rate_hz"),
         (BEARING, {"noise__parts": [{"kind": "path", "share": 1}]}, "kind path needs a transfer path"),
         (BEARING, {"path": {"kind": "modal"}}, "sensing.path: missing n_modes"),
