@@ -3,17 +3,18 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from functools import lru_cache
 
 import numpy as np
 from numpy.typing import NDArray
 
+from gensig.errors import GeometryError
 from gensig.faults.base import Fault, faulty_teeth
 from gensig.geometry.contact import GearPair
-from gensig.geometry.tooth import healthy_tooth
 from gensig.material import Material
 from gensig.mesh.load_distribution import loaded_pair_table, pair_states, static_mesh
+from gensig.mesh.modification import PLAIN, FlankModification, PairModification, sound_teeth
 from gensig.mesh.options import MeshOptions
 from gensig.mesh.pair_table import PairTable, flank_sides, slice_bending, structural_terms
 from gensig.systems.pair_machine import PairMachine
@@ -57,11 +58,13 @@ class _SinglePair:
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class SpurPair(PairMachine):
-    """One machine under one set of conventions."""
+    """One machine under one set of conventions; ``modification`` is of all teeth, before errors and faults."""
+
+    modification: PairModification = PLAIN
 
     def mesh_table(self, faults: Sequence[Fault] = ()) -> PairTable:
         """Compliance and gap tables with the given faults."""
-        return _mesh_table(self.pair, self.material, self.mesh, tuple(faults), self.mesh_force)
+        return _mesh_table(self.pair, self.material, self.mesh, tuple(faults), self.mesh_force, self.modification)
 
     def stiffness_curves(
         self, faults: Sequence[Fault] = (), *, n_positions: int = 201, points_per_tooth: int = 100
@@ -85,12 +88,46 @@ class SpurPair(PairMachine):
             load_share=static.load / np.maximum(static.load.sum(axis=1, keepdims=True), 1e-30),
         )
 
+    def long_relief(self) -> PairModification:
+        """Linear tip reliefs that make up for the deflection under the set torque, of teeth as cut.
+
+        From the tips down to where a pair begins to carry alone (point B of the wheel, D of the pinion), as deep as
+        the pair deflects there less the body's part, which the next pair shares.
+
+        Raises
+        ------
+        GeometryError    for a contact ratio outside 1..2: no pair, or none but one, ever carries alone
+
+        Source: Welbourn's rule as in Lin, Oswald & Townsend (1989), see ``docs/theory/spur_mesh.md``; the shared part
+        is ours.
+        """
+        pair = self.pair
+        if not 1.0 <= pair.transverse_contact_ratio < 2.0:
+            raise GeometryError(
+                f"the transverse contact ratio {pair.transverse_contact_ratio:.4f} lies outside 1..2, where a pair "
+                f"carries alone for a while: that is where these reliefs begin"
+            )
+        alone = np.array([pair.base_pitch, pair.path_of_contact - pair.base_pitch])
+        plain = replace(self, modification=PLAIN)
+        shared = plain.mesh_table().shared_compliance
+        depth = self.mesh_force * (1.0 / plain._single_pair(alone, ()).stiffness - shared)
+        starts = (pair.pinion, pair.pinion_curvature(alone[0])), (pair.wheel, pair.wheel_curvature(alone[1]))
+        sides = {
+            gear.name: FlankModification(
+                tip_relief=float(back),
+                tip_relief_height=gear.tip_radius - float(np.hypot(gear.base_radius, curvature)),
+            )
+            for (gear, curvature), back in zip(starts, depth, strict=True)
+        }
+        return PairModification(pinion=sides["pinion"], wheel=sides["wheel"])
+
     def _single_pair(self, position: Array, faults: Sequence[Fault]) -> _SinglePair:
         """The pair of each gear's first faulty tooth, sound where there is none, under the whole load.
 
         Half of the contact term of sound flanks belongs to either gear, what a fault adds to it to the faulty one.
         """
-        odd = faulty_teeth(self.pair, faults)
+        whole = sound_teeth(self.pair, self.modification)
+        odd = faulty_teeth(self.pair, faults, whole)
         structure = self.material.in_plane(self.mesh.elasticity)
         sides = flank_sides(self.pair, position, self.material, self.mesh, self.mesh_force, pinion_share=0.5)
         bending = slice_bending(self.pair, position, self.material, self.mesh)
@@ -98,7 +135,7 @@ class SpurPair(PairMachine):
         for name, side in sides.items():
             mine = {number: tooth for (gear, number), tooth in odd.items() if gear == name}
             named = [fault.first_tooth for fault in faults if fault.gear == name and fault.first_tooth in mine]
-            tooth = mine[named[0] if named else min(mine)] if mine else healthy_tooth(side.gear)
+            tooth = mine[named[0] if named else min(mine)] if mine else whole[name]
             tip = tooth.tip_curvature_radius
             own_gap, contact = side.contact(tooth, bending, self.mesh)
             curvature = np.minimum(side.curvature, tip)
@@ -110,6 +147,12 @@ class SpurPair(PairMachine):
 
 @lru_cache(maxsize=32)
 def _mesh_table(
-    pair: GearPair, material: Material, mesh: MeshOptions, faults: tuple[Fault, ...], force: float
+    pair: GearPair,
+    material: Material,
+    mesh: MeshOptions,
+    faults: tuple[Fault, ...],
+    force: float,
+    modification: PairModification,
 ) -> PairTable:
-    return loaded_pair_table(pair, material, mesh, faulty_teeth(pair, faults), force=force)
+    teeth = faulty_teeth(pair, faults, sound_teeth(pair, modification))
+    return loaded_pair_table(pair, material, mesh, teeth, force=force, modification=modification)
