@@ -301,7 +301,7 @@ def read_line_machine(config: Mapping[str, Any]) -> LineMachine:
     place = _record_mesh(engine)
     pair, mesh = drive.pairs[place], drive.line.meshes[place]
     if read_heat(config).is_any or read_modification(config).is_any:
-        raise ConfigError("heat and modification are of a single helical pair; a drive line takes heat=none")
+        raise ConfigError("heat and modification are of a single gear pair; a drive line takes heat=none")
     operating, quality = (
         read_operating(section(config, "operating")),
         read(Quality, section(config, "quality"), "quality"),
