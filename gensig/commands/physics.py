@@ -20,6 +20,7 @@ from gensig.mesh.pair_table import PairTable
 from gensig.systems.machines import read_machine
 from gensig.systems.pair_machine import PairMachine
 from gensig.systems.registry import SLICED
+from gensig.systems.spur_pair import SpurPair
 from gensig.systems.stiffness_curves import StiffnessCurves
 from gensig.units import channel_unit
 
@@ -81,6 +82,16 @@ def stiffness_content(system: PairMachine, curves: StiffnessCurves) -> dict[str,
         },
         "shared_body_compliance_m_per_n": table.shared_compliance,
     }
+    if (
+        isinstance(system, SpurPair)
+        and system.mesh.law != "paper"
+        and 1.0 <= system.pair.transverse_contact_ratio < 2.0
+    ):
+        relief = system.long_relief()
+        content["long_tip_relief"] = {
+            name: {"tip_relief_um": side.tip_relief * 1e6, "tip_relief_height_mm": side.tip_relief_height * 1e3}
+            for name, side in (("pinion", relief.pinion), ("wheel", relief.wheel))
+        }
     if curves.faulty_pair_stiffness is not None and curves.faulty_pair_gap is not None:
         content["faulty_pair_stiffness_n_per_m"] = curves.faulty_pair_stiffness.tolist()
         content["faulty_pair_gap_um"] = (curves.faulty_pair_gap * 1e6).tolist()
@@ -93,6 +104,12 @@ def _print_stiffness(content: dict[str, Any], curves: StiffnessCurves) -> None:
     print(f"mesh stiffness, mean       {content['mesh_stiffness_mean_n_per_m']:.4e} N/m")
     print(f"mesh stiffness, range      {curves.mesh_stiffness.min():.4e} .. {curves.mesh_stiffness.max():.4e} N/m")
     print(f"single pair, highest       {highest(curves.single_pair_stiffness, curves.faulty_pair_stiffness)}")
+    if (relief := content.get("long_tip_relief")) is not None:
+        sides = (
+            f"{name} {side['tip_relief_um']:.2f} um over {side['tip_relief_height_mm']:.2f} mm"
+            for name, side in relief.items()
+        )
+        print(f"tip relief for this torque {', '.join(sides)} of height")
     if curves.faulty_pair_stiffness is not None:
         loss = 1e2 * (1.0 - curves.faulty_pair_stiffness / curves.single_pair_stiffness)
         gap = np.array(content["faulty_pair_gap_um"])

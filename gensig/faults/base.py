@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from abc import ABC, abstractmethod
-from collections.abc import Iterable
+from collections.abc import Iterable, Mapping
 from dataclasses import dataclass, field
 from typing import ClassVar
 
@@ -83,10 +83,13 @@ def _shown(fault: Fault, key: str) -> str:
     return f"{from_si(key, value):g}" if isinstance(value, float) else repr(value)
 
 
-def faulty_teeth(pair: GearPair, faults: Iterable[Fault]) -> dict[tuple[str, int], Tooth]:
+def faulty_teeth(
+    pair: GearPair, faults: Iterable[Fault], sound_teeth: Mapping[str, Tooth] | None = None
+) -> dict[tuple[str, int], Tooth]:
     """The teeth that differ from the sound one, by (gear, tooth); several faults of a tooth compose in order.
 
-    Teeth to which the same has happened are one object: the mesh computes them once.
+    Teeth to which the same has happened are one object: the mesh computes them once. ``sound_teeth`` are those that
+    faults happen to, by gear; None: as cut.
 
     Raises
     ------
@@ -96,7 +99,7 @@ def faulty_teeth(pair: GearPair, faults: Iterable[Fault]) -> dict[tuple[str, int
     teeth: dict[tuple[str, int], Tooth] = {}
     for fault in faults:
         gear = gears[fault.gear]
-        sound = healthy_tooth(gear)
+        sound = healthy_tooth(gear) if sound_teeth is None else sound_teeth[fault.gear]
         made: dict[int, Tooth] = {}
         for number in fault.teeth(gear):
             before = teeth.get((fault.gear, number), sound)

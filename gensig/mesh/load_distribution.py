@@ -12,6 +12,7 @@ from numpy.typing import NDArray
 from gensig.geometry.contact import GearPair
 from gensig.geometry.tooth import Tooth
 from gensig.material import Material
+from gensig.mesh.modification import PLAIN, PairModification
 from gensig.mesh.options import MeshOptions
 from gensig.mesh.pair_table import N_PAIRS, PairTable, pair_table
 
@@ -123,21 +124,24 @@ def loaded_pair_table(
     teeth: Mapping[tuple[str, int], Tooth] | None = None,
     *,
     force: float,
+    modification: PairModification = PLAIN,
 ) -> PairTable:
     """Table whose contact term is the secant at the quasi-static load of sound pairs under a total force in N."""
-    load = force if options.contact == "linear" else sound_load(pair, material, options, force)
-    return pair_table(pair, material, options, teeth, load=load)
+    load = force if options.contact == "linear" else sound_load(pair, material, options, force, modification)
+    return pair_table(pair, material, options, teeth, load=load, modification=modification)
 
 
 @lru_cache(maxsize=32)  # the records of a condition share it, whatever their faults
-def sound_load(pair: GearPair, material: Material, options: MeshOptions, force: float) -> Array:
+def sound_load(
+    pair: GearPair, material: Material, options: MeshOptions, force: float, modification: PairModification = PLAIN
+) -> Array:
     """Quasi-static load of a sound pair at every node under a total force in N, (node,) N; not to be written to.
 
     Load sharing and local compliance depend on each other; the sharing moves by less than 1e-3 after three rounds.
     """
     load: Array | float = force
     for _ in range(LOAD_ROUNDS):
-        sound = pair_table(pair, material, options, load=load)
+        sound = pair_table(pair, material, options, load=load, modification=modification)
         shares = static_mesh(sound, _sound_states(sound), force).load
         load = np.maximum(np.append(shares.T.ravel(), 0.0), LEAST_LOAD_SHARE * force)
     loads = np.asarray(load)

@@ -6,7 +6,9 @@ lowest working point. Source of the shapes and names: ISO 21771-1:2024, section 
 
 from __future__ import annotations
 
+from collections.abc import Mapping
 from dataclasses import dataclass, fields, replace
+from functools import lru_cache
 from typing import Any
 
 import numpy as np
@@ -15,11 +17,13 @@ from numpy.typing import NDArray
 from gensig.errors import ConfigError
 from gensig.geometry.contact import GearPair
 from gensig.geometry.gear import Gear
+from gensig.geometry.tooth import Tooth, healthy_tooth
 from gensig.units import from_si, unit
 
 Array = NDArray[np.float64]
 
 SHAPES = {"linear": 1, "parabolic": 2}  # exponent of the share of the height
+N_SLICES = 40  # across the face of a spur tooth with a modified lead
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -138,11 +142,42 @@ class PairModification:
         place : (slice,) m      from the end that enters first
         """
         on_path = np.clip(position, 0.0, pair.path_of_contact)
+        curvature = {"pinion": pair.pinion_curvature(on_path), "wheel": pair.wheel_curvature(on_path)}
+        profile = sum(self.profile(pair, name, np.asarray(values)) for name, values in curvature.items())
+        return profile + self.lead(pair, place)[:, None]
+
+    def profile(self, pair: GearPair, name: str, curvature_radius: Array) -> Array:
+        """Depth over the profile of the gear of that name, (point,) m; see ``FlankModification.profile``."""
+        if name == "pinion":
+            return self.pinion.profile(pair.pinion, curvature_radius, float(pair.pinion_curvature(0.0)))
+        return self.wheel.profile(pair.wheel, curvature_radius, float(pair.wheel_curvature(pair.path_of_contact)))
+
+    def lead(self, pair: GearPair, place: Array) -> Array:
+        """Depth of both gears together across the face, (slice,) m; nowhere less than 0."""
         width = pair.face_width
-        profile = self.pinion.profile(
-            pair.pinion, np.asarray(pair.pinion_curvature(on_path)), float(pair.pinion_curvature(0.0))
-        ) + self.wheel.profile(
-            pair.wheel, np.asarray(pair.wheel_curvature(on_path)), float(pair.wheel_curvature(pair.path_of_contact))
-        )
         lead = self.pinion.lead(place, width) + self.wheel.lead(place, width) + self.misalignment * place / width
-        return profile + (lead - min(float(lead.min()), 0.0))[:, None]
+        return np.asarray(lead - min(float(lead.min()), 0.0))
+
+
+PLAIN = PairModification(pinion=FlankModification(), wheel=FlankModification())
+
+
+@lru_cache(maxsize=16)
+def sound_teeth(pair: GearPair, modification: PairModification = PLAIN) -> Mapping[str, Tooth]:
+    """The tooth that all of a spur gear have before faults and errors, by gear: as cut, or modified.
+
+    A mate feels the sum of both leads only: all of it stands on the gear with the narrower face.
+    """
+    gears = {"pinion": pair.pinion, "wheel": pair.wheel}
+    teeth = {name: healthy_tooth(gear) for name, gear in gears.items()}
+    if not modification.is_any:
+        return teeth
+    narrow = min(gears, key=lambda name: gears[name].face_width)
+    edges = np.linspace(0.0, pair.face_width, N_SLICES + 1)
+    lead = modification.lead(pair, 0.5 * (edges[1:] + edges[:-1]))
+    for name, tooth in teeth.items():
+        depth = modification.profile(pair, name, tooth.profile.curvature_radius)
+        if name == narrow and lead.any():
+            tooth, depth = tooth.split(edges), depth + lead[:, None]
+        teeth[name] = tooth.with_deviation(depth) if depth.any() else tooth
+    return teeth

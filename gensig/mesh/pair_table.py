@@ -21,6 +21,7 @@ from gensig.mesh.body_coupling import shared_body_compliance
 from gensig.mesh.compliance import tooth_compliance
 from gensig.mesh.face import bearing_width, face_contact, is_nominal
 from gensig.mesh.local_contact import ContactLaw, contact_law, relative_radius
+from gensig.mesh.modification import PLAIN, PairModification, sound_teeth
 from gensig.mesh.options import MeshOptions
 from gensig.mesh.root_crack import crack_compliance
 from gensig.mesh.smooth_table import smooth
@@ -79,23 +80,27 @@ def pair_table(
     teeth: Mapping[tuple[str, int], Tooth] | None = None,
     *,
     load: Array | float,
+    modification: PairModification = PLAIN,
 ) -> PairTable:
     """Tabulate the mesh of a gear pair.
 
     Parameters
     ----------
     teeth : the teeth that are not sound, by (gear, tooth), as ``faulty_teeth`` gives them
+    modification : of the flanks of all others
     load : (node,) N    load of a pair by position, at which a load-dependent contact term is taken
     """
     odd = dict(teeth or {})
     position = node_positions(pair, options)
     sound = _sound_structure(pair, material, options)
+    whole = sound_teeth(pair, modification)
     sides = {}
     for name, side in _node_sides(pair, material, options).items():
         mine = {tooth: odd[gear, tooth] for gear, tooth in sorted(odd) if gear == name}
         sides[name] = _gear_table(
             side.under(load),
             position,
+            whole[name],
             mine,
             sound[name],
             sound["bending"],
@@ -283,6 +288,7 @@ def flank_sides(
 def _gear_table(
     side: FlankSide,
     position: Array,
+    whole: Tooth,
     odd: Mapping[int, Tooth],
     sound: tuple[Array, Array],
     bending: Array,
@@ -290,7 +296,7 @@ def _gear_table(
     options: MeshOptions,
 ) -> GearTable:
     """Rows of the distinct teeth: teeth that are one object share a row, equal structures are computed once."""
-    distinct, kind = distinct_teeth(side.gear, odd)
+    distinct, kind = distinct_teeth(whole, odd)
     corner, sound_row = sound
     structures = {_structure_key(distinct[0]): sound_row}
     compliance: Array = np.empty((len(distinct), len(position)))
@@ -316,10 +322,10 @@ def _gear_table(
     )
 
 
-def distinct_teeth(gear: Gear, odd: Mapping[int, Tooth]) -> tuple[list[Tooth], NDArray[np.int64]]:
+def distinct_teeth(sound: Tooth, odd: Mapping[int, Tooth]) -> tuple[list[Tooth], NDArray[np.int64]]:
     """The sound tooth and those that differ, by object, and which of them each tooth of the gear is, (tooth,)."""
-    distinct = [healthy_tooth(gear)]
-    kind = np.zeros(gear.n_teeth, dtype=np.int64)
+    distinct = [sound]
+    kind = np.zeros(sound.gear.n_teeth, dtype=np.int64)
     for number, tooth in odd.items():
         row = next((row for row, known in enumerate(distinct) if known is tooth), len(distinct))
         if row == len(distinct):

@@ -98,7 +98,7 @@ def slices_of_gears(
     flanks = flank_sides(pair, node_positions(pair, options), material, options, 1.0) if odd else {}
     for gear in (pair.pinion, pair.wheel):
         teeth = {number: odd[name, number] for name, number in sorted(odd) if name == gear.name}
-        distinct, kind = distinct_teeth(gear, teeth)
+        distinct, kind = distinct_teeth(healthy_tooth(gear), teeth)
         shape = (len(distinct), len(edges) - 1, len(structure))
         if len(distinct) == 1:
             softening = gap = np.broadcast_to(0.0, shape)

@@ -145,7 +145,9 @@ def sliced_table(
     """
     odd = dict(teeth or {})
     (pinion, pinion_kind), (wheel, wheel_kind) = (
-        distinct_teeth(gear, {number: odd[name, number] for name, number in sorted(odd) if name == gear.name})
+        distinct_teeth(
+            healthy_tooth(gear), {number: odd[name, number] for name, number in sorted(odd) if name == gear.name}
+        )
         for gear in (pair.pinion, pair.wheel)
     )
     if (n_pairs := len(pinion) * len(wheel)) > MOST_PAIRS:

@@ -21,6 +21,7 @@ from gensig.dynamics.newmark import LineMotion, LineSolver
 from gensig.dynamics.pair import Body, Support
 from gensig.errors import ConfigError, SimulationError
 from gensig.faults.base import Fault
+from gensig.mesh.modification import PLAIN, sound_teeth
 from gensig.mesh.options import SliceOptions, read_mesh_options, read_slice_options
 from gensig.mesh.pair_table import PairTable
 from gensig.mesh.sliced_table import SlicedTable
@@ -134,7 +135,8 @@ class LineMachine(PairMachine):
                 "stiffness slice by slice; choose a spur mesh, or take its gears with gensig stiffness "
                 "system=helical_pair"
             )
-        return stiffness_curves(self, table, faults, n_positions=n_positions, points_per_tooth=points_per_tooth)
+        whole = sound_teeth(self.pair, PLAIN)
+        return stiffness_curves(self, table, faults, whole, n_positions=n_positions, points_per_tooth=points_per_tooth)
 
     def require_drive(self) -> None:
         """Raise unless at least one pair is always in contact, by the overlap of the face too."""
@@ -340,7 +342,7 @@ def read_line_machine(config: Mapping[str, Any]) -> LineMachine:
     place = _record_mesh(engine)
     pair, mesh = drive.pairs[place], drive.line.meshes[place]
     if read_heat(config).is_any or read_modification(config).is_any:
-        raise ConfigError("heat and modification are of a single helical pair; a drive line takes heat=none")
+        raise ConfigError("heat and modification are of a single gear pair; a drive line takes heat=none")
     operating, quality = (
         read_operating(section(config, "operating")),
         read(Quality, section(config, "quality"), "quality"),

@@ -12,7 +12,7 @@ from gensig.geometry.contact import GearPair
 from gensig.geometry.gear import Gear
 from gensig.material import Material
 from gensig.mesh.heat import Heat
-from gensig.mesh.modification import FlankModification, PairModification
+from gensig.mesh.modification import FlankModification, PairModification, sound_teeth
 from gensig.mesh.options import read_mesh_options, read_slice_options
 from gensig.sensing.manufacturing import Quality
 from gensig.sensing.reading import read_sensing
@@ -41,23 +41,23 @@ SYSTEM_KEYS = ("kind", "supports", "motor", "load")
 
 def read_spur_pair(config: Mapping[str, Any]) -> SpurPair:
     """Build a spur pair from the boundary keys of a configuration."""
+    modification = read_modification(config)
     gear = section(config, "gear")
     if _number("gear.helix_angle_deg", gear["helix_angle_deg"]) != 0.0:
         raise ConfigError(
             f"gear.helix_angle_deg = {gear['helix_angle_deg']:g}: system=spur_pair takes spur gears, 0; helical ones "
             f"have system=helical_pair"
         )
-    if read_modification(config).is_any:
-        raise ConfigError(
-            "modification: system=spur_pair has its reliefs as faults (fault=tip_relief, fault=misalignment); a "
-            "modification is taken by gensig transmission-error, and by gensig stiffness with system=helical_pair"
-        )
     if read_heat(config).is_any:
         raise ConfigError(
             "heat: system=spur_pair has gears as they are drawn; system=helical_pair takes heat, and spur gears too"
         )
     pair = read_pair(config)
-    return SpurPair(pair=pair, **_read_machine(config, pair))
+    machine = _read_machine(config, pair)
+    if modification.is_any and machine["mesh"].law == "paper":
+        raise ConfigError("modification opens gaps, which mesh.law=paper does not know: take mesh.law=one_sided")
+    sound_teeth(pair, modification)  # raises for reliefs that overlap
+    return SpurPair(pair=pair, modification=modification, **machine)
 
 
 def read_helical_pair(config: Mapping[str, Any]) -> HelicalPair:

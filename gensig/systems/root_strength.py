@@ -177,7 +177,8 @@ class RootStrength:
     def _whole(self, phases: Array, force: float) -> tuple[Array, Array, dict[str, Array]]:
         """Pairs of a spur pair as wholes: roll, share of the load and stress by gear, (point,) each."""
         mesh = self.flanks.mesh
-        table = loaded_pair_table(self.pair, self.flanks.material, mesh, force=force)
+        flanks = self.flanks
+        table = loaded_pair_table(self.pair, flanks.material, mesh, force=force, modification=flanks.modification)
         states = pair_states(table, phases)
         load = static_mesh(table, states, force).load
         stress = {

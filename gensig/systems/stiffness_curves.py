@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from typing import TYPE_CHECKING
 
@@ -10,7 +10,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from gensig.faults.base import Fault, faulty_teeth
-from gensig.geometry.tooth import healthy_tooth
+from gensig.geometry.tooth import Tooth
 from gensig.mesh.load_distribution import pair_states, static_mesh
 from gensig.mesh.pair_table import PairTable, flank_sides, slice_bending, structural_terms
 
@@ -41,7 +41,7 @@ class StiffnessCurves:
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
-class _SinglePair:
+class SinglePair:
     """One pair under the whole load: compliance terms by gear in m/N, gap in m, 1 where it has flank to touch."""
 
     terms: dict[str, dict[str, Array]]
@@ -55,12 +55,21 @@ class _SinglePair:
 
 
 def stiffness_curves(
-    machine: PairMachine, table: PairTable, faults: Sequence[Fault], *, n_positions: int, points_per_tooth: int
+    machine: PairMachine,
+    table: PairTable,
+    faults: Sequence[Fault],
+    whole: Mapping[str, Tooth],
+    *,
+    n_positions: int,
+    points_per_tooth: int,
 ) -> StiffnessCurves:
-    """Single-pair and mesh stiffness with their parts; contact ratios below 1 are allowed, nothing need turn."""
+    """Single-pair and mesh stiffness with their parts; contact ratios below 1 are allowed, nothing need turn.
+
+    ``whole`` are the sound teeth by gear, as designed.
+    """
     pair = machine.pair
     position = np.linspace(0.0, pair.path_of_contact, n_positions)
-    sound, faulty = _single_pair(machine, position, ()), _single_pair(machine, position, faults)
+    sound, faulty = (single_pair(machine, position, some, whole) for some in ((), faults))
     gear = pair.wheel if faults and faults[0].gear == "wheel" else pair.pinion
     roll = pair.base_pitch * (np.arange(gear.n_teeth * points_per_tooth) + 0.5) / points_per_tooth
     static = static_mesh(table, pair_states(table, roll), machine.mesh_force)
@@ -76,12 +85,14 @@ def stiffness_curves(
     )
 
 
-def _single_pair(machine: PairMachine, position: Array, faults: Sequence[Fault]) -> _SinglePair:
+def single_pair(
+    machine: PairMachine, position: Array, faults: Sequence[Fault], whole: Mapping[str, Tooth]
+) -> SinglePair:
     """The pair of each gear's first faulty tooth, sound where there is none, under the whole load.
 
     Half of the contact term of sound flanks belongs to either gear, what a fault adds to it to the faulty one.
     """
-    odd = faulty_teeth(machine.pair, faults)
+    odd = faulty_teeth(machine.pair, faults, whole)
     structure = machine.material.in_plane(machine.mesh.elasticity)
     sides = flank_sides(machine.pair, position, machine.material, machine.mesh, machine.mesh_force, pinion_share=0.5)
     bending = slice_bending(machine.pair, position, machine.material, machine.mesh)
@@ -89,11 +100,11 @@ def _single_pair(machine: PairMachine, position: Array, faults: Sequence[Fault])
     for name, side in sides.items():
         mine = {number: tooth for (gear, number), tooth in odd.items() if gear == name}
         named = [fault.first_tooth for fault in faults if fault.gear == name and fault.first_tooth in mine]
-        tooth = mine[named[0] if named else min(mine)] if mine else healthy_tooth(side.gear)
+        tooth = mine[named[0] if named else min(mine)] if mine else whole[name]
         tip = tooth.tip_curvature_radius
         own_gap, contact = side.contact(tooth, bending, machine.mesh)
         curvature = np.minimum(side.curvature, tip)
         terms[name] = {**structural_terms(tooth, curvature, structure, machine.mesh), "contact": contact}
         gap += own_gap
         touches[(side.curvature > tip + 1e-12) | (not tooth.present)] = 0.0
-    return _SinglePair(terms=terms, gap=gap, touches=touches)
+    return SinglePair(terms=terms, gap=gap, touches=touches)

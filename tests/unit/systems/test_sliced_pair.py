@@ -102,7 +102,18 @@ def test_points_of_the_box_are_modifications(helical):
     ("words", "message"),
     [
         (["gear.helix_angle_deg=10"], "system=spur_pair takes spur gears"),
-        (["modification.pinion.crowning_um=3"], "modification: system=spur_pair has its reliefs as faults"),
+        (
+            ["modification.wheel.tip_relief_um=3", "operating.torque_nm=0", "gear.helix_angle_deg=10"],
+            r"^modification.wheel.tip_relief_height_mm = 0: a relief of 3 um needs a length",
+        ),
+        (
+            ["modification.pinion.tip_relief_um=3", "modification.pinion.tip_relief_height_mm=9"],
+            "tip_relief_height_mm = 9 and root_relief_height_mm = 0 overlap",
+        ),
+        (
+            ["modification=beihang_both", "mesh.law=paper"],
+            "modification opens gaps, which mesh.law=paper does not know",
+        ),
     ],
 )
 def test_what_a_spur_pair_cannot_have_is_refused(words, message):

@@ -1,0 +1,58 @@
+"""The lists in docs/api, made from the docstrings: ``python tests/api_pages.py`` writes them, a test compares them."""
+
+import inspect
+import re
+from importlib import import_module
+from pathlib import Path
+from types import ModuleType
+from typing import Any
+
+FOLDER = Path(__file__).resolve().parent.parent / "docs" / "api"
+PAGES = sorted(FOLDER.glob("*.md"))
+BEGIN, END = "<!-- made by tests/api_pages.py -->", "<!-- end of what is made -->"
+
+
+def page(path: Path) -> str:
+    """The page with what each of its ``::: name`` stands for, and the public names of those that are modules."""
+    text = path.read_text(encoding="utf-8")
+    lines = [line for name in re.findall(r"^::: (\S+)$", text, re.M) for line in _lines(name)]
+    head, rest = text.split(BEGIN, 1)
+    return "\n".join([head + BEGIN, "", *lines, "", END + rest.split(END, 1)[1]])
+
+
+def _lines(name: str) -> list[str]:
+    found = _resolved(name)
+    lines = [f"- `{name}`: {_summary(found)}"]
+    if isinstance(found, ModuleType):
+        lines += [f"    - `{own}`: {_summary(value)}" for own, value in _public(found)]
+    return lines
+
+
+def _resolved(name: str) -> Any:
+    try:
+        return import_module(name)
+    except ModuleNotFoundError:
+        parent, _, own = name.rpartition(".")
+        return getattr(_resolved(parent), own)
+
+
+def _public(module: ModuleType) -> list[tuple[str, Any]]:
+    """Functions and classes that the module itself defines, in its order."""
+    return [
+        (name, value)
+        for name, value in vars(module).items()
+        if not name.startswith("_")
+        and (inspect.isfunction(value) or inspect.isclass(value))
+        and value.__module__ == module.__name__
+    ]
+
+
+def _summary(found: Any) -> str:
+    """First paragraph of the docstring, to its first full stop."""
+    paragraph = " ".join((inspect.getdoc(found) or "").partition("\n\n")[0].split())
+    return re.split(r"(?<=\.) (?=[A-Z])", paragraph)[0].replace("``", "`")
+
+
+if __name__ == "__main__":
+    for path in PAGES:
+        path.write_text(page(path), encoding="utf-8")
