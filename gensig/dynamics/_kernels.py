@@ -2,8 +2,6 @@
 
 Every number of a record lies in its own lane of a vector, and no instruction mixes lanes or reorders sums: a record's
 bits depend on nothing but its own numbers. Arrays are flat; a row is one number for every record of the group.
-
-Numba's cache knows the time of this file alone: touch it after a change of one that it imports.
 """
 
 from __future__ import annotations

@@ -24,12 +24,12 @@ ROUNDED = 1e-14  # of what forces take off an approach
 def between(table, low, high, share, per_cell, out):
     """Value and slope, ``share`` of the way between two nodes whose values and slopes stand at ``low`` and ``high``.
 
-    The slope goes straight and the value follows its integral. ``per_cell`` is the slope asked for over that per cell.
+    Of the cubic through both. ``per_cell`` is the slope asked for over that per cell.
     """
-    slope = table[low + 1]
-    bend = table[high + 1] - slope
-    out[0] = table[low] + share * (slope + 0.5 * share * bend)
-    out[1] = per_cell * (slope + share * bend)
+    rise, slope, slope_1 = table[high] - table[low], table[low + 1], table[high + 1]
+    bend, twist = 3.0 * rise - 2.0 * slope - slope_1, slope + slope_1 - 2.0 * rise
+    out[0] = table[low] + share * (slope + share * (bend + share * twist))
+    out[1] = per_cell * (slope + share * (2.0 * bend + 3.0 * share * twist))
 
 
 @compiled

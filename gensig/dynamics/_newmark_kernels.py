@@ -2,8 +2,6 @@
 
 The symbols are those of ``docs/theory/shaft_line_integration.md``. Scalar code without reassociation, own loops instead
 of library calls: bits depend on nothing but the numbers given.
-
-Numba's cache knows the time of this file alone: touch it after a change of one that it imports.
 """
 
 from __future__ import annotations

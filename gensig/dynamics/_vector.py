@@ -9,7 +9,10 @@ A group is 64 bytes wide: two AVX registers, so that each waits less for the oth
 from __future__ import annotations
 
 import functools
+import hashlib
 import operator
+from collections.abc import Callable
+from pathlib import Path
 from typing import Any
 
 import numpy as np
@@ -26,8 +29,36 @@ FOUR = 4
 
 # Without Numba's reference counting (arrays are borrowed, none is made here) a step costs a third less.
 _OPTIONS: dict[str, Any] = {"cache": True, "error_model": "numpy", "_nrt": False}
-compiled: Any = functools.partial(njit, nogil=True, **_OPTIONS)()
-inlined: Any = functools.partial(njit, inline="always", **_OPTIONS)()
+
+
+def source_stamp(folder: Path) -> str:
+    """Hash of all private modules of a folder, whose compiled functions call each other across files."""
+    found = hashlib.sha256()
+    for path in sorted(folder.glob("_*.py")):
+        found.update(path.name.encode() + b"\0" + path.read_bytes() + b"\0")
+    return found.hexdigest()
+
+
+_STAMP = source_stamp(Path(__file__).parent)
+
+
+def _stamped(decorator: Callable[[Any], Any]) -> Any:
+    """The decorator, with a cache that is stale after a change of any of the files.
+
+    Numba looks at a function's own file alone, and would go on with what was compiled of another one's former content.
+    """
+
+    def decorate(function: Any) -> Any:
+        made = decorator(function)
+        if hasattr(made, "_cache"):  # not where NUMBA_DISABLE_JIT is set
+            made._cache._cache_file._source_stamp = _STAMP
+        return made
+
+    return decorate
+
+
+compiled: Any = _stamped(functools.partial(njit, nogil=True, **_OPTIONS)())
+inlined: Any = _stamped(functools.partial(njit, inline="always", **_OPTIONS)())
 
 _intrinsic: Any = intrinsic
 _INDEX = ir.IntType(32)

@@ -14,8 +14,7 @@ from gensig.dynamics._line_layout import Factor, Line, Meshes, Padded, Rows, Tor
 from gensig.dynamics.line_course import LineCourse, ShaftTorque
 from gensig.dynamics.line_mesh import LineMesh
 from gensig.errors import ConfigError, SimulationError
-from gensig.mesh.pair_table import SMOOTHED_GAP
-from gensig.mesh.smooth_table import smooth
+from gensig.mesh.pair_table import SMOOTHED_GAP, SMOOTHED_SHARE
 
 Array = NDArray[np.float64]
 Index = NDArray[np.int64]
@@ -151,15 +150,27 @@ def pack_meshes(line: GearedLine, order: Index) -> Meshes:
 
 
 def _columns(mesh: LineMesh) -> Array:
-    """Gap and stiffness of every spring, each with its slope per cell, (row, node, column).
-
-    Smooth over the roll, so that no step lands where the torque of the passing teeth jumps. Nothing is made up for in
-    stiffnesses: they stay positive.
-    """
+    """Gap and stiffness of every spring, each with its slope per cell, (row, node, column)."""
     n_rows, n_nodes = mesh.gap.shape
-    gap = np.stack(smooth(mesh.gap, 1.0, SMOOTHED_GAP, alike=False), axis=2)
-    springs = np.stack(smooth(mesh.stiffness, 1.0, 0.0), axis=2).reshape(n_rows, -1, n_nodes, 2)
+    gap = np.stack([mesh.gap, _slopes(mesh.gap, SMOOTHED_GAP)], axis=2)
+    slope = _slopes(mesh.stiffness, SMOOTHED_SHARE * float(mesh.stiffness.max()))
+    springs = np.stack([mesh.stiffness, slope], axis=2).reshape(n_rows, -1, n_nodes, 2)
     return np.concatenate([gap, np.moveaxis(springs, 1, 2).reshape(n_rows, n_nodes, -1)], axis=2)
+
+
+def _slopes(values: Array, limit: float) -> Array:
+    """Slopes per cell at the nodes, (row, node): central differences, with which cubics between the nodes are smooth.
+
+    Where the second difference exceeds ``limit``, or what is 0 begins to grow, the harmonic mean of both chords (0 at a
+    turn) stands instead: its cubics never leave the values at their ends, so that an edge stays one. At the ends the
+    chord itself. Source: Fritsch & Butland, SIAM J. Sci. Stat. Comput. 5 (1984).
+    """
+    chord = np.diff(values, axis=1)
+    before, after = chord[:, :-1], chord[:, 1:]
+    mean, product = 0.5 * (before + after), before * after
+    limited = np.divide(product, mean, out=np.zeros_like(mean), where=product > 0.0)
+    is_smooth = (np.abs(after - before) <= limit) & (values[:, :-2] != 0.0) & (values[:, 2:] != 0.0)
+    return np.concatenate([chord[:, :1], np.where(is_smooth, mean, limited), chord[:, -1:]], axis=1)
 
 
 def pack_torques(line: GearedLine, order: Index, torques: Sequence[ShaftTorque], course: LineCourse) -> Torques:

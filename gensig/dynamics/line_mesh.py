@@ -25,7 +25,7 @@ class LineMesh:
     as they enter. The back flanks meet along the mirrored roll ``mirror`` - u.
 
     direction : (dof,)                 gradient of the approach along the transverse line of action, m/rad or 1
-    gap : (row, node)                  of one pair in m, made smooth over the roll when it is integrated
+    gap : (row, node)                  of one pair in m; a smooth cubic between nodes
     depth : (spring,)                  m, how deep a pair bites where each of its springs begins to bear; from 0 on
     stiffness : (row * spring, node)   of each spring in N/m, those of one row after those of the one before
     rows, coast_rows : (kind, kind)    the row of a pair of kinds of teeth of a and b on either flank, -1 for a pair

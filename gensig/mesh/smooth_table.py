@@ -8,7 +8,7 @@ from numpy.typing import NDArray
 Array = NDArray[np.float64]
 
 
-def smooth(values: Array, distance: float, limit: float, *, alike: bool = True) -> tuple[Array, Array]:
+def smooth(values: Array, distance: float, limit: float) -> tuple[Array, Array]:
     """Values and slopes at the nodes of quadratic splines that run through nearly the given values.
 
     Between nodes the slope goes straight, and the value follows its integral; point values and slopes of a law that
@@ -20,11 +20,9 @@ def smooth(values: Array, distance: float, limit: float, *, alike: bool = True) 
     Parameters
     ----------
     values : (row, node)    at a constant ``distance`` in m
-    alike : False makes up for each row's own second difference
     """
-    model = values[:1] if alike else values
-    bend = np.zeros_like(model)
-    bend[:, 1:-1] = np.clip(np.diff(model, n=2, axis=1), -limit, limit)
+    bend = np.zeros(values.shape[1])
+    bend[1:-1] = np.clip(np.diff(values[0], n=2), -limit, limit)
     here = values - 0.25 * bend
     # straight on beyond the ends; np.pad takes longer than all the rest
     before = np.concatenate([2.0 * here[:, :1] - here[:, 1:2], here[:, :-1]], axis=1)

@@ -45,9 +45,12 @@ def test_plain_lines_come_every_few_seconds_even_before_a_shard(
 
 
 def test_a_long_wait_for_the_first_record_is_explained() -> None:
-    progress = ShardProgress(quiet=True, n_records=100)
+    progress = ShardProgress(quiet=True, n_records=100, n_shards=1, n_at_work=1)
     progress._begin -= 15.0
-    assert progress.facts() == "15 s; the first run compiles for a minute or two"
+    assert (
+        progress.facts()
+        == "15 s; 1 of 1 shards at work, counted when whole; the first run compiles for a minute or two"
+    )
 
 
 def test_rate_and_time_left_are_those_of_this_run() -> None:
