@@ -117,7 +117,9 @@ class TestRows:
             ((one("crack", gear="wheel", tooth=[1, 2]), one("pitch_error", gear="wheel", tooth=[2, 3])), 4, 1),
             ((one("misalignment", gear="wheel", tooth="all"),), 2, 1),
         ):
-            xiamen.mesh_table()  # the sound gears' own structures
+            pair_table(
+                xiamen.pair, xiamen.material, xiamen.mesh, load=xiamen.mesh_force
+            )  # the sound gears' own structures
             computed.clear()
             teeth = faulty_teeth(xiamen.pair, faults)
             table = pair_table(xiamen.pair, xiamen.material, xiamen.mesh, teeth, load=xiamen.mesh_force)
