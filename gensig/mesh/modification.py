@@ -162,16 +162,18 @@ class PairModification:
 PLAIN = PairModification(pinion=FlankModification(), wheel=FlankModification())
 
 
-@lru_cache(maxsize=16)
 def sound_teeth(pair: GearPair, modification: PairModification = PLAIN) -> Mapping[str, Tooth]:
-    """The tooth that all of a spur gear have before faults and errors, by gear: as cut, or modified.
+    """The tooth that all of a spur gear have before faults and errors, by gear: as cut, or modified."""
+    if modification.is_any:
+        return _modified_teeth(pair, modification)
+    return {"pinion": healthy_tooth(pair.pinion), "wheel": healthy_tooth(pair.wheel)}
 
-    A mate feels the sum of both leads only: all of it stands on the gear with the narrower face.
-    """
+
+@lru_cache(maxsize=16)
+def _modified_teeth(pair: GearPair, modification: PairModification) -> Mapping[str, Tooth]:
+    """A mate feels the sum of both leads only: all of it stands on the gear with the narrower face."""
     gears = {"pinion": pair.pinion, "wheel": pair.wheel}
     teeth = {name: healthy_tooth(gear) for name, gear in gears.items()}
-    if not modification.is_any:
-        return teeth
     narrow = min(gears, key=lambda name: gears[name].face_width)
     edges = np.linspace(0.0, pair.face_width, N_SLICES + 1)
     lead = modification.lead(pair, 0.5 * (edges[1:] + edges[:-1]))
