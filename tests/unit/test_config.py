@@ -3,13 +3,12 @@
 import json
 import re
 import warnings
-from importlib import resources
 
 import pytest
 from fault_cases import option
 
 from gensig.compose import compose, options, override_keys, sweep
-from gensig.config import DerivedValueWarning, _fault_option, read_request
+from gensig.config import DerivedValueWarning, read_request
 from gensig.errors import ConfigError, GensigError
 from gensig.faults.base import faulty_teeth
 from gensig.faults.registry import read_faults
@@ -383,30 +382,3 @@ def test_paper_experiment_has_neither_noise_nor_errors():
 def test_options_and_primary_files():
     assert {"crack", "healthy", "missing_tooth", "pitting"} <= set(options("fault"))
     assert set(compose("generate")) >= {"gear", "mesh", "plan", "seed"}
-
-
-class TestFaultOptionAlone:
-    """The options of faults are composed without the words that cannot change them."""
-
-    OTHERS = ("experiment=quickstart", "gear.normal_module_mm=3", "operating.torque_nm=7", "seed=4", "out=x.y")
-
-    def test_no_option_of_the_package_refers_to_another_group(self):
-        folder = resources.files("gensig.configs").joinpath("fault")
-        texts = [path.read_text(encoding="utf-8") for path in folder.iterdir() if path.name.endswith(".yaml")]
-        assert len(texts) == len(options("fault"))
-        assert not any("${" in text for text in texts)
-
-    @pytest.mark.parametrize("fault", options("fault"))
-    def test_it_is_that_of_the_whole_configuration(self, fault):
-        words = [*self.OTHERS, f"fault={fault}"]
-        assert _fault_option(words, None) == compose("generate", words)["fault"]
-
-    def test_a_reference_to_another_group_is_followed(self):
-        words = ["operating.torque_nm=3", "fault.crack_depth_mm=${operating.torque_nm}", "fault=crack"]
-        request = read_request(["plan.classes=[crack]", *words[:2]])
-        assert request.config["classes"]["crack"]["crack_depth_mm"] == 3
-        assert _fault_option(words, None)["crack_depth_mm"] == 3
-
-    def test_nobody_can_change_what_the_next_one_gets(self):
-        _fault_option(["fault=crack"], None)["vary"].clear()
-        assert _fault_option(["fault=crack"], None)["vary"]
