@@ -14,7 +14,6 @@ from gensig.errors import ConfigError
 from gensig.gearbox import GearOption
 
 PLAIN, REALISTIC = "plain", "realistic"
-BASES = (PLAIN, REALISTIC)
 LEAST_TURNS = 10  # of the pinion in a record at the slowest speed
 SPEED_SHARES, TORQUE_SHARES = (0.5, 1.2), (0.3, 1.2)  # of the rated ones, over which a plan draws
 LARGEST_SHARE = 3.0
