@@ -16,12 +16,12 @@ import numpy as np
 from numpy.typing import NDArray
 
 from benchmarks._realism_recording import VARIABLE
-from diagnose.adaptation import HEALTHY, METHODS, adapt_domain, adapt_network
-from diagnose.domain import distances
-from diagnose.machine import together
-from diagnose.model_io import ModelDescription, load_domain, load_model, load_statistics
-from diagnose.train import predict_windows
-from diagnose.windows import Segments, WindowSet, plan_windows
+from diagnose.data.windows import Segments, WindowSet, plan_windows
+from diagnose.networks.adaptation import HEALTHY, METHODS, adapt_domain, adapt_network
+from diagnose.networks.domain import distances
+from diagnose.recordings.machine import together
+from diagnose.training.store import ModelDescription, load_domain, load_model, load_statistics
+from diagnose.training.train import predict_windows
 from gensig.cli import main as gensig_main
 from gensig.errors import ConfigError
 from gensig.systems.registry import SIDES

@@ -12,11 +12,18 @@ from numpy.typing import NDArray
 from torch import nn
 
 from benchmarks._realism_sets import kept
-from diagnose.adaptation import HEALTHY, METHODS, Statistics, adapt_network, chosen_windows, statistics_of
-from diagnose.metrics import balanced_accuracy, confusion_by_unit, over_records
-from diagnose.model_io import load_model, load_statistics
-from diagnose.train import predict_windows
-from diagnose.windows import Segments, Task, WindowSet, load_windows, subset_segments, task_of
+from diagnose.data.windows import Segments, Task, WindowSet, load_windows, subset_segments, task_of
+from diagnose.networks.adaptation import (
+    HEALTHY,
+    METHODS,
+    Statistics,
+    adapt_network,
+    chosen_windows,
+    statistics_of,
+)
+from diagnose.scoring.metrics import balanced_accuracy, confusion_by_unit, over_records
+from diagnose.training.store import load_model, load_statistics
+from diagnose.training.train import predict_windows
 from gensig.dataset.reader import Dataset
 
 FloatArray = NDArray[np.floating]

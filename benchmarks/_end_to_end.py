@@ -20,10 +20,10 @@ from benchmarks._stages import (
     WRITING,
     Stages,
 )
-from gensig import records
 from gensig.execution.local import LocalExecutor
-from gensig.generation import begin_folder, run_folder
 from gensig.mesh.load_distribution import sound_load
+from gensig.production.folder import begin_folder, run_folder
+from gensig.record import simulate as records
 from gensig.systems import spur_pair
 
 RECORDING_SHARE = "share of the records' own integration"  # of the kernel's rate, where that would be the same

@@ -11,9 +11,9 @@ import math
 import numpy as np
 from numpy.typing import NDArray
 
-from gensig.dynamics.geared_line import GearedLine
-from gensig.dynamics.line_course import ShaftTorque
-from gensig.dynamics.line_mesh import LineMesh, phase_mesh
+from gensig.driveline.time.course import ShaftTorque
+from gensig.driveline.time.geared_line import GearedLine
+from gensig.driveline.time.line_mesh import LineMesh, phase_mesh
 
 Array = NDArray[np.float64]
 

@@ -15,11 +15,11 @@ from typing import Any
 import numpy as np
 
 from benchmarks._mutants import Mutant, mutate
-from gensig.dataset.index import open_index
-from gensig.dataset.inspection import inspect
-from gensig.dataset.layout import read_manifest
+from gensig.dataset.folder.inspection import inspect
+from gensig.dataset.folder.layout import read_manifest
+from gensig.dataset.folder.verify import verify
 from gensig.dataset.reader import open_dataset
-from gensig.dataset.verify import verify
+from gensig.dataset.storage.index import open_index
 from gensig.errors import DatasetError
 
 METHOD = "spawn"

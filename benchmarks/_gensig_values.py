@@ -11,13 +11,13 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from gensig.config import read_request
 from gensig.geometry.contact import GearPair
 from gensig.geometry.gear import Gear
 from gensig.geometry.tooth import healthy_tooth
 from gensig.geometry.tooth_profile import involute_point, load_angle
 from gensig.mesh.compliance import tooth_compliance
 from gensig.mesh.fillet_foundation import body_coefficients, fillet_foundation_compliance
+from gensig.plan.request import read_request
 from gensig.systems.registry import read_system
 from gensig.systems.spur_pair import SpurPair
 

@@ -13,7 +13,7 @@ from typing import Any
 
 from llvmlite.binding import get_host_cpu_name
 
-from gensig.dataset.environment import environment
+from gensig.dataset.folder.environment import environment
 
 Figures = Mapping[str, Mapping[str, float]]  # section: name: value
 

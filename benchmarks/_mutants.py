@@ -11,7 +11,7 @@ from typing import Any
 import h5py
 import numpy as np
 
-from gensig.dataset.atomic import sha256_file
+from gensig.dataset.storage.atomic import sha256_file
 
 SECRET = b"nobody outside this folder may read me"
 Shard = Callable[[h5py.File, Path], None]

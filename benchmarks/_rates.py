@@ -11,15 +11,15 @@ from scipy.integrate import solve_ivp
 
 from benchmarks import _scalar
 from benchmarks._measure import in_turn
-from gensig.config import read_request
 from gensig.dynamics import _kernels, integrator
 from gensig.dynamics._layout import N_LAW
 from gensig.dynamics._vector import LANES, n_lanes
 from gensig.dynamics.decimation import decimator, in_band_error
 from gensig.dynamics.lanes import pack
 from gensig.dynamics.pair import PairDynamics
-from gensig.planning import make_plan
-from gensig.rows import record_system, row_run, row_values
+from gensig.plan.make import make_plan
+from gensig.plan.request import read_request
+from gensig.record.inputs import record_system, row_run, row_values
 
 Array = NDArray[np.float64]
 Work = tuple[Callable[[], Any], float]  # what to time, and the seconds that it simulates

@@ -14,12 +14,12 @@ from typing import Any
 import yaml
 
 import gensig
-from gensig.config import read_request
-from gensig.dataset.layout import OVERRIDES
+from gensig.dataset.folder.layout import OVERRIDES
 from gensig.dataset.reader import Dataset
 from gensig.errors import ConfigError
 from gensig.faults.crack import Crack
 from gensig.faults.registry import read_faults
+from gensig.plan.request import read_request
 from gensig.systems.registry import SIDES, read_system
 
 SPEED, TORQUE, GRADE = "operating.speed_rpm", "operating.torque_nm", "quality.iso1328_grade"

@@ -12,10 +12,11 @@ from unittest import mock
 import numpy as np
 
 from benchmarks._measure import least
-from gensig import generation, records
-from gensig.dataset.shard import ShardWriter
+from gensig.dataset.storage.shard import ShardWriter
 from gensig.dynamics import _kernels, integrator
 from gensig.dynamics.decimation import Decimator, decimator
+from gensig.production import folder as generation
+from gensig.record import simulate as records
 from gensig.systems import lead_in, pair_machine, spur_pair
 
 PLAN, TABLES, EQUATIONS = "machine and plan row", "mesh tables", "equations and packing"

@@ -16,9 +16,9 @@ from typing import Any
 
 import numpy as np
 
-from gensig.config import read_request
 from gensig.dynamics.decimation import in_band_error
 from gensig.faults.registry import fault_parts, read_faults
+from gensig.plan.request import read_request
 from gensig.sensing.agreement import agreement
 from gensig.sensing.manufacturing import draw_gearbox, draw_specimen
 from gensig.systems.pair_machine import BOUNCING, CleanRecord, Run, simulate_together

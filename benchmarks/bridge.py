@@ -1,8 +1,9 @@
 """``python -m benchmarks.bridge``: does adapting a network by healthy recordings help, and what does it break?
 
 Trains the default network in one simulated world, adapts it to others by their healthy records alone
-(`diagnose.adaptation`) and judges it on units that took no part; beside it the naive variants, which match all classes
-of the training to healthy records, and a network trained in the other world with labels. Then the negative control:
+(`diagnose.networks.adaptation`) and judges it on units that took no part; beside it the naive variants,
+which match all classes of the training to healthy records, and a network trained in the other world with
+labels. Then the negative control:
 recordings of two states that differ in the mounting, read from the folder ``$GENSIG_MEASURED`` where it is set.
 """
 

@@ -19,7 +19,6 @@ from scipy.optimize import minimize_scalar
 
 from benchmarks._contact_law_motion import Mesh, mesh_at_loads, motion, static_approach
 from benchmarks._mesh_numbers import mesh_numbers
-from gensig.config import read_request
 from gensig.dynamics._vector import LANES
 from gensig.dynamics.decimation import decimator
 from gensig.dynamics.integrator import settling_time
@@ -30,6 +29,7 @@ from gensig.faults.registry import read_faults
 from gensig.mesh.face import slice_gaps
 from gensig.mesh.load_distribution import pair_states, static_mesh
 from gensig.mesh.pair_table import PairTable, flank_sides, pair_table
+from gensig.plan.request import read_request
 from gensig.systems.pair_machine import Run
 from gensig.systems.registry import read_system
 from gensig.systems.spur_pair import SpurPair

@@ -14,8 +14,8 @@ from pathlib import Path
 
 import numpy as np
 
-from diagnose.scoring import Benchmark, sha256, signal_rms
-from diagnose.study import is_leaky
+from diagnose.studies.benchmark import Benchmark, sha256, signal_rms
+from diagnose.studies.study import is_leaky
 from gensig.dataset.reader import open_dataset
 
 FOLDER = Path(__file__).parents[1] / "diagnose" / "frozen"

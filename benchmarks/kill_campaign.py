@@ -27,8 +27,8 @@ from contextlib import suppress
 from pathlib import Path
 
 from gensig.cli import main as gensig
-from gensig.dataset.manifest import read_manifest
-from gensig.dataset.verify import verify
+from gensig.dataset.folder.manifest import read_manifest
+from gensig.dataset.folder.verify import verify
 
 SET = (
     "plan.n_records=8",

@@ -10,13 +10,13 @@ from __future__ import annotations
 import argparse
 import time
 
-from gensig.compose import options
-from gensig.config import read_request
 from gensig.faults.base import faulty_teeth
 from gensig.faults.registry import read_faults
 from gensig.geometry import tooth
 from gensig.mesh import body_coupling, pair_table
 from gensig.mesh.load_distribution import loaded_pair_table, sound_load
+from gensig.options.compose import options
+from gensig.plan.request import read_request
 from gensig.systems.registry import read_system
 
 KEPT = (

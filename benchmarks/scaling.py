@@ -21,13 +21,13 @@ from pathlib import Path
 import numpy as np
 
 from benchmarks._measure import begin, in_turn, print_figures, write_json
-from gensig.config import read_request
 from gensig.dynamics._vector import LANES
 from gensig.errors import SimulationError
 from gensig.execution.local import LocalExecutor
 from gensig.faults.registry import read_faults
-from gensig.generation import begin_folder, run_folder, write_shard
 from gensig.mesh.load_distribution import sound_load
+from gensig.plan.request import read_request
+from gensig.production.folder import begin_folder, run_folder, write_shard
 from gensig.systems import spur_pair
 from gensig.systems.pair_machine import Run, Start, simulate_together
 from gensig.systems.registry import read_system

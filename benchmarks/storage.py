@@ -21,15 +21,15 @@ from typing import Any
 import h5py
 import numpy as np
 
-from gensig.config import read_request
-from gensig.dataset.compression import COMPRESSIONS
-from gensig.dataset.layout import shard_path
-from gensig.dataset.manifest import finalize, record_shard
+from gensig.dataset.folder.layout import shard_path
+from gensig.dataset.folder.manifest import finalize, record_shard
 from gensig.dataset.reader import open_dataset
 from gensig.dataset.schema import SAMPLE_TYPES
-from gensig.generation import begin_folder, open_shard
-from gensig.planning import make_plan
-from gensig.records import Record, simulate_records
+from gensig.dataset.storage.compression import COMPRESSIONS
+from gensig.plan.make import make_plan
+from gensig.plan.request import read_request
+from gensig.production.folder import begin_folder, open_shard
+from gensig.record.simulate import Record, simulate_records
 
 N_SIMULATED = 16
 MEGABYTE = 1e6

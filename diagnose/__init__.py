@@ -1,1 +1,5 @@
 """Small, honest fault classification on gensig data sets."""
+
+from gensig import moved
+
+moved.install()

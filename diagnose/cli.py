@@ -7,7 +7,7 @@ import sys
 from collections.abc import Sequence
 from typing import Any
 
-from gensig.program import HELP_FLAGS, Parser, exit_text, guarded, refuse_verb
+from gensig.terminal.program import HELP_FLAGS, Parser, exit_text, guarded, refuse_verb
 from gensig.version import __version__
 
 # Verb -> what it does; ``diagnose.commands.VERB`` has ``run(words) -> exit status``.
@@ -28,7 +28,7 @@ PROGRAM = "diagnose"
 
 def main(argv: Sequence[str] | None = None) -> int:
     """Run the command; exit status 0, 2 for a mistake, 3 for the flag of predict, 130 when interrupted."""
-    from gensig.completion import answer, is_asked
+    from gensig.terminal.completion import answer, is_asked
 
     if is_asked():
         verbs = {name: (summary, _module(name).add_arguments) for name, summary in VERBS.items()}

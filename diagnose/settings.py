@@ -49,7 +49,7 @@ class TrainSettings:
     test_channels: tuple[str, ...] | None
     seeds: tuple[int, ...]
     sampling_rate_hz: float | None
-    window_samples: int | None  # None: see `diagnose.window_choice`
+    window_samples: int | None  # None: see `diagnose.data.window_choice`
     stride_samples: int | None  # None: as long as a window
     normalise: str
     epochs: int

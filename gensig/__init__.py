@@ -16,16 +16,19 @@ from collections.abc import Sequence
 from pathlib import Path
 from typing import TYPE_CHECKING
 
+from gensig import moved
 from gensig.version import __version__
 
 if TYPE_CHECKING:
     from gensig.dataset.reader import Dataset
     from gensig.faults.base import Fault
-    from gensig.pairs import FaultPairs
-    from gensig.streaming import RecordStream
+    from gensig.production.fault_pairs import FaultPairs
+    from gensig.production.streaming import RecordStream
     from gensig.systems.pair_machine import PairMachine
 
 __all__ = ["__version__", "fault_pairs", "generate", "load_faults", "load_system", "open_dataset", "stream"]
+
+moved.install()
 
 
 def open_dataset(path: str | Path, *, allow_incomplete: bool = False) -> Dataset:
@@ -37,8 +40,8 @@ def open_dataset(path: str | Path, *, allow_incomplete: bool = False) -> Dataset
 
 def load_system(*overrides: str, config_dir: str | Path | None = None) -> PairMachine:
     """The sound machine that overrides describe, as the commands would build it; for its faults see `load_faults`."""
-    from gensig.config import read_request
-    from gensig.systems.machines import read_machine
+    from gensig.plan.request import read_request
+    from gensig.record.machines import read_machine
 
     return read_machine(read_request(overrides, config_dir=config_dir).config)
 
@@ -56,8 +59,8 @@ def load_faults(*overrides: str, config_dir: str | Path | None = None) -> tuple[
     ------
     gensig.errors.GensigError    for anything that cannot be used
     """
-    from gensig.config import read_request
     from gensig.faults.registry import read_faults
+    from gensig.plan.request import read_request
 
     return read_faults(read_request(overrides, config_dir=config_dir).config["fault"])
 
@@ -69,10 +72,10 @@ def generate(*overrides: str, out: str | Path, config_dir: str | Path | None = N
     ------
     gensig.errors.GensigError    for anything that cannot be used, and where a shard could not be made
     """
-    from gensig.config import read_request
     from gensig.errors import ConfigError, SimulationError
     from gensig.execution.registry import read_executor
-    from gensig.generation import begin_folder, run_folder
+    from gensig.plan.request import read_request
+    from gensig.production.folder import begin_folder, run_folder
 
     request = read_request(overrides, config_dir=config_dir)
     executor = read_executor(request.config["executor"])
@@ -97,10 +100,10 @@ def stream(*overrides: str, epoch: int = 0, config_dir: str | Path | None = None
     ------
     gensig.errors.GensigError    for anything that cannot be used
     """
-    from gensig.compose import sweep
-    from gensig.config import read_request
     from gensig.errors import ConfigError
-    from gensig.streaming import open_stream
+    from gensig.options.compose import sweep
+    from gensig.plan.request import read_request
+    from gensig.production.streaming import open_stream
 
     if len(sweep(overrides)) > 1:
         raise ConfigError("a stream is one data set: give one value a key, and make a stream for each")
@@ -116,14 +119,14 @@ def fault_pairs(
     epoch: int = 0,
     config_dir: str | Path | None = None,
 ) -> FaultPairs:
-    """The selected machine with and without its fault over a map of speeds and torques; see ``gensig.pairs``.
+    """The selected machine with and without its fault over a map of speeds and torques.
 
     Raises
     ------
     gensig.errors.GensigError    for anything that cannot be used
     """
-    from gensig.config import read_request
-    from gensig.pairs import make_pairs
+    from gensig.plan.request import read_request
+    from gensig.production.fault_pairs import make_pairs
 
     config = read_request(overrides, config_dir=config_dir).config
     return make_pairs(

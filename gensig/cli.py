@@ -8,7 +8,7 @@ from collections.abc import Sequence
 
 from gensig.commands.arguments import OVERRIDES
 from gensig.commands.verbs import VERBS
-from gensig.program import HELP_FLAGS, Parser, exit_text, guarded, refuse_verb
+from gensig.terminal.program import HELP_FLAGS, Parser, exit_text, guarded, refuse_verb
 from gensig.version import __version__
 
 PROGRAM = "gensig"
@@ -17,7 +17,7 @@ OF_DIAGNOSE = ("train", "evaluate", "predict", "adapt", "detectability", "score"
 
 def main(argv: Sequence[str] | None = None) -> int:
     """Run the command; exit status 0, 1 for partial or damaged results, 2 for a mistake, 130 when interrupted."""
-    from gensig.completion import answer, is_asked
+    from gensig.terminal.completion import answer, is_asked
 
     if is_asked():
         verbs = {name: (verb.summary, verb.arguments) for name, verb in VERBS.items()}
@@ -50,7 +50,7 @@ def _run(words: list[str]) -> int:
     with one_line_warnings(PROGRAM):
         status = int(getattr(importlib.import_module(module), function)(arguments))
     if verb.instead is not None:
-        from gensig.commands.reading import say_unread
+        from gensig.commands.request import say_unread
 
         say_unread(arguments, verb.instead)
     return status

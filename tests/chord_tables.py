@@ -11,7 +11,7 @@ from gensig.dynamics.pair import Body, PairDynamics
 from gensig.geometry.contact import GearPair
 from gensig.mesh.load_distribution import loaded_pair_table
 from gensig.mesh.pair_table import FIRST_PITCH, LAST_PITCH, PairTable
-from gensig.mesh.sliced_table import SlicedTable
+from gensig.mesh.sliced.sliced_table import SlicedTable
 from gensig.mesh.smooth_table import smooth
 
 FARTHEST = 1e-3  # m, gap of a pair that is nowhere near

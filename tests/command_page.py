@@ -7,7 +7,7 @@ import diagnose.cli
 import gensig.cli
 from diagnose.commands import adapt, detectability, evaluate, export, predict, score, train
 from gensig.commands.verbs import VERBS
-from gensig.program import EXITS
+from gensig.terminal.program import EXITS
 
 PAGE = Path(__file__).resolve().parent.parent / "docs" / "commands.md"
 DIAGNOSE = {

@@ -12,10 +12,10 @@ import pytest
 from hydra._internal.sources_registry import SourcesRegistry
 from hydra.core.plugins import Plugins
 
-import gensig.compose
-from gensig.config import read_request
+import gensig.options.compose
 from gensig.dynamics.pair import PairDynamics
 from gensig.geometry.gear import Gear
+from gensig.plan.request import read_request
 from gensig.systems.registry import read_system
 from gensig.systems.spur_pair import SpurPair
 
@@ -45,7 +45,7 @@ def compositions() -> Iterator[Any]:
     """
     Plugins.instance()  # registers the sources
     source = SourcesRegistry.instance().resolve("pkg")
-    parse, parsed, compose = source._read_config, {}, gensig.compose.hydra_compose
+    parse, parsed, compose = source._read_config, {}, gensig.options.compose.hydra_compose
 
     def read(self: Any, path: Any) -> Any:
         if str(path) not in parsed:
@@ -63,7 +63,7 @@ def compositions() -> Iterator[Any]:
 
     with pytest.MonkeyPatch.context() as patch:
         patch.setattr(source, "_read_config", read)
-        patch.setattr(gensig.compose, "hydra_compose", composed)
+        patch.setattr(gensig.options.compose, "hydra_compose", composed)
         yield remembered
 
 

@@ -8,9 +8,9 @@ from pathlib import Path
 import numpy as np
 import yaml
 
-from gensig.dynamics.engine_torques import engine_torques
-from gensig.dynamics.forced import Elements, LinearLine, steady_response
-from gensig.systems.engine import read_engine
+from gensig.driveline.excitation.engine import read_engine
+from gensig.driveline.excitation.engine_torques import engine_torques
+from gensig.driveline.linear.forced import Elements, LinearLine, steady_response
 
 CONFIGS = Path(__file__).resolve().parents[1] / "configs"
 TABLE = CONFIGS / "tables" / "engine_shafting.csv"

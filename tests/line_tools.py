@@ -6,12 +6,12 @@ import math
 
 import numpy as np
 
-from gensig.dynamics import _line_layout as layout
-from gensig.dynamics._line_mesh_kernels import mesh_law
-from gensig.dynamics.geared_line import GearedLine, pack_meshes
-from gensig.dynamics.line_course import LineCourse, ShaftTorque, constant_speed
-from gensig.dynamics.line_mesh import LineMesh, phase_mesh
-from gensig.dynamics.newmark import LineMotion, LineSolver, _Run, _scratch
+from gensig.driveline.time import _layout as layout
+from gensig.driveline.time._line_mesh_kernels import mesh_law
+from gensig.driveline.time.course import LineCourse, ShaftTorque, constant_speed
+from gensig.driveline.time.geared_line import GearedLine, pack_meshes
+from gensig.driveline.time.line_mesh import LineMesh, phase_mesh
+from gensig.driveline.time.newmark import LineMotion, LineSolver, _Run, _scratch
 
 RADII, INERTIAS, TEETH = (0.05, 0.1), (0.01, 0.05), (20, 40)
 STIFFNESS = 3e8  # N/m

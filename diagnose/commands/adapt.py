@@ -48,8 +48,8 @@ def run(words: Sequence[str]) -> int:
     arguments = parser().parse_args(words)
     out = Path(arguments.out)
     refuse_existing(out)
-    from diagnose.machine import adapt_model
-    from diagnose.predict import Source
+    from diagnose.recordings.machine import adapt_model
+    from diagnose.recordings.predict import Source
 
     sources = [
         Source(

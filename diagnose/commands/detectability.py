@@ -63,8 +63,8 @@ def run(words: Sequence[str]) -> int:
     )
     _say_unread(overrides)
     import gensig
-    from diagnose.detectability import confirm_best, make_maps, read_bandwidths
-    from diagnose.detectability_report import content, summary
+    from diagnose.detectability.maps import confirm_best, make_maps, read_bandwidths
+    from diagnose.detectability.summary import content, summary
     from diagnose.progress import progress
 
     make_pairs = partial(
@@ -89,7 +89,7 @@ def run(words: Sequence[str]) -> int:
 
         table.write_text(json.dumps(content(maps, again), indent=1, allow_nan=False) + "\n", encoding="utf-8")
     if figure is not None:
-        from diagnose.detectability_figure import detectability_figure
+        from diagnose.detectability.figure import detectability_figure
 
         detectability_figure(figure, maps)
     return 0
@@ -97,7 +97,7 @@ def run(words: Sequence[str]) -> int:
 
 def _say_unread(overrides: Sequence[str]) -> None:
     """One line on stderr for every typed key of which a map makes nothing."""
-    from gensig.compose import override_keys
+    from gensig.options.compose import override_keys
 
     for key in override_keys(overrides):
         flag = next((flag for name, flag in NOT_READ.items() if key == name or key.startswith(f"{name}.")), None)

@@ -49,8 +49,8 @@ def run(words: Sequence[str]) -> int:
     out = Path(values["out"]) if "out" in values else None
     if out is not None:
         refuse_existing(out)
-    from diagnose.evaluate import evaluate_model, write_evaluation
-    from diagnose.model_io import load_model, read_description
+    from diagnose.recordings.evaluate import evaluate_model, write_evaluation
+    from diagnose.training.store import load_model, read_description
     from gensig.dataset.reader import open_dataset
 
     if read_description(values["model_dir"]).remaining_life is not None:
@@ -78,8 +78,8 @@ def run(words: Sequence[str]) -> int:
 
 
 def _evaluate_life(values: Mapping[str, str], out: Path | None) -> None:
-    from diagnose.life_evaluate import evaluate_life, life_lines, write_life_evaluation
-    from diagnose.life_io import load_life_model
+    from diagnose.recordings.life_evaluate import evaluate_life, life_lines, write_life_evaluation
+    from diagnose.training.life_store import load_life_model
     from gensig.dataset.reader import open_dataset
 
     model, description, facts = load_life_model(values["model_dir"])

@@ -44,8 +44,8 @@ def run(words: Sequence[str]) -> int:
         raise DatasetError(f"--out {out} exists; choose another or remove it")
     if not out.parent.is_dir():
         raise DatasetError(f"--out {out}: there is no folder {out.parent}")
-    from diagnose.model_io import load_model, read_description
-    from diagnose.onnx_export import export_onnx, need_packages
+    from diagnose.recordings.onnx_export import export_onnx, need_packages
+    from diagnose.training.store import load_model, read_description
 
     need_packages()
     if read_description(arguments.model).remaining_life is not None:
@@ -59,8 +59,8 @@ def run(words: Sequence[str]) -> int:
 
 
 def _export_life(folder: str, out: Path) -> None:
-    from diagnose.life_io import load_life_model
-    from diagnose.life_onnx import export_life_onnx
+    from diagnose.recordings.life_onnx import export_life_onnx
+    from diagnose.training.life_store import load_life_model
 
     model, description, facts = load_life_model(folder)
     difference = export_life_onnx(model, description, facts, out)

@@ -6,7 +6,7 @@ from collections.abc import Mapping
 from pathlib import Path
 
 from gensig.errors import DatasetError
-from gensig.program import Parser
+from gensig.terminal.program import Parser
 
 
 def verb_parser(verb: str, description: str, examples: str, exits: Mapping[int, str] | None = None) -> Parser:

@@ -10,7 +10,7 @@ from diagnose.commands.parser import Parser, verb_parser
 from gensig.errors import ConfigError
 
 if TYPE_CHECKING:
-    from diagnose.predict import Source
+    from diagnose.recordings.predict import Source
 
 HELP = """\
 Class probabilities of one recording, or how long the machine still runs, with a flag for what is unlike the training
@@ -64,7 +64,7 @@ def add_arguments(parser: ArgumentParser) -> None:
 def run(words: Sequence[str]) -> int:
     """Print class probabilities; the exit status tells of a recording unlike the training data."""
     arguments = parser().parse_intermixed_args(words)
-    from diagnose.predict import Source
+    from diagnose.recordings.predict import Source
 
     sources = [
         Source(
@@ -98,8 +98,8 @@ def run(words: Sequence[str]) -> int:
 
 def _answers(arguments: Namespace) -> Callable[[Source], tuple[dict[str, Any], str]]:
     """What answers for a recording: everything that is said of it, and the line for people."""
-    from diagnose.model_io import load_domain, load_model, read_description
-    from diagnose.predict import predict_recording, summary
+    from diagnose.recordings.predict import predict_recording, summary
+    from diagnose.training.store import load_domain, load_model, read_description
 
     if read_description(arguments.model).remaining_life is not None:
         return _life_answers(arguments)
@@ -118,9 +118,9 @@ def _answers(arguments: Namespace) -> Callable[[Source], tuple[dict[str, Any], s
 
 def _life_answers(arguments: Namespace) -> Callable[[Source], tuple[dict[str, Any], str]]:
     """The same of a remaining life."""
-    from diagnose.life_io import load_life_model
-    from diagnose.life_predict import life_summary, predict_life
-    from diagnose.model_io import load_domain
+    from diagnose.recordings.life_predict import life_summary, predict_life
+    from diagnose.training.life_store import load_life_model
+    from diagnose.training.store import load_domain
 
     model, description, facts = load_life_model(arguments.model)
     domain = load_domain(arguments.model, description)

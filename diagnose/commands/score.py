@@ -40,7 +40,7 @@ def add_arguments(parser: ArgumentParser) -> None:
 def run(words: Sequence[str]) -> int:
     """Print the scores; a benchmark that differs from the frozen one is named on stderr and not compared."""
     arguments = parser().parse_args(words)
-    from diagnose.scoring import score_file, score_table
+    from diagnose.studies.benchmark import score_file, score_table
     from gensig.dataset.reader import open_dataset
 
     dataset = open_dataset(arguments.data)

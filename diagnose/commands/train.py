@@ -51,7 +51,7 @@ def add_arguments(parser: ArgumentParser) -> None:
 def run(words: Sequence[str]) -> int:
     """Train, judge, write the report."""
     arguments = parser().parse_intermixed_args(words)
-    from gensig.compose import compose, override_keys
+    from gensig.options.compose import compose, override_keys
 
     if not arguments.multirun:
         override_keys(arguments.overrides)
@@ -66,7 +66,7 @@ def run(words: Sequence[str]) -> int:
 
 def _expand(overrides: Sequence[str], config_dir: str | None) -> list[dict[str, Any]]:
     """Configurations of a multirun, each with its own ``out``; all composed before the first one runs."""
-    from gensig.compose import compose, job_folders, sweep
+    from gensig.options.compose import compose, job_folders, sweep
 
     jobs = sweep(overrides)
     configs = [compose("train", job, config_dir=config_dir) for job in jobs]
@@ -87,11 +87,11 @@ def _train_one(config: dict[str, Any]) -> None:
     if settings.task == "remaining_life":
         _train_life(settings, out)
         return
-    from diagnose.novelty_report import novelty_tables
+    from diagnose.data.protocols import choose_protocols
     from diagnose.progress import progress
-    from diagnose.protocols import choose_protocols
-    from diagnose.report import result_table, without_interval, write_report
-    from diagnose.study import plan_study, run_study, settings_for, task_from
+    from diagnose.report.novelty_report import novelty_tables
+    from diagnose.report.page import result_table, without_interval, write_report
+    from diagnose.studies.study import plan_study, run_study, settings_for, task_from
     from gensig.dataset.reader import open_dataset
 
     task = task_from(open_dataset(settings.data), settings)
@@ -110,8 +110,8 @@ def _train_one(config: dict[str, Any]) -> None:
 
 def _say_window(dataset: Dataset, settings: TrainSettings) -> None:
     """One line where the data set asks for another length of windows than usual and nobody gave one."""
-    from diagnose.turns import wants_turns
-    from diagnose.window_choice import chosen_window
+    from diagnose.data.turns import wants_turns
+    from diagnose.data.window_choice import chosen_window
 
     why = None if settings.window_samples or wants_turns(settings.model) else chosen_window(dataset)[1]
     if why:
@@ -119,11 +119,11 @@ def _say_window(dataset: Dataset, settings: TrainSettings) -> None:
 
 
 def _train_life(settings: TrainSettings, out: Path) -> None:
-    from diagnose.life_report import life_tables, write_life_report
-    from diagnose.life_study import check_life_settings, plan_life_study, run_life_study
-    from diagnose.lives import lives_of
+    from diagnose.data.lives import lives_of
     from diagnose.progress import progress
-    from diagnose.study import settings_for, task_from
+    from diagnose.report.life_report import life_tables, write_life_report
+    from diagnose.studies.life_study import check_life_settings, plan_life_study, run_life_study
+    from diagnose.studies.study import settings_for, task_from
     from gensig.dataset.reader import open_dataset
 
     check_life_settings(settings)

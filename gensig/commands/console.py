@@ -15,7 +15,7 @@ from typing import TYPE_CHECKING, Any
 from gensig.errors import ConfigError
 
 if TYPE_CHECKING:
-    from gensig.generation import Progress
+    from gensig.production.folder import Progress
 
 LINE_SECONDS = 5.0
 LONG_SECONDS = 10.0  # without a record: time to say what may take so long

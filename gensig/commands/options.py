@@ -10,9 +10,9 @@ from collections.abc import Sequence
 from dataclasses import asdict
 from typing import Any
 
-from gensig import nearest, option_files
 from gensig.errors import ConfigError
-from gensig.option_files import (
+from gensig.options import files as option_files
+from gensig.options.files import (
     PRIMARY,
     Key,
     chosen_beside,
@@ -22,6 +22,7 @@ from gensig.option_files import (
     section_keys,
     sections,
 )
+from gensig.text import nearest
 
 VALUE_WIDTH = 34  # a longer value is cut; --json has it whole
 READ_BY = {"generate": "gensig", "train": "diagnose train"}

@@ -6,8 +6,8 @@ import sys
 from argparse import Namespace
 
 from gensig.commands.console import replaced_file
-from gensig.validation.checks import run_validation
-from gensig.validation.document import markdown, shortfalls, summary
+from gensig.validation.markdown import markdown, shortfalls, summary
+from gensig.validation.verdicts import run_validation
 
 
 def validate(arguments: Namespace) -> int:

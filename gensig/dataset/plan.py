@@ -10,8 +10,8 @@ from types import MappingProxyType
 
 import numpy as np
 
-from gensig.dataset.atomic import read_text, write_text
 from gensig.dataset.schema import COLUMNS, kind_of
+from gensig.dataset.storage.atomic import read_text, write_text
 from gensig.errors import DatasetError
 
 PLAN_BYTES_LIMIT = 4 * 1024**3

@@ -10,16 +10,23 @@ from typing import Any
 import h5py
 import numpy as np
 
-from gensig.dataset.attributes import HDF5_ERRORS, read_attributes
-from gensig.dataset.compression import compression_of
-from gensig.dataset.guard import datasets, first_line, open_file, open_shard, read_rows, same_file
-from gensig.dataset.layout import PLAN, SPLITS, Manifest, read_manifest, shard_path
+from gensig.dataset.folder.layout import PLAN, SPLITS, Manifest, read_manifest, shard_path
 from gensig.dataset.plan import Plan, read_plan
-from gensig.dataset.protocols import PROTOCOLS, why_left_out
-from gensig.dataset.quantization import read_signal
 from gensig.dataset.schema import SCALES, SIGNALS
 from gensig.dataset.selection import Selection, StoredRecord, structured, unknown_name
-from gensig.dataset.splits import SUBSETS, read_split
+from gensig.dataset.splitting.protocols import PROTOCOLS, why_left_out
+from gensig.dataset.splitting.splits import SUBSETS, read_split
+from gensig.dataset.storage.attributes import HDF5_ERRORS, read_attributes
+from gensig.dataset.storage.compression import compression_of
+from gensig.dataset.storage.guard import (
+    datasets,
+    first_line,
+    open_file,
+    open_shard,
+    read_rows,
+    same_file,
+)
+from gensig.dataset.storage.quantization import read_signal
 from gensig.errors import DatasetError
 
 MAX_OPEN_SHARDS = 64

@@ -1,21 +1,62 @@
 """Records of a data set that meet conditions: chosen by columns, read when asked for."""
 
+from __future__ import annotations
+
 import difflib
 from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass
-from typing import TYPE_CHECKING, Any
+from pathlib import Path
+from typing import Any, Protocol
 
 import numpy as np
 
+from gensig.dataset.plan import Plan
 from gensig.dataset.schema import PARAMS
 from gensig.errors import DatasetError
-
-if TYPE_CHECKING:
-    from gensig.dataset.reader import Dataset
 
 # Short names for columns, as users say them.
 ALIASES = {"fault": "label_name"}
 _STATES = ("ok", "failed")
+
+
+class RecordSource(Protocol):
+    """What a selection reads: columns of all records, and signals of one; a `Dataset` is one."""
+
+    @property
+    def folder(self) -> Path:
+        """Folder of the data set."""
+
+    @property
+    def plan(self) -> Plan:
+        """Plan of all records."""
+
+    @property
+    def n_records(self) -> int:
+        """Number of records."""
+
+    @property
+    def n_samples(self) -> int:
+        """Samples of one channel of one record."""
+
+    @property
+    def channel_names(self) -> list[str]:
+        """Names along the channel axis."""
+
+    @property
+    def class_names(self) -> list[str]:
+        """Names of the classes by label."""
+
+    @property
+    def column_names(self) -> list[str]:
+        """Names that `column` takes."""
+
+    def column(self, name: str) -> np.ndarray:
+        """One value (or short vector) a record, (record, ...)."""
+
+    def signals(
+        self, index: int, start: int = 0, stop: int | None = None, channels: Sequence[int | str] | None = None
+    ) -> np.ndarray:
+        """Acceleration of one record, (channel, sample) float32 in m/s^2."""
 
 
 @dataclass(frozen=True, slots=True, kw_only=True, eq=False)
@@ -24,12 +65,12 @@ class StoredRecord:
 
     Parameters
     ----------
-    dataset : Dataset
+    dataset : RecordSource
     index : int       place in the plan's order
     values : dict     column -> Python value; a (n,) array where a column holds a short vector
     """
 
-    dataset: "Dataset"
+    dataset: RecordSource
     index: int
     values: Mapping[str, Any]
 
@@ -43,16 +84,16 @@ class Selection:
 
     Attributes
     ----------
-    dataset : Dataset
+    dataset : RecordSource
     index : (record,) int64    numbers of the chosen records in the data set
     """
 
-    def __init__(self, dataset: "Dataset", index: np.ndarray) -> None:
+    def __init__(self, dataset: RecordSource, index: np.ndarray) -> None:
         self.dataset = dataset
         self.index = np.asarray(index, dtype=np.int64)
         self.index.flags.writeable = False
 
-    def where(self, **conditions: Any) -> "Selection":
+    def where(self, **conditions: Any) -> Selection:
         """Those of these records that meet all conditions; see `Dataset.where`."""
         keep = np.ones(len(self.index), dtype=bool)
         for name, wanted in conditions.items():
@@ -122,7 +163,7 @@ def unknown_name(kind: str, name: str, known: Sequence[str], place: object) -> D
     return DatasetError(f"{kind} {name!r} does not exist in {place}; {hint}")
 
 
-def _meets(dataset: "Dataset", name: str, wanted: Any) -> np.ndarray:
+def _meets(dataset: RecordSource, name: str, wanted: Any) -> np.ndarray:
     """(record,) bool: which records meet one condition."""
     values = _values(dataset, name)
     if values.ndim != 1:
@@ -146,7 +187,7 @@ def _meets(dataset: "Dataset", name: str, wanted: Any) -> np.ndarray:
     return meets
 
 
-def _values(dataset: "Dataset", name: str) -> np.ndarray:
+def _values(dataset: RecordSource, name: str) -> np.ndarray:
     name = ALIASES.get(name, name) if name not in dataset.column_names else name
     if name not in dataset.column_names and f"{PARAMS}/{name}" in dataset.column_names:
         name = f"{PARAMS}/{name}"
@@ -174,7 +215,7 @@ def _in_range(name: str, values: np.ndarray, wanted: tuple) -> np.ndarray:
     return (values >= low) & (values <= high)
 
 
-def _check_choices(dataset: "Dataset", name: str, values: np.ndarray, choices: Sequence[Any]) -> None:
+def _check_choices(dataset: RecordSource, name: str, values: np.ndarray, choices: Sequence[Any]) -> None:
     """Refuse text that no record has: it is a slip of the pen. Classes and states may be absent, and so may ''."""
     column = ALIASES.get(name, name)
     possible = {*values.tolist(), ""}

@@ -32,14 +32,15 @@ _OPTIONS: dict[str, Any] = {"cache": True, "error_model": "numpy", "_nrt": False
 
 
 def source_stamp(folder: Path) -> str:
-    """Hash of all private modules of a folder, whose compiled functions call each other across files."""
-    found = hashlib.sha256()
-    for path in sorted(folder.glob("_*.py")):
-        found.update(path.name.encode() + b"\0" + path.read_bytes() + b"\0")
-    return found.hexdigest()
+    """Hash of all private modules below a folder, whose compiled functions call each other across files."""
+    digest = hashlib.sha256()
+    for path in sorted(folder.rglob("_*.py")):
+        name = str(path.relative_to(folder))
+        digest.update(name.encode() + b"\0" + path.read_bytes() + b"\0")
+    return digest.hexdigest()
 
 
-_STAMP = source_stamp(Path(__file__).parent)
+_STAMP = source_stamp(Path(__file__).parents[1])  # of the whole package
 
 
 def _stamped(decorator: Callable[[Any], Any]) -> Any:

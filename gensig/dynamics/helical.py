@@ -11,7 +11,7 @@ from gensig.dynamics._layout import MOST_PAIRS
 from gensig.errors import ConfigError
 from gensig.geometry.contact import GearPair
 from gensig.mesh.pair_table import FIRST_PITCH, LAST_PITCH, PairTable
-from gensig.mesh.sliced_table import SlicedTable
+from gensig.mesh.sliced.sliced_table import SlicedTable
 
 Array = NDArray[np.float64]
 

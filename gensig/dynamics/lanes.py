@@ -29,8 +29,8 @@ from gensig.dynamics._vector import n_lanes
 from gensig.dynamics.helical import pitches
 from gensig.dynamics.pair import PairDynamics
 from gensig.mesh.pair_table import GearTable, PairTable
-from gensig.mesh.sliced_statics import left_out_energy
-from gensig.mesh.sliced_table import SlicedTable
+from gensig.mesh.sliced.sliced_statics import left_out_energy
+from gensig.mesh.sliced.sliced_table import SlicedTable
 
 Array = NDArray[np.float64]
 

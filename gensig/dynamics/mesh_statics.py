@@ -10,8 +10,8 @@ from numpy.typing import NDArray
 from gensig.dynamics.helical import half_lag
 from gensig.mesh.load_distribution import pair_states, static_mesh
 from gensig.mesh.pair_table import PairTable
-from gensig.mesh.sliced_statics import chord_equilibrium, chord_states
-from gensig.mesh.sliced_table import SlicedTable
+from gensig.mesh.sliced.sliced_statics import chord_equilibrium, chord_states
+from gensig.mesh.sliced.sliced_table import SlicedTable
 
 Array = NDArray[np.float64]
 

@@ -17,9 +17,9 @@ from gensig.dynamics.system import LumpedSystem, eigenvalues
 from gensig.errors import ConfigError
 from gensig.mesh.load_distribution import PairStates, StaticMesh, pair_states, static_mesh
 from gensig.mesh.pair_table import PairTable
-from gensig.mesh.sliced_statics import chord_equilibrium, chord_states
-from gensig.mesh.sliced_table import SlicedTable
-from gensig.operating import Nominal, Operating
+from gensig.mesh.sliced.sliced_statics import chord_equilibrium, chord_states
+from gensig.mesh.sliced.sliced_table import SlicedTable
+from gensig.operation.setpoint import Nominal, Operating
 from gensig.units import split_unit, unit
 
 Array = NDArray[np.float64]

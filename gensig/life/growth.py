@@ -11,7 +11,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from gensig.life.history import History
+from gensig.life.load_history import History
 
 Array = NDArray[np.float64]
 

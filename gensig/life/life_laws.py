@@ -10,8 +10,8 @@ import numpy as np
 from numpy.typing import NDArray
 
 from gensig.errors import ConfigError, ExtrapolationError, SimulationError
-from gensig.life.wear_case import WearCase
-from gensig.life.wear_life import hours, wear_life
+from gensig.life.wear.wear_case import WearCase
+from gensig.life.wear.wear_life import hours, wear_life
 
 Array = NDArray[np.float64]
 

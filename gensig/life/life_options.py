@@ -9,7 +9,7 @@ from typing import Any
 from gensig.errors import ConfigError
 from gensig.life.crack_growth import CrackGrowthOptions
 from gensig.life.drift import Drift
-from gensig.life.history import DrawnBlocks
+from gensig.life.load_history import DrawnBlocks
 from gensig.life.pit_growth import PitGrowthOptions
 from gensig.life.snapshots import SPACINGS
 from gensig.life.spread import Spread

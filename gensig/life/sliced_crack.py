@@ -20,8 +20,8 @@ from gensig.life.crack_growth import (
     require_open,
 )
 from gensig.material import Material
-from gensig.mesh.slice_energy import structure_energy
-from gensig.mesh.slices import SlicedMesh, contact_phases, settled_contact
+from gensig.mesh.sliced.slice_energy import structure_energy
+from gensig.mesh.sliced.slices import SlicedMesh, contact_phases, settled_contact
 
 Array = NDArray[np.float64]
 MeshOf = Callable[[Sequence[Fault]], SlicedMesh]

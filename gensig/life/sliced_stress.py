@@ -6,8 +6,8 @@ import numpy as np
 from numpy.typing import NDArray
 
 from gensig.material import Material
-from gensig.mesh.slice_pressure import contact_pressure
-from gensig.mesh.slices import SlicedMesh, loaded_contact
+from gensig.mesh.sliced.slice_pressure import contact_pressure
+from gensig.mesh.sliced.slices import SlicedMesh, loaded_contact
 
 Array = NDArray[np.float64]
 

@@ -10,7 +10,7 @@ from numpy.typing import NDArray
 from gensig.geometry.tooth import Tooth
 from gensig.geometry.tooth_profile import involute_point, load_angle
 from gensig.material import Material
-from gensig.mesh.sections import sections
+from gensig.mesh.tooth_sections import sections
 
 Array = NDArray[np.float64]
 

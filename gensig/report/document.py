@@ -8,18 +8,17 @@ from typing import Any
 
 import numpy as np
 
-from gensig.dataset.atomic import write_bytes
-from gensig.dataset.card import plain
-from gensig.dataset.class_figures import FIRST_CHOICE
+from gensig.dataset.cards.card import plain
+from gensig.dataset.cards.class_figures import FIRST_CHOICE
 from gensig.dataset.reader import Dataset, open_dataset
+from gensig.dataset.storage.atomic import write_bytes
 from gensig.errors import ConfigError
-from gensig.page import Charts, Section, Select, Switch, interactive_page
 from gensig.report import tables
 from gensig.report.examples import Choice, choose, envelope_band, example, usable_top
 from gensig.report.levels import VELOCITY, level_table, loudness, velocity_rms
 from gensig.report.measured_ranges import at_measured_rate, beside_measurements
 from gensig.report.packing import pack_floats
-from gensig.report.rotation import Rotation, read_rotation
+from gensig.report.rotation_frequencies import Rotation, read_rotation
 from gensig.report.values import (
     ALONG,
     INDICATORS,
@@ -33,6 +32,7 @@ from gensig.report.values import (
     some_records,
     value_table,
 )
+from gensig.text.page import Charts, Section, Select, Switch, interactive_page
 from gensig.validation.realism import Comparison
 
 SCRIPT = "dataset_report.js"

@@ -12,7 +12,7 @@ from numpy.typing import NDArray
 from gensig.dataset.reader import Dataset
 from gensig.errors import DatasetError
 from gensig.report.packing import pack_amplitude, pack_signal
-from gensig.report.rotation import Rotation
+from gensig.report.rotation_frequencies import Rotation
 from gensig.report.values import has_lives
 from gensig.signals.envelope import envelope_spectrum
 from gensig.signals.spectrum import amplitude_spectrum

@@ -8,12 +8,12 @@ from pathlib import Path
 
 import numpy as np
 
-from gensig.dataset.atomic import read_text
-from gensig.dataset.card import CAVEATS, GEOMETRY, plain, rounded, torque_words, value_range
-from gensig.dataset.layout import CONFIG, CONFIG_BYTES_LIMIT, OVERRIDES
-from gensig.dataset.protocols import PROTOCOLS
+from gensig.dataset.cards.card import CAVEATS, GEOMETRY, plain, rounded, torque_words, value_range
+from gensig.dataset.folder.layout import CONFIG, CONFIG_BYTES_LIMIT, OVERRIDES
 from gensig.dataset.reader import Dataset
-from gensig.page import Section, Table
+from gensig.dataset.splitting.protocols import PROTOCOLS
+from gensig.dataset.storage.atomic import read_text
+from gensig.text.page import Section, Table
 from gensig.validation.realism import Comparison, shown_range
 
 MANY_SHARDS = 200

@@ -13,7 +13,7 @@ from gensig.dataset.reader import Dataset
 from gensig.dataset.schema import COLUMNS, PARAMS
 from gensig.errors import DatasetError
 from gensig.report.packing import pack_floats, packed
-from gensig.report.rotation import Rotation
+from gensig.report.rotation_frequencies import Rotation
 from gensig.signals.averaging import time_synchronous_average
 from gensig.signals.indicators import crest_factor, fm4, kurtosis, rms, sideband_ratio
 

@@ -10,8 +10,8 @@ from numpy.typing import NDArray
 
 from gensig.sensing.accelerometer import SensorSet, draw_sensors
 from gensig.sensing.chain import LONGEST_LEAD, Sensing, add_noise, power, transverse_channel
-from gensig.sensing.drift import draw_drift
 from gensig.sensing.dropped import draw_dropped, filled
+from gensig.sensing.gain_drift import draw_drift
 from gensig.sensing.measured_path import ImpulseResponses, read_responses
 from gensig.sensing.noise import band_power
 from gensig.sensing.transfer_path import Housing, ModalPath, draw_housing

@@ -11,7 +11,7 @@ from numpy.typing import NDArray
 
 from gensig.dynamics.decimation import LOWEST_HZ, usable_band
 from gensig.errors import ConfigError
-from gensig.user_file import check_columns, check_rate, read_table
+from gensig.text.user_file import check_columns, check_rate, read_table
 
 Array = NDArray[np.float64]
 

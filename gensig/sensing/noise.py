@@ -15,8 +15,8 @@ from numpy.typing import NDArray
 from gensig.dynamics.decimation import usable_band
 from gensig.errors import ConfigError
 from gensig.sensing.transfer_path import SETTLED, mode_section
+from gensig.text.user_file import check_columns, check_rate, read_table
 from gensig.units import read, unit
-from gensig.user_file import check_columns, check_rate, read_table
 
 Array = NDArray[np.float64]
 

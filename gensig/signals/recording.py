@@ -12,7 +12,7 @@ from numpy.typing import NDArray
 
 from gensig.errors import ConfigError
 from gensig.signals.recording_files import Content, read_hdf5, read_mat, read_npy, read_npz, read_wav
-from gensig.user_file import check_rate, read_table
+from gensig.text.user_file import check_rate, read_table
 
 Array = NDArray[np.float64]
 

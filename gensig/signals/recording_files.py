@@ -14,7 +14,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from gensig.errors import ConfigError
-from gensig.user_file import MOST_BYTES
+from gensig.text.user_file import MOST_BYTES
 
 Array = NDArray[np.float64]
 

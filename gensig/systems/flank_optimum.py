@@ -11,7 +11,7 @@ from numpy.typing import NDArray
 
 from gensig.errors import ConfigError, GeometryError
 from gensig.mesh.modification import FlankModification, PairModification
-from gensig.mesh.slices import loaded_contact
+from gensig.mesh.sliced.slices import loaded_contact
 from gensig.systems.sliced_pair import SlicedPair
 
 Array = NDArray[np.float64]

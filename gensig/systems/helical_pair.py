@@ -8,7 +8,7 @@ from dataclasses import dataclass
 from gensig.dynamics._layout import MOST_PAIRS
 from gensig.errors import ConfigError, GeometryError
 from gensig.faults.base import Fault
-from gensig.mesh.sliced_table import SlicedTable
+from gensig.mesh.sliced.sliced_table import SlicedTable
 from gensig.systems.pair_machine import PairMachine
 from gensig.systems.sliced_pair import SlicedPair
 

@@ -12,10 +12,16 @@ from numpy.typing import NDArray
 from gensig.errors import ConfigError, GeometryError
 from gensig.geometry.contact import GearPair
 from gensig.geometry.gear import Gear
-from gensig.mesh.body_heat import BodyHeat, solved_body, uniform_body
-from gensig.mesh.heat import Heat, contact_half_width, flash_temperature, friction_heat, rolling_speeds
-from gensig.mesh.slices import LoadedContact, loaded_contact
-from gensig.mesh.thermal_growth import GearGrowth, PairGrowth
+from gensig.mesh.sliced.slices import LoadedContact, loaded_contact
+from gensig.mesh.thermal.body_heat import BodyHeat, solved_body, uniform_body
+from gensig.mesh.thermal.heat import (
+    Heat,
+    contact_half_width,
+    flash_temperature,
+    friction_heat,
+    rolling_speeds,
+)
+from gensig.mesh.thermal.thermal_growth import GearGrowth, PairGrowth
 from gensig.systems.sliced_pair import SlicedPair
 
 Array = NDArray[np.float64]

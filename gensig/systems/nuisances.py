@@ -12,7 +12,7 @@ from numpy.typing import NDArray
 from gensig.dynamics.decimation import usable_band
 from gensig.dynamics.pair import PairDynamics
 from gensig.dynamics.response import accelerations
-from gensig.operating import Nominal
+from gensig.operation.setpoint import Nominal
 from gensig.sensing.nuisance import draw_tones
 from gensig.sensing.tones import SENSE, TURN, Tones, shaft
 from gensig.systems.pair_machine import CleanRecord, Run, Start

@@ -31,8 +31,8 @@ from gensig.geometry.contact import GearPair
 from gensig.material import Material
 from gensig.mesh.options import MeshOptions
 from gensig.mesh.pair_table import N_PAIRS, PairTable
-from gensig.mesh.sliced_table import SlicedTable
-from gensig.operating import Operating
+from gensig.mesh.sliced.sliced_table import SlicedTable
+from gensig.operation.setpoint import Operating
 from gensig.sensing.agreement import agreement
 from gensig.sensing.chain import Sensing
 from gensig.sensing.encoder import Disc

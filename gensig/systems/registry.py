@@ -11,14 +11,14 @@ from gensig.errors import ConfigError
 from gensig.geometry.contact import GearPair
 from gensig.geometry.gear import Gear
 from gensig.material import Material
-from gensig.mesh.heat import Heat
 from gensig.mesh.modification import FlankModification, PairModification, sound_teeth
 from gensig.mesh.options import read_mesh_options, read_slice_options
+from gensig.mesh.thermal.heat import Heat
+from gensig.operation.options import read_operating
 from gensig.sensing.manufacturing import Quality
-from gensig.sensing.reading import read_sensing
+from gensig.sensing.options import read_sensing
 from gensig.systems.helical_pair import HelicalPair
 from gensig.systems.hot_pair import Duty, as_configured
-from gensig.systems.operation import read_operating
 from gensig.systems.pair_machine import PairMachine
 from gensig.systems.sliced_pair import SlicedPair
 from gensig.systems.spur_pair import SpurPair

@@ -13,7 +13,7 @@ from numpy.typing import NDArray
 
 from gensig.errors import ConfigError
 from gensig.geometry.contact import GearPair
-from gensig.life.root_stress import (
+from gensig.life.root.root_stress import (
     RootFactors,
     gears_of,
     pair_root_stress,
@@ -22,9 +22,9 @@ from gensig.life.root_stress import (
     spread_along_face,
     stress_factor_on_path,
 )
-from gensig.life.strength import Safety, Strength, safety
+from gensig.life.root.strength import Safety, Strength, safety
 from gensig.mesh.load_distribution import loaded_pair_table, pair_states, static_mesh
-from gensig.mesh.slices import loaded_contact
+from gensig.mesh.sliced.slices import loaded_contact
 from gensig.sensing.manufacturing import Quality
 from gensig.systems.registry import SLICED, read_sliced_pair, read_system, section
 from gensig.systems.sliced_pair import SlicedPair

@@ -16,9 +16,9 @@ from gensig.material import Material
 from gensig.mesh.modification import PairModification
 from gensig.mesh.options import MeshOptions, SliceOptions
 from gensig.mesh.pair_table import node_positions
-from gensig.mesh.slice_pressure import contact_pressure
-from gensig.mesh.sliced_table import SlicedTable, sliced_table
-from gensig.mesh.slices import (
+from gensig.mesh.sliced.slice_pressure import contact_pressure
+from gensig.mesh.sliced.sliced_table import SlicedTable, sliced_table
+from gensig.mesh.sliced.slices import (
     LoadedContact,
     Meeting,
     SlicedMesh,
@@ -27,7 +27,7 @@ from gensig.mesh.slices import (
     slice_places,
     sliced_mesh,
 )
-from gensig.mesh.thermal_growth import PairGrowth
+from gensig.mesh.thermal.thermal_growth import PairGrowth
 
 Array = NDArray[np.float64]
 

@@ -4,20 +4,40 @@ from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
-from typing import TYPE_CHECKING
+from typing import Protocol
 
 import numpy as np
 from numpy.typing import NDArray
 
 from gensig.faults.base import Fault, faulty_teeth
+from gensig.geometry.contact import GearPair
 from gensig.geometry.tooth import Tooth
+from gensig.material import Material
 from gensig.mesh.load_distribution import pair_states, static_mesh
+from gensig.mesh.options import MeshOptions
 from gensig.mesh.pair_table import PairTable, flank_sides, slice_bending, structural_terms
 
-if TYPE_CHECKING:
-    from gensig.systems.pair_machine import PairMachine
-
 Array = NDArray[np.float64]
+
+
+class LoadedMesh(Protocol):
+    """A mesh under a set torque: geometry, material, mesh options, and the force along the line of action in N."""
+
+    @property
+    def pair(self) -> GearPair:
+        """Geometry of the two gears."""
+
+    @property
+    def material(self) -> Material:
+        """Elasticity of both gears."""
+
+    @property
+    def mesh(self) -> MeshOptions:
+        """Conventions of the mesh."""
+
+    @property
+    def mesh_force(self) -> float:
+        """Normal force, N."""
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -55,7 +75,7 @@ class SinglePair:
 
 
 def stiffness_curves(
-    machine: PairMachine,
+    machine: LoadedMesh,
     table: PairTable,
     faults: Sequence[Fault],
     whole: Mapping[str, Tooth],
@@ -86,7 +106,7 @@ def stiffness_curves(
 
 
 def single_pair(
-    machine: PairMachine, position: Array, faults: Sequence[Fault], whole: Mapping[str, Tooth]
+    machine: LoadedMesh, position: Array, faults: Sequence[Fault], whole: Mapping[str, Tooth]
 ) -> SinglePair:
     """The pair of each gear's first faulty tooth, sound where there is none, under the whole load.
 

@@ -12,7 +12,7 @@ from numpy.typing import NDArray
 from gensig.errors import ConfigError
 from gensig.faults.registry import read_faults
 from gensig.life.options import read_wear_options
-from gensig.life.wear_case import WearCase, wear_case
+from gensig.life.wear.wear_case import WearCase, wear_case
 from gensig.systems.registry import SIDES, read_sliced_pair, section
 
 Array = NDArray[np.float64]

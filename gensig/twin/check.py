@@ -10,8 +10,8 @@ import numpy as np
 from numpy.typing import NDArray
 
 from gensig.errors import SimulationError
-from gensig.planning import make_plan
-from gensig.records import simulate_records
+from gensig.plan.make import make_plan
+from gensig.record.simulate import simulate_records
 from gensig.sensing.agreement import third_octave_bands, third_octave_power
 from gensig.signals.indicators import crest_factor, kurtosis, rms
 from gensig.signals.mesh_motion import Motion, Teeth

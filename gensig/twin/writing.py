@@ -10,7 +10,7 @@ from typing import Any
 import numpy as np
 
 from gensig.errors import ConfigError
-from gensig.option_writing import is_option_name, option_lines
+from gensig.text.option_writing import is_option_name, option_lines
 from gensig.twin.fitting import SOURCE_CHANNEL, Fit, minimum_phase, oversampling
 
 PATH_STEP = 20.0  # Hz between the lines of the path's file; its gain is smooth over a sixth of an octave

@@ -11,7 +11,6 @@ import numpy as np
 import yaml
 from numpy.typing import NDArray
 
-from gensig.compose import compose
 from gensig.dynamics.pair import PairDynamics
 from gensig.errors import ConfigError
 from gensig.faults.base import Fault, faulty_teeth
@@ -20,6 +19,7 @@ from gensig.geometry.contact import GearPair
 from gensig.geometry.gear import Gear
 from gensig.material import Material
 from gensig.mesh.pair_table import PairTable, pair_table
+from gensig.options.compose import compose
 from gensig.systems.registry import read_spur_pair
 from gensig.systems.spur_pair import SpurPair
 

@@ -1,6 +1,6 @@
 """Printed figures as data: one CSV per source, one row per figure or claim.
 
-The columns: ``id``; ``quantity`` and ``at``, what is computed and where (``gensig.validation.checks.KINDS``);
+The columns: ``id``; ``quantity`` and ``at``, what is computed and where (``gensig.validation.verdicts.KINDS``);
 ``overrides``, the configuration it belongs to; ``printed``, ``unit`` and ``tolerance``; ``kind``; ``expected``, a
 verdict other than the good one that is known and explained; ``source`` (section, equation or table); ``reason``.
 

@@ -4,8 +4,8 @@ import numpy as np
 import pytest
 from numpy.testing import assert_allclose
 
-from gensig.compose import compose
 from gensig.errors import ConfigError
+from gensig.options.compose import compose
 from gensig.systems.registry import read_system
 from gensig.validation.case import read_case, with_fault, with_words
 

@@ -13,7 +13,7 @@ from engine_cases import (
 )
 from numpy.testing import assert_allclose
 
-from gensig.validation.engine_response_checks import read_forced_case
+from gensig.validation.checks.engine_response_checks import read_forced_case
 
 FLYWHEEL, CRANK_GEAR, PUMP_GEAR, FAR_END = 13, 2, 44, 64
 BASE_RADIUS = 0.081 * np.cos(np.radians(20.0))  # both gears of the pump drive: 54 teeth, module 3 mm, table 2

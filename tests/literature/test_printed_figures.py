@@ -6,7 +6,6 @@ from dataclasses import replace
 import pytest
 
 from gensig.errors import ConfigError
-from gensig.validation.checks import KINDS, evaluate, run_validation
 from gensig.validation.rows import (
     DIFFERS,
     FAILS,
@@ -19,6 +18,7 @@ from gensig.validation.rows import (
     printed_value,
     read_rows,
 )
+from gensig.validation.verdicts import KINDS, evaluate, run_validation
 
 ROWS = [row for source in SOURCES for row in read_rows(source)]
 

@@ -11,7 +11,7 @@ from gensig.dynamics.lanes import _table_rows
 from gensig.errors import GeometryError
 from gensig.mesh.load_distribution import pair_states, static_mesh
 from gensig.mesh.modification import PLAIN, FlankModification, PairModification
-from gensig.mesh.sliced_statics import chord_equilibrium, chord_states
+from gensig.mesh.sliced.sliced_statics import chord_equilibrium, chord_states
 from gensig.systems.pair_machine import Run, simulate_together
 from gensig.systems.registry import read_system
 

@@ -11,7 +11,7 @@ from gensig.faults.base import faulty_teeth
 from gensig.faults.registry import FAULTS
 from gensig.geometry.tooth import healthy_tooth
 from gensig.mesh.pair_table import pair_compliance
-from gensig.mesh.sections import sections
+from gensig.mesh.tooth_sections import sections
 
 
 def test_the_cases_are_all_faults():

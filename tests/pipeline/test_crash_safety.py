@@ -17,9 +17,9 @@ import yaml
 from small_sets import TINY, contents, make
 
 from gensig.cli import main
-from gensig.dataset.layout import read_manifest, shard_path
-from gensig.dataset.receipts import receipt_path, write_receipt
-from gensig.dataset.verify import verify
+from gensig.dataset.folder.layout import read_manifest, shard_path
+from gensig.dataset.folder.verify import verify
+from gensig.dataset.storage.receipts import receipt_path, write_receipt
 
 ROOT = Path(__file__).parents[2]
 

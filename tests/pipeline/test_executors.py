@@ -15,7 +15,7 @@ import pytest
 from small_sets import TINY, contents, make
 
 from gensig.cli import main
-from gensig.dataset.verify import verify
+from gensig.dataset.folder.verify import verify
 from gensig.errors import ConfigError
 from gensig.execution.array import ArrayExecutor
 from gensig.execution.base import TRIES, Executor, ShardFailure

@@ -15,7 +15,7 @@ import pytest
 
 import gensig
 from gensig.cli import main
-from gensig.dataset.verify import verify
+from gensig.dataset.folder.verify import verify
 
 SMALL = (
     "plan.n_records=8",

@@ -8,10 +8,10 @@ import pytest
 from numpy.testing import assert_allclose, assert_array_equal
 
 from gensig.cli import main
-from gensig.config import read_request
-from gensig.planning import make_plan
-from gensig.records import simulate_records
-from gensig.systems import line_loads
+from gensig.driveline import loads as line_loads
+from gensig.plan.make import make_plan
+from gensig.plan.request import read_request
+from gensig.record.simulate import simulate_records
 
 LINE = (
     "experiment=engine_broken_tooth", "life=crack_growth", "plan.n_records=null", "plan.classes=[healthy,crack]",

@@ -10,9 +10,9 @@ from benchmarks import _realism_recording as recording
 from benchmarks import _realism_sets as sets
 from benchmarks import _realism_values as values
 from benchmarks import realism
-from gensig.config import read_request
 from gensig.errors import ConfigError, DatasetError
-from gensig.planning import read_counts
+from gensig.plan.make import read_counts
+from gensig.plan.request import read_request
 from gensig.validation.realism import read_ranges
 
 BASE = ["experiment=quickstart", "executor.n_workers=1"]

@@ -7,8 +7,8 @@ import pytest
 
 import gensig
 from gensig.cli import main
+from gensig.dataset.folder.verify import verify
 from gensig.dataset.plan import read_plan
-from gensig.dataset.verify import verify
 
 WORDS = (
     "plan.n_records=null",

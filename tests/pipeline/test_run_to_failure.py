@@ -9,14 +9,14 @@ from numpy.testing import assert_allclose, assert_array_equal
 
 from gensig import generate, open_dataset, stream
 from gensig.cli import main
-from gensig.config import read_request
 from gensig.dataset.plan import plan_text
-from gensig.dataset.protocols import make_splits
 from gensig.dataset.schema import LIFE_COLUMNS
-from gensig.dataset.split_check import split_problems
+from gensig.dataset.splitting.protocols import make_splits
+from gensig.dataset.splitting.split_check import split_problems
 from gensig.errors import ConfigError
-from gensig.planning import make_plan
-from gensig.records import simulate_records
+from gensig.plan.make import make_plan
+from gensig.plan.request import read_request
+from gensig.record.simulate import simulate_records
 
 LIVES = ("experiment=run_to_failure", "plan.n_units=12", "plan.n_gearboxes=3", "life.snapshot_count=8")
 SMALL = (

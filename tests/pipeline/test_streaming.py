@@ -9,12 +9,12 @@ import pytest
 from torch.utils.data import DataLoader
 
 import gensig
-from diagnose.data import StreamingDataset, VibrationDataset
+from diagnose.data.torch_sets import StreamingDataset, VibrationDataset
+from gensig.dataset.folder.verify import verify
 from gensig.dataset.schema import SIGNALS
-from gensig.dataset.verify import verify
 from gensig.errors import ConfigError, DatasetError
-from gensig.records import Record
-from gensig.streaming import RecordStream, _as_stored, epoch_seed, open_stream
+from gensig.production.streaming import RecordStream, _as_stored, epoch_seed, open_stream
+from gensig.record.simulate import Record
 
 SMALL = (
     "plan.n_records=6",

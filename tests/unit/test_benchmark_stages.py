@@ -1,8 +1,8 @@
 """The benchmark's clocks stand on functions that are there, and see the records that are made."""
 
 from benchmarks._stages import CLOCKED, Stages
-from gensig.planning import make_plan
-from gensig.records import simulate_records
+from gensig.plan.make import make_plan
+from gensig.record.simulate import simulate_records
 
 
 def test_every_stage_has_its_function():

@@ -12,8 +12,16 @@ from hypothesis import strategies as st
 from numpy.testing import assert_allclose
 from scipy.integrate import quad
 
-from gensig.courses import EARLIEST, FASTEST_RIPPLE, WALK_LIMIT, Profile, Ramp, RandomWalk, Ripple
 from gensig.errors import ConfigError
+from gensig.operation.courses import (
+    EARLIEST,
+    FASTEST_RIPPLE,
+    WALK_LIMIT,
+    Profile,
+    Ramp,
+    RandomWalk,
+    Ripple,
+)
 
 WALK = RandomWalk(scatter=0.02, correlation_time=0.4)
 BENT = Profile(times=(-0.3, 0.1, 0.5, 0.9), factors=(0.5, 1.2, 0.8, 1.0))

@@ -11,11 +11,11 @@ from hypothesis import strategies as st
 from numpy.testing import assert_allclose
 from scipy.integrate import quad
 
-from gensig.config import read_request
-from gensig.courses import MOST_POINTS, Profile
 from gensig.errors import ConfigError
-from gensig.rows import record_system
-from gensig.systems.operation import read_profile
+from gensig.operation.courses import MOST_POINTS, Profile
+from gensig.operation.options import read_profile
+from gensig.plan.request import read_request
+from gensig.record.inputs import record_system
 from gensig.systems.registry import read_system
 
 POINTS = ((-0.2, 0.5), (0.3, 0.8), (0.7, 1.0), (1.0, 0.25))

@@ -7,11 +7,11 @@ import numpy as np
 import pytest
 from numpy.testing import assert_allclose
 
-from gensig.config import read_request
-from gensig.courses import Profile
 from gensig.errors import ConfigError
+from gensig.operation.courses import Profile
+from gensig.operation.options import read_operating
+from gensig.plan.request import read_request
 from gensig.systems.lead_in import earlier
-from gensig.systems.operation import read_operating
 from gensig.systems.pair_machine import Run
 from gensig.systems.registry import read_system
 

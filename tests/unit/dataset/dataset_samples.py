@@ -4,11 +4,11 @@ from pathlib import Path
 
 import numpy as np
 
-from gensig.dataset.beginning import create_folder
-from gensig.dataset.layout import shard_path
-from gensig.dataset.manifest import finalize, identity_hash, record_shard
+from gensig.dataset.folder.beginning import create_folder
+from gensig.dataset.folder.layout import shard_path
+from gensig.dataset.folder.manifest import finalize, identity_hash, record_shard
 from gensig.dataset.plan import Plan, record_ids, shard_places
-from gensig.dataset.shard import ShardWriter
+from gensig.dataset.storage.shard import ShardWriter
 
 CLASSES = ["healthy", "crack", "pitting"]
 ATTRIBUTES = {

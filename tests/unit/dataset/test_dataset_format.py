@@ -8,7 +8,7 @@ import numpy as np
 import pytest
 from dataset_samples import build, row_of
 
-from gensig.dataset.layout import read_manifest
+from gensig.dataset.folder.layout import read_manifest
 from gensig.dataset.plan import Plan
 from gensig.dataset.reader import open_dataset
 from gensig.dataset.schema import (

@@ -9,7 +9,7 @@ import pytest
 from dataset_samples import CLASSES, build, row_of
 
 import gensig.dataset.reader as reader_module
-from gensig.dataset.layout import shard_path
+from gensig.dataset.folder.layout import shard_path
 from gensig.dataset.plan import Plan
 from gensig.dataset.reader import Dataset, open_dataset
 from gensig.errors import DatasetError

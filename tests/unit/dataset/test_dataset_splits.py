@@ -8,8 +8,8 @@ import pytest
 from dataset_samples import make_plan
 
 from gensig.dataset.plan import Plan
-from gensig.dataset.protocols import make_splits
-from gensig.dataset.splits import SUBSETS, SplitTable, read_split
+from gensig.dataset.splitting.protocols import make_splits
+from gensig.dataset.splitting.splits import SUBSETS, SplitTable, read_split
 from gensig.errors import DatasetError
 
 OLD_DIGESTS = {

@@ -13,9 +13,9 @@ from dataset_samples import build, make_plan
 from benchmarks import _fuzz_judge
 from benchmarks._fuzz_judge import Verdict, verdicts
 from benchmarks._mutants import SECRET, STRUCTURES, Mutant
-from gensig.dataset.index import open_index
-from gensig.dataset.inspection import inspect
-from gensig.dataset.layout import shard_path
+from gensig.dataset.folder.inspection import inspect
+from gensig.dataset.folder.layout import shard_path
+from gensig.dataset.storage.index import open_index
 from gensig.errors import DatasetError
 
 N_MUTANTS = 144  # every forbidden structure and every forgery of a manifest once; the campaign tries thousands

@@ -4,9 +4,9 @@ import numpy as np
 import pytest
 
 from gensig.dataset.plan import Plan, record_ids, shard_places
-from gensig.dataset.protocols import PROTOCOLS, make_splits, why_left_out
-from gensig.dataset.split_check import split_problems
-from gensig.dataset.splits import SUBSETS, SplitTable
+from gensig.dataset.splitting.protocols import PROTOCOLS, make_splits, why_left_out
+from gensig.dataset.splitting.split_check import split_problems
+from gensig.dataset.splitting.splits import SUBSETS, SplitTable
 
 RANGES = {"cross_speed": "speed_set_rpm", "cross_torque": "torque_nm", "cross_snr": "snr_db"}
 SEVERITIES = ("unseen_severity_inner", "unseen_severity_outer")

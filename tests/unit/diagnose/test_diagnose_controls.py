@@ -8,19 +8,27 @@ import pytest
 from fake_dataset import CLASSES, FakeDataset
 
 import gensig.dataset.reader
+from diagnose.baselines.oracle import chosen_oracle, oracle_table, oracle_windows
+from diagnose.baselines.probe import (
+    EXCLUDED,
+    LABELS,
+    METADATA,
+    RESULTS,
+    fit_probe,
+    probe_values,
+    probed_columns,
+)
 from diagnose.cli import main
-from diagnose.controls import control_jobs
-from diagnose.controls_text import controls_section, oracle_verdict, verdict
-from diagnose.metrics import ratio_with_interval
-from diagnose.oracle import chosen_oracle, oracle_table, oracle_windows
-from diagnose.predictions import Prediction, Rows
-from diagnose.probe import EXCLUDED, LABELS, METADATA, RESULTS, fit_probe, probe_values, probed_columns
+from diagnose.data.windows import load_windows, subset_segments, task_of
+from diagnose.report.control_sections import controls_section, oracle_verdict, verdict
+from diagnose.scoring.metrics import ratio_with_interval
+from diagnose.scoring.predictions import Prediction, Rows
 from diagnose.settings import settings_from
-from diagnose.study import task_from
-from diagnose.windows import load_windows, subset_segments, task_of
-from gensig.compose import compose
+from diagnose.studies.controls import control_jobs
+from diagnose.studies.study import task_from
 from gensig.dataset.schema import COLUMNS, SIGNALS
 from gensig.errors import ConfigError
+from gensig.options.compose import compose
 
 FAST = [
     "protocols=[by_unit]", "window_samples=1200", "stride_samples=1000", "epochs=2", "seeds=[0]", "n_bootstrap=200",

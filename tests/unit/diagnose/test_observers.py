@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 from numpy.testing import assert_allclose
 
-from diagnose.observers import (
+from diagnose.detectability.observers import (
     ENVELOPE_HARMONICS,
     band_indicators,
     confirmed,

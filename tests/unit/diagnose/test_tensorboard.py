@@ -80,7 +80,7 @@ def test_a_value_that_is_no_switch_is_refused(tmp_path, capsys):
 def test_without_the_package_one_line_says_what_to_install():
     code = (
         "import sys; sys.modules['tensorboard'] = None\n"
-        "from diagnose.tensorboard import need_tensorboard\n"
+        "from diagnose.training.tensorboard import need_tensorboard\n"
         "from gensig.errors import ConfigError\n"
         "try: need_tensorboard()\n"
         "except ConfigError as error: print(error)\n"

@@ -7,7 +7,7 @@ import sys
 from pathlib import Path
 
 import gensig.dynamics as dynamics
-from gensig.dynamics import _line_mesh_kernels, _newmark_kernels
+from gensig.driveline.time import _line_mesh_kernels, _newmark_kernels
 from gensig.dynamics._vector import source_stamp
 
 FOLDER = Path(dynamics.__file__).parent

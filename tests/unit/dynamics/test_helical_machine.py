@@ -14,7 +14,7 @@ from gensig.dynamics.lanes import pack
 from gensig.dynamics.mesh_statics import loss_arm
 from gensig.dynamics.pair import PAIR_DOFS, Body, Support
 from gensig.errors import ConfigError
-from gensig.mesh.sliced_statics import left_out_energy
+from gensig.mesh.sliced.sliced_statics import left_out_energy
 from gensig.sensing.manufacturing import nominal_gearbox
 from gensig.systems.supports import in_gearbox
 from gensig.units import is_turning, read

@@ -10,12 +10,12 @@ from numpy.testing import assert_allclose
 from scipy.integrate import solve_ivp
 from scipy.optimize import brentq
 
-from gensig.courses import Profile
 from gensig.dynamics import mesh_statics
 from gensig.dynamics.pair import DOFS, PAIR_DOFS, Rotor
 from gensig.dynamics.system import eigenvalues
 from gensig.errors import ConfigError
 from gensig.mesh.load_distribution import static_mesh
+from gensig.operation.courses import Profile
 from gensig.systems.registry import read_system
 
 MOTOR = Rotor(inertia=2e-3, coupling_stiffness=3e3, coupling_damping_ratio=0.05)

@@ -7,13 +7,13 @@ import pytest
 from fault_cases import KINDS, one, option
 from numpy.testing import assert_allclose
 
-from gensig.compose import options
 from gensig.errors import ConfigError, FaultError, GensigError
 from gensig.faults.base import faulty_teeth
 from gensig.faults.broken import MissingTooth
 from gensig.faults.crack import Crack
 from gensig.faults.pitting import Pitting
 from gensig.faults.registry import COMPOUND, FAULTS, fault_parts, read_faults
+from gensig.options.compose import options
 from gensig.systems.pair_machine import severity
 
 CRACK, PIT, MISSING = ({**option(kind), "tooth": 3} for kind in ("crack", "pitting", "missing_tooth"))

@@ -12,7 +12,7 @@ from gensig.faults.broken import tooth_height
 from gensig.faults.flank_loss import flank_area
 from gensig.geometry.tooth import healthy_tooth
 from gensig.mesh.face import bearing_width
-from gensig.mesh.sections import sections
+from gensig.mesh.tooth_sections import sections
 
 HOLES, FORM = {"slice_edges", "material_loss"}, {"flank_deviation"}
 CHANGES = {

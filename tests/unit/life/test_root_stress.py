@@ -6,9 +6,8 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from gensig.compose import compose, options
 from gensig.errors import ConfigError, GeometryError
-from gensig.life.root_stress import (
+from gensig.life.root.root_stress import (
     deep_tooth_factor,
     helix_factor,
     load_distribution_factor,
@@ -18,6 +17,7 @@ from gensig.life.root_stress import (
     root_width,
     spread_along_face,
 )
+from gensig.options.compose import compose, options
 from gensig.systems.registry import read_pair
 from gensig.systems.root_strength import read_root_strength
 

@@ -4,9 +4,8 @@ from dataclasses import replace
 
 import pytest
 
-from gensig.compose import compose, options
 from gensig.errors import ConfigError
-from gensig.life.strength import (
+from gensig.life.root.strength import (
     Strength,
     life_factor,
     relative_notch_sensitivity,
@@ -14,6 +13,7 @@ from gensig.life.strength import (
     safety,
     size_factor,
 )
+from gensig.options.compose import compose, options
 from gensig.units import read
 
 

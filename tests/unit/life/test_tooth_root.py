@@ -11,7 +11,7 @@ from gensig.errors import ExtrapolationError
 from gensig.geometry.gear import Gear
 from gensig.geometry.tooth_profile import involute_point, root_curve
 from gensig.geometry.tooth_profile import load_angle as flank_load_angle
-from gensig.life.tooth_root import TANGENT, root_loading, root_section, virtual_gear
+from gensig.life.root.tooth_root import TANGENT, root_loading, root_section, virtual_gear
 
 
 def gear(n_teeth, *, shift=0.0, module=3e-3, rounding=0.38, helix=0.0):

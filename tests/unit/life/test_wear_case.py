@@ -6,14 +6,20 @@ import numpy as np
 import pytest
 from numpy.testing import assert_allclose
 
-from gensig.compose import compose
 from gensig.errors import ConfigError, ExtrapolationError, SimulationError
 from gensig.faults.base import faulty_teeth
 from gensig.faults.registry import read_faults
-from gensig.life.archard import LEAST_CURVATURE_SHARE, flank_radii, hertz_pressure, hunting_turns, worn_curvature
 from gensig.life.life_laws import FittedLaw, fitted_laws, life_map, torque_exponent
 from gensig.life.options import read_wear_options
-from gensig.life.wear_life import wear_life, worn_flanks
+from gensig.life.wear.archard import (
+    LEAST_CURVATURE_SHARE,
+    flank_radii,
+    hertz_pressure,
+    hunting_turns,
+    worn_curvature,
+)
+from gensig.life.wear.wear_life import wear_life, worn_flanks
+from gensig.options.compose import compose
 from gensig.systems.wear import read_wear_case, wear_fault
 
 FULL = ("gear=harbin_38_55", "gear.addendum_coefficient=1", "wear.threshold_um=20")

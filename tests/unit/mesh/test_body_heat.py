@@ -6,10 +6,10 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from gensig.compose import compose
 from gensig.errors import ConfigError
 from gensig.geometry.tooth_profile import tooth_profile
-from gensig.mesh.body_heat import face_surface, solved_body, tooth_surface, uniform_body
+from gensig.mesh.thermal.body_heat import face_surface, solved_body, tooth_surface, uniform_body
+from gensig.options.compose import compose
 from gensig.systems.registry import read_heat, read_pair
 
 WORDS = ["system=helical_pair", "gear=chongqing_40_162", "heat=chongqing_rated"]

@@ -6,11 +6,17 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from gensig.compose import compose
 from gensig.errors import ConfigError, ExtrapolationError
-from gensig.mesh.heat import BLOK_SEMI_WIDTH, contact_half_width, flash_temperature, friction_heat, rolling_speeds
-from gensig.mesh.slice_pressure import contact_pressure
-from gensig.mesh.slices import loaded_contact
+from gensig.mesh.sliced.slice_pressure import contact_pressure
+from gensig.mesh.sliced.slices import loaded_contact
+from gensig.mesh.thermal.heat import (
+    BLOK_SEMI_WIDTH,
+    contact_half_width,
+    flash_temperature,
+    friction_heat,
+    rolling_speeds,
+)
+from gensig.options.compose import compose
 from gensig.systems.registry import read_duty, read_heat
 
 SPEED = 125.0

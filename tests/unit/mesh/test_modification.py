@@ -5,9 +5,9 @@ import math
 import numpy as np
 import pytest
 
-from gensig.compose import compose
 from gensig.errors import ConfigError
 from gensig.mesh.modification import FlankModification, PairModification
+from gensig.options.compose import compose
 from gensig.systems.registry import read_modification, read_pair
 
 MICRO, MILLI = 1e-6, 1e-3

@@ -5,13 +5,13 @@ import functools
 import numpy as np
 import pytest
 
-from gensig.config import read_request
 from gensig.errors import ConfigError
 from gensig.faults.base import faulty_teeth
 from gensig.faults.registry import read_faults
 from gensig.mesh.load_distribution import loaded_pair_table, pair_states, static_mesh
-from gensig.mesh.slice_teeth import merged_edges
-from gensig.mesh.slices import Meeting, loaded_contact, sliced_mesh
+from gensig.mesh.sliced.slice_teeth import merged_edges
+from gensig.mesh.sliced.slices import Meeting, loaded_contact, sliced_mesh
+from gensig.plan.request import read_request
 from gensig.systems.registry import read_sliced_pair
 
 SPUR = ("gear=xiamen_23_84", "mesh.contact=linear")

@@ -5,14 +5,14 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from gensig.config import read_request
 from gensig.errors import FaultError
 from gensig.faults.registry import read_faults
-from gensig.mesh._slice_kernels import bite_forces
 from gensig.mesh.load_distribution import loaded_pair_table, pair_states, static_mesh
 from gensig.mesh.pair_table import node_positions
-from gensig.mesh.sliced_table import DEEPEST, N_CHORDS, sliced_table
-from gensig.mesh.slices import Meeting, loaded_contact, single_pair_stiffness, slice_places
+from gensig.mesh.sliced._slice_kernels import bite_forces
+from gensig.mesh.sliced.sliced_table import DEEPEST, N_CHORDS, sliced_table
+from gensig.mesh.sliced.slices import Meeting, loaded_contact, single_pair_stiffness, slice_places
+from gensig.plan.request import read_request
 from gensig.systems.registry import read_sliced_pair
 
 

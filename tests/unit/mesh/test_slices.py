@@ -8,20 +8,20 @@ import numpy as np
 import pytest
 from scipy.optimize import nnls
 
-from gensig.compose import compose
 from gensig.errors import ConfigError, GeometryError
 from gensig.geometry.contact import GearPair
 from gensig.geometry.gear import Gear
 from gensig.geometry.tooth import healthy_tooth
 from gensig.geometry.tooth_profile import load_angle
 from gensig.material import Material
-from gensig.mesh._slice_kernels import bite_forces
 from gensig.mesh.body_coupling import cross_compliance
 from gensig.mesh.load_distribution import loaded_pair_table, pair_states, static_mesh
 from gensig.mesh.options import read_mesh_options, read_slice_options
 from gensig.mesh.pair_table import structural_compliance
-from gensig.mesh.slice_pressure import contact_pressure
-from gensig.mesh.slices import loaded_contact, single_pair_stiffness, sliced_mesh
+from gensig.mesh.sliced._slice_kernels import bite_forces
+from gensig.mesh.sliced.slice_pressure import contact_pressure
+from gensig.mesh.sliced.slices import loaded_contact, single_pair_stiffness, sliced_mesh
+from gensig.options.compose import compose
 from gensig.units import read, to_si
 
 STEEL = Material(youngs_modulus=210e9, poisson_ratio=0.3, density_kg_per_m3=7850.0)

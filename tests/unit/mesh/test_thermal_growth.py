@@ -5,10 +5,10 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from gensig.compose import compose
 from gensig.geometry.tooth_profile import involute_point, load_angle
-from gensig.mesh.body_heat import solved_body
-from gensig.mesh.thermal_growth import GearGrowth, PairGrowth
+from gensig.mesh.thermal.body_heat import solved_body
+from gensig.mesh.thermal.thermal_growth import GearGrowth, PairGrowth
+from gensig.options.compose import compose
 from gensig.systems.registry import read_heat, read_pair
 
 WORDS = ["system=helical_pair", "gear=chongqing_40_162", "heat=chongqing_rated"]

@@ -8,9 +8,9 @@ from numpy.testing import assert_allclose
 from test_instrument import BEARING, HOUSING, changed, instrument, source
 
 from gensig.errors import ConfigError
-from gensig.sensing.drift import draw_drift
 from gensig.sensing.dropped import draw_dropped, filled
-from gensig.sensing.reading import read_sensing
+from gensig.sensing.gain_drift import draw_drift
+from gensig.sensing.options import read_sensing
 
 N = 10_000
 

@@ -7,11 +7,11 @@ import numpy as np
 import pytest
 from numpy.testing import assert_allclose
 
-from gensig.config import read_request
 from gensig.errors import ConfigError
+from gensig.plan.request import read_request
 from gensig.sensing.chain import power
 from gensig.sensing.instrument import draw_instrument
-from gensig.sensing.reading import NESTED, read_sensing
+from gensig.sensing.options import NESTED, read_sensing
 
 HOUSING = read_request(["sensing=housing"]).config["sensing"]
 BEARING = read_request([]).config["sensing"]

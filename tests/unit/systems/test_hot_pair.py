@@ -6,9 +6,9 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from gensig.compose import compose
 from gensig.errors import ConfigError, ExtrapolationError, GeometryError
 from gensig.mesh.modification import FlankModification
+from gensig.options.compose import compose
 from gensig.systems.hot_pair import (
     as_configured,
     flash_skin_growth,

@@ -5,9 +5,9 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from gensig.config import read_request
 from gensig.errors import ConfigError
 from gensig.mesh.modification import FlankModification
+from gensig.plan.request import read_request
 from gensig.systems.flank_optimum import N_VARIABLES, Cases, judge, optimise, unpacked
 from gensig.systems.registry import read_sliced_pair, read_system
 

@@ -9,13 +9,13 @@ import numpy as np
 import pytest
 from numpy.testing import assert_allclose
 
-from gensig.config import read_request
 from gensig.dynamics.bearing import support_stiffness
 from gensig.dynamics.integrator import settling_time
 from gensig.errors import ConfigError
-from gensig.planning import make_plan
-from gensig.records import simulate_record
-from gensig.rows import Stream, record_system, row_run, row_values, stream
+from gensig.plan.make import make_plan
+from gensig.plan.request import read_request
+from gensig.record.inputs import Stream, record_system, row_run, row_values, stream
+from gensig.record.simulate import simulate_record
 from gensig.sensing.manufacturing import draw_gearbox, nominal_gearbox, with_damping_ratio
 from gensig.systems.pair_machine import Run
 from gensig.systems.registry import read_system

@@ -4,9 +4,9 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from gensig.config import read_request
-from gensig.planning import make_plan
-from gensig.records import simulate_record
+from gensig.plan.make import make_plan
+from gensig.plan.request import read_request
+from gensig.record.simulate import simulate_record
 
 RATE = 25600.0
 TEETH = (23, 37)

@@ -10,7 +10,7 @@ from gensig.cli import main
 from gensig.errors import ConfigError
 from gensig.signals.mesh_motion import Teeth
 from gensig.signals.recording import STANDARD_GRAVITY
-from gensig.twin.recording import read_recording
+from gensig.twin.machine_recording import read_recording
 from gensig.twin.speed import find_motion
 
 RATE = 5120.0

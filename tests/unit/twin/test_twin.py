@@ -6,8 +6,8 @@ import yaml
 from machines import GRADE, RATE, SPEED, TEETH, drifting, measured
 
 from gensig.cli import main
-from gensig.config import read_request
 from gensig.dataset.reader import open_dataset
+from gensig.plan.request import read_request
 from gensig.signals.mesh_motion import Teeth
 from gensig.signals.recording import Recording
 from gensig.twin.fitting import gain_at, minimum_phase

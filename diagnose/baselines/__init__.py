@@ -1,0 +1,1 @@
+"""Baselines that a network must beat, and the features they use."""

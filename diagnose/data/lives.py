@@ -1,0 +1,153 @@
+"""Records as snapshots of machines that run to failure: whose life, how old, how long it still runs."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from diagnose.data.protocols import OPEN_PROTOCOLS, choose_protocols
+from diagnose.data.windows import CROSS_SENSOR, SUBSETS, Segments, Task, subset_segments
+from gensig.errors import ConfigError, DatasetError
+
+if TYPE_CHECKING:
+    from diagnose.settings import LifeSettings, TrainSettings
+
+FloatArray = NDArray[np.floating]
+IntArray = NDArray[np.integer]
+COLUMNS = ("life_id", "life_time_h", "remaining_life_h", "life_failed")
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class Lives:
+    """What a data set says of the lives that its records belong to.
+
+    Attributes
+    ----------
+    name : (record,) text, "" for a record that is no snapshot of a life, or that failed in simulation
+    age : (record,) h of operation when it was taken
+    remaining : (record,) h from then to the failure; of a life that did not fail, to the end of its history
+    failed : (record,) bool whether its life ended in failure; where not, it is censored and `remaining` a lower bound
+    """
+
+    name: NDArray[Any]
+    age: FloatArray
+    remaining: FloatArray
+    failed: NDArray[np.bool_]
+
+    def known(self, early_life: float) -> NDArray[np.bool_]:
+        """(record,) whether the remaining life, cut at ``early_life`` h, is known: a bound above the cut says it."""
+        return (self.name != "") & (self.failed | (self.remaining >= early_life))
+
+
+def lives_of(task: Task) -> Lives:
+    """The lives of a task's data set.
+
+    Raises
+    ------
+    DatasetError    for a data set whose records are no snapshots of lives, or whose columns contradict each other
+    """
+    dataset = task.dataset
+    if missing := [name for name in COLUMNS if name not in dataset.column_names]:
+        raise DatasetError(
+            f"{dataset.folder} has no column {missing[0]}: its records are no snapshots of lives, which "
+            "task=remaining_life needs; make one with gensig generate experiment=run_to_failure"
+        )
+    name, age, remaining, failed = (np.asarray(dataset.column(column)) for column in COLUMNS)
+    age, remaining = age.astype(float), remaining.astype(float)
+    used = (task.labels() >= 0) & (name != "") & np.isfinite(age) & np.isfinite(remaining)
+    if not used.any():
+        raise DatasetError(f"{dataset.folder}: no usable record is a snapshot of a life")
+    if (wrong := np.flatnonzero(used & ((age < 0) | (remaining < 0)))).size:
+        raise DatasetError(
+            f"{dataset.folder}, record {dataset.column('record_id')[wrong[0]]}: life_time_h {age[wrong[0]]:g} and "
+            f"remaining_life_h {remaining[wrong[0]]:g} must not be below 0"
+        )
+    for life in np.unique(name[used]):
+        if np.unique(failed[used & (name == life)]).size > 1:
+            raise DatasetError(f"{dataset.folder}: life {life} has failed in some of its records and not in others")
+    return Lives(name=np.where(used, name, ""), age=age, remaining=remaining, failed=failed == 1)
+
+
+def life_segments(task: Task, lives: Lives, protocol: str, subset: str) -> Segments:
+    """Stretches of one subset of a split whose records are snapshots of lives.
+
+    Raises
+    ------
+    ConfigError    for a subset without any
+    """
+    found = subset_segments(task, protocol, subset)
+    kept = lives.name[found.record] != ""
+    if not kept.any():
+        raise ConfigError(f"protocol {protocol}: its {subset} part has no snapshot of a life; leave the protocol out")
+    return Segments(record=found.record[kept], start=found.start[kept], stop=found.stop[kept])
+
+
+def choose_life_protocols(task: Task, lives: Lives, settings: TrainSettings) -> tuple[tuple[str, ...], dict[str, str]]:
+    """Protocols that keep every life whole on one side, and of the others wanted, why they are left out.
+
+    Raises
+    ------
+    ConfigError    for a name that is no protocol, and where none is left
+    """
+    wanted, left_out = choose_protocols(task, settings.protocols)
+    kept = []
+    for protocol in wanted:
+        reason = _why_not(task, lives, protocol)
+        if reason is None:
+            kept.append(protocol)
+        else:
+            left_out = {**left_out, protocol: reason}
+    if not kept:
+        reasons = "; ".join(f"{name}: {reason}" for name, reason in left_out.items())
+        raise ConfigError(f"{task.dataset.folder} has no protocol for task=remaining_life ({reasons})")
+    return tuple(kept), left_out
+
+
+def _why_not(task: Task, lives: Lives, protocol: str) -> str | None:
+    if protocol in OPEN_PROTOCOLS or protocol == CROSS_SENSOR:
+        return "it is of no use for remaining lives"
+    records = {subset: life_segments(task, lives, protocol, subset).record for subset in SUBSETS}
+    names = {subset: set(lives.name[record].tolist()) for subset, record in records.items()}
+    for one, other in (("train", "validation"), ("train", "test"), ("validation", "test")):
+        if both := sorted(names[one] & names[other]):
+            return f"life {both[0]} is in its {one} and its {other} part"
+    for subset, record in records.items():
+        if not lives.failed[record].any():
+            return f"no life of its {subset} part failed; make more lives or a longer horizon"
+    return None
+
+
+def early_level(lives: Lives, record: IntArray, settings: LifeSettings) -> float:
+    """Level in h at which the remaining life is cut: long before its failure a machine shows nothing of it.
+
+    Parameters
+    ----------
+    lives : of the data set
+    record : of the training part
+    settings : ``early_life_h``, or ``early_life_share`` of the median length of the training lives that failed
+
+    Raises
+    ------
+    DatasetError    for lives of no length
+
+    Source: the piecewise linear target of Heimes (2008), "Recurrent neural networks for remaining useful life
+    estimation", International Conference on Prognostics and Health Management.
+    """
+    if settings.early_life_h is not None:
+        return float(settings.early_life_h)
+    chosen = record[lives.failed[record]]
+    _, first = np.unique(lives.name[chosen], return_index=True)
+    level = settings.early_life_share * float(np.median((lives.age + lives.remaining)[chosen[first]]))
+    if level <= 0:
+        raise DatasetError("the training lives have no length; give remaining_life.early_life_h")
+    return level
+
+
+def balanced_weights(name: NDArray[Any]) -> FloatArray:
+    """(record,) weights of mean 1 by which every life counts the same, from (record,) names of lives."""
+    _, place, counts = np.unique(name, return_inverse=True, return_counts=True)
+    weight = 1.0 / counts[place]
+    return np.asarray(weight / weight.mean())

@@ -1,0 +1,269 @@
+"""Which stretches of which records belong to a subset, and the windows cut from them, always after the split."""
+
+from __future__ import annotations
+
+import difflib
+from collections.abc import Callable, Mapping, Sequence
+from dataclasses import dataclass, field, replace
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from gensig.errors import ConfigError, DatasetError
+
+if TYPE_CHECKING:
+    from gensig.dataset.reader import Dataset
+
+SUBSETS = ("train", "validation", "test")
+NORMALISATIONS = ("rms", "none")
+CROSS_SENSOR = "cross_sensor"  # the units of by_unit, tested on other channels
+IntArray = NDArray[np.integer]
+FloatArray = NDArray[np.floating]
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class Task:
+    """A data set as one classification task: which classes and channels, and how records are cut.
+
+    Attributes
+    ----------
+    dataset : Dataset
+    class_names : order of the labels; records of other classes are left out
+    channel_names : in the order of the network's input
+    window_samples, stride_samples : length of a window and step from one to the next, in samples
+    normalise : ``"rms"`` divides each channel of each window by its RMS, ``"none"`` keeps m/s^2
+    one_class : whether one class will do, for what is no classification
+    cross_channels : channels that `CROSS_SENSOR` trains and tests on, or in one line why there are none
+    """
+
+    dataset: Dataset
+    class_names: tuple[str, ...]
+    channel_names: tuple[str, ...]
+    window_samples: int
+    stride_samples: int
+    normalise: str
+    one_class: bool = False
+    cross_channels: tuple[tuple[str, ...], tuple[str, ...]] | str = "no channels to test on are named"
+
+    def __post_init__(self) -> None:
+        check_names("class", self.class_names, self.dataset.class_names)
+        check_names("channel", self.channel_names, self.dataset.channel_names)
+        check_names("normalisation", (self.normalise,), NORMALISATIONS)
+        if self.window_samples < 1 or self.stride_samples < 1:
+            raise ConfigError("window_samples and stride_samples must be at least 1")
+        if len(self.class_names) < 2 and not self.one_class:
+            raise ConfigError(f"one class only ({', '.join(self.class_names)}): nothing to tell apart")
+
+    @property
+    def channels(self) -> list[int]:
+        """Index of each channel in the data set."""
+        available = list(self.dataset.channel_names)
+        return [available.index(name) for name in self.channel_names]
+
+    def part(self, protocol: str, subset: str) -> Task:
+        """The task as one subset of a protocol sees it: with channels of its own in `CROSS_SENSOR`.
+
+        Raises
+        ------
+        ConfigError    for `CROSS_SENSOR` of a task that has no channels to test on
+        """
+        if protocol != CROSS_SENSOR:
+            return self
+        if isinstance(self.cross_channels, str):
+            raise ConfigError(f"protocol {protocol}: {self.cross_channels}")
+        trained, tested = self.cross_channels
+        return replace(self, channel_names=tested if subset == "test" else trained)
+
+    def labels(self) -> IntArray:
+        """(record,) index into `class_names`; -1 for another class and for a record that failed."""
+        order = {name: index for index, name in enumerate(self.class_names)}
+        names = [self.dataset.class_names[int(label)] for label in self.dataset.column("label")]
+        labels = np.array([order.get(name, -1) for name in names], dtype=np.int64)
+        return np.where(np.asarray(self.dataset.usable, dtype=bool), labels, -1)
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class Segments:
+    """Stretches of records: (segment,) record index, first sample, sample after the last."""
+
+    record: IntArray
+    start: IntArray
+    stop: IntArray
+
+
+def task_of(
+    dataset: Dataset,
+    *,
+    window_samples: int,
+    stride_samples: int,
+    normalise: str,
+    classes: Sequence[str] | None = None,
+    channels: Sequence[str] | None = None,
+    one_class: bool = False,
+) -> Task:
+    """Task over the named classes and channels, all of the data set's where None."""
+    return Task(
+        dataset=dataset,
+        class_names=tuple(dataset.class_names if classes is None else classes),
+        channel_names=tuple(dataset.channel_names if channels is None else channels),
+        window_samples=window_samples,
+        stride_samples=stride_samples,
+        normalise=normalise,
+        one_class=one_class,
+    )
+
+
+def subset_segments(task: Task, protocol: str, subset: str) -> Segments:
+    """Stretches of one subset of a split, records of other classes and failed ones left out.
+
+    Raises
+    ------
+    ConfigError    for a protocol or subset that does not exist, or a subset without records
+    """
+    stored = "by_unit" if protocol == CROSS_SENSOR else protocol
+    check_names("protocol", (stored,), task.dataset.protocols)
+    check_names("subset", (subset,), SUBSETS)
+    labels, length = task.labels(), n_samples(task.dataset)
+    rows = [
+        (record, int(np.ceil(start * length - 1e-6)), int(np.floor(stop * length + 1e-6)))
+        for record, start, stop in task.dataset.split(stored).get(subset, [])
+        if labels[record] >= 0
+    ]
+    if not rows:
+        raise ConfigError(
+            f"protocol {protocol}: its {subset} part is empty; make more records or leave the protocol out"
+        )
+    record, start, stop = np.array(rows, dtype=np.int64).T
+    return Segments(record=record, start=start, stop=stop)
+
+
+def all_segments(task: Task) -> Segments:
+    """Every whole record of the task's classes that did not fail."""
+    record = np.flatnonzero(task.labels() >= 0)
+    if record.size == 0:
+        raise DatasetError(f"{task.dataset.folder}: no usable record of {', '.join(task.class_names)}")
+    length = n_samples(task.dataset)
+    return Segments(record=record, start=np.zeros_like(record), stop=np.full_like(record, length))
+
+
+def plan_windows(segments: Segments, window_samples: int, stride_samples: int) -> tuple[IntArray, IntArray]:
+    """Windows that lie whole inside their segment.
+
+    Returns
+    -------
+    segment : (window,) index of the segment
+    start : (window,) first sample, counted in the record
+
+    Raises
+    ------
+    ConfigError    if no segment is as long as a window
+    """
+    lengths = segments.stop - segments.start
+    counts = np.maximum((lengths - window_samples) // stride_samples + 1, 0)
+    if counts.sum() == 0:
+        raise ConfigError(
+            f"window_samples={window_samples} is too long: the longest stretch holds {lengths.max()} samples"
+        )
+    segment = np.repeat(np.arange(counts.size), counts)
+    step = np.concatenate([np.arange(count) for count in counts])
+    return segment, segments.start[segment] + step * stride_samples
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class WindowSet:
+    """One subset in memory: its stretches of signal and the windows planned on them.
+
+    Attributes
+    ----------
+    signals : one (channel, sample) float32 array in m/s^2 per segment
+    segment, start : (window,) segment of each window, and its first sample in that segment
+    label, record : (window,)
+    window_samples, normalise : as in `Task`
+    targets : what is known beside the label, one value a window; see `diagnose.data.targets`
+    """
+
+    signals: tuple[NDArray[np.float32], ...]
+    segment: IntArray
+    start: IntArray
+    label: IntArray
+    record: IntArray
+    window_samples: int
+    normalise: str
+    targets: Mapping[str, NDArray[Any]] = field(default_factory=dict)
+
+    def __len__(self) -> int:
+        return int(self.segment.size)
+
+    def cut(self, windows: IntArray, rng: np.random.Generator | None = None) -> NDArray[np.float32]:
+        """Cut windows, at their planned start or, with `rng`, anywhere in their segment.
+
+        Returns
+        -------
+        (window, channel, sample) float32, normalised
+        """
+        chosen = np.empty((len(windows), self.signals[0].shape[0], self.window_samples), dtype=np.float32)
+        for row, window in enumerate(windows):
+            signal = self.signals[self.segment[window]]
+            last = signal.shape[-1] - self.window_samples
+            start = int(self.start[window]) if rng is None else int(rng.integers(last + 1))
+            chosen[row] = signal[:, start : start + self.window_samples]
+        return normalised(chosen, self.normalise)
+
+
+Read = Callable[["Task", int, int, int], NDArray[np.float32]]
+
+
+def load_windows(task: Task, segments: Segments, *, read: Read | None = None) -> WindowSet:
+    """Read the stretches into memory (4 bytes a sample), by `read_signal` or ``read``, and plan their windows.
+
+    Raises
+    ------
+    DatasetError    for a signal that is not finite
+    """
+    segment, start = plan_windows(segments, task.window_samples, task.stride_samples)
+    used, segment = np.unique(segment, return_inverse=True)
+    rows = [(int(segments.record[i]), int(segments.start[i]), int(segments.stop[i])) for i in used]
+    record = segments.record[used][segment]
+    return WindowSet(
+        signals=tuple((read or read_signal)(task, *row) for row in rows),
+        segment=segment,
+        start=start - segments.start[used][segment],
+        label=task.labels()[record],
+        record=record,
+        window_samples=task.window_samples,
+        normalise=task.normalise,
+    )
+
+
+def read_signal(task: Task, record: int, start: int, stop: int, *, name: str = "acceleration") -> NDArray[np.float32]:
+    """(channel, sample) m/s^2 of the task's channels; refuses values that are not finite."""
+    signal = np.asarray(task.dataset.signals(record, start, stop, task.channels, name=name), dtype=np.float32)
+    if not np.isfinite(signal).all():
+        which = task.dataset.column("record_id")[record]
+        raise DatasetError(f"record {which} of {task.dataset.folder}: its signal holds values that are not finite")
+    return signal
+
+
+def normalised(windows: NDArray[np.float32], how: str) -> NDArray[np.float32]:
+    """Windows (..., channel, sample) less their mean and, for ``"rms"``, divided by their RMS channel by channel."""
+    centered = windows - windows.mean(axis=-1, keepdims=True)
+    if how == "none":
+        return centered
+    level = np.sqrt(np.einsum("...s,...s->...", centered, centered) / centered.shape[-1])[..., None]
+    centered *= np.divide(1, level, out=np.zeros_like(level), where=level > 0)
+    return centered
+
+
+def n_samples(dataset: Dataset) -> int:
+    """Samples a record, the same for all."""
+    return int(dataset.n_samples)
+
+
+def check_names(kind: str, wanted: Sequence[Any], available: Sequence[str]) -> None:
+    """Refuse a name that does not exist, with the nearest ones."""
+    for name in wanted:
+        if name not in available:
+            close = difflib.get_close_matches(str(name), list(available), n=2)
+            hint = f"did you mean {' or '.join(close)}?" if close else f"there is {', '.join(available)}"
+            raise ConfigError(f"no {kind} '{name}'; {hint}")

@@ -1,0 +1,83 @@
+"""Spectra of windows, and a network that sees nothing else."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Sequence
+
+import torch
+from torch import nn
+
+from diagnose.networks.network import Network
+from gensig.errors import ConfigError
+
+
+def log_spectrum(windows: torch.Tensor, floor: float) -> torch.Tensor:
+    """Logarithm of the magnitude spectrum, tapered by a Hann window.
+
+    Parameters
+    ----------
+    windows : (..., sample), of about unit RMS
+    floor : added to the magnitude, whose root mean square is 1 for white noise of unit RMS; bins below it look alike
+
+    Returns
+    -------
+    (..., bin) from 0 to half the sampling rate, natural logarithm
+    """
+    n = windows.shape[-1]
+    taper = torch.hann_window(n, dtype=windows.dtype, device=windows.device)
+    magnitude = torch.fft.rfft(windows * taper).abs() / math.sqrt(3 * n / 8)  # 3/8: mean square of the taper
+    return torch.log(magnitude + floor)
+
+
+class SpectrumCnn(Network):
+    """Small convolutional network on the log-magnitude spectrum of the window: blind to phase and to where in time.
+
+    The spectrum has the mean over its bins taken off, channel by channel, so that gain does not tell. The last map is
+    pooled to a fixed number of bands, mean and maximum of each: unlike time, frequency is not interchangeable.
+
+    Parameters
+    ----------
+    n_channels, n_classes : of the data
+    input_scale : (channel,) what the input is divided by; stored with the weights
+    floor : see `log_spectrum`
+    widths, kernels, strides : channels after each block, its kernel in its input's bins, its stride
+    n_bands : equal parts of the frequency axis that the class scores tell apart
+    dropout : share of pooled features dropped in training
+    heads : see `diagnose.settings.HEADS`
+    """
+
+    def __init__(
+        self,
+        *,
+        n_channels: int,
+        n_classes: int,
+        input_scale: Sequence[float],
+        floor: float,
+        widths: Sequence[int],
+        kernels: Sequence[int],
+        strides: Sequence[int],
+        n_bands: int,
+        dropout: float,
+        heads: Sequence[str] = (),
+    ) -> None:
+        super().__init__(input_scale)
+        if not len(widths) == len(kernels) == len(strides) > 0:
+            raise ConfigError("model: widths, kernels and strides must be lists of the same length, one entry a block")
+        if not floor > 0:
+            raise ConfigError(f"model: floor must be greater than 0, not {floor!r}")
+        self.floor = float(floor)
+        blocks: list[nn.Module] = []
+        for n_in, n_out, kernel, stride in zip((n_channels, *widths), widths, kernels, strides, strict=False):
+            convolution = nn.Conv1d(n_in, n_out, kernel, stride=stride, padding=kernel // 2, bias=False)
+            blocks += [convolution, nn.BatchNorm1d(n_out), nn.ReLU()]
+        self.blocks = nn.Sequential(*blocks)
+        self.mean, self.maximum = nn.AdaptiveAvgPool1d(n_bands), nn.AdaptiveMaxPool1d(n_bands)
+        self.head = nn.Sequential(nn.Flatten(), nn.Dropout(dropout), nn.Linear(2 * widths[-1] * n_bands, n_classes))
+        self.add_heads(heads, 2 * widths[-1] * n_bands, n_classes)
+
+    def look(self, windows: torch.Tensor) -> tuple[torch.Tensor, None]:
+        """Mean and maximum of every band of the last block."""
+        spectrum = log_spectrum(windows, self.floor)
+        maps = self.blocks(spectrum - spectrum.mean(dim=-1, keepdim=True))
+        return torch.cat([self.mean(maps), self.maximum(maps)], dim=1).flatten(start_dim=1), None

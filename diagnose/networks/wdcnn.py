@@ -1,0 +1,71 @@
+"""WDCNN, the network that most papers on raw vibration compare with."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+
+import torch
+from torch import nn
+
+from diagnose.networks.network import Network
+
+FIRST_KERNEL, FIRST_STRIDE, FIRST_PADDING = 64, 16, 24
+
+
+class Wdcnn(Network):
+    """Deep convolutional network with a wide first kernel, as published; several channels enter side by side.
+
+    A first convolution of 64 samples with stride 16, then convolutions of 3 samples, the last one without padding. Each
+    is followed by batch normalisation, ReLU and a maximum over 2; a hidden layer and the class scores follow. The
+    weights start as torch starts them.
+
+    For one channel and the published 2048 samples, layers and sizes are those of the paper. Its hidden layer sees the
+    3 positions that such a window leaves. Other windows leave more or fewer: their last map is brought to the same
+    number of positions by the maximum over equal parts. This is ours, and does nothing at 2048 samples.
+
+    Parameters
+    ----------
+    n_channels, n_classes : of the data
+    input_scale : (channel,) what the input is divided by; stored with the weights
+    widths : channels after each convolution, the first one included
+    n_positions : of the last map that the hidden layer sees
+    n_hidden : units of the hidden layer
+    heads : see `diagnose.settings.HEADS`
+
+    Source: Zhang, Peng, Li, Chen & Zhang (2017), "A new deep learning model for fault diagnosis with good anti-noise
+    and domain adaptation ability on raw vibration signals", Sensors 17 (2), 425, table 2.
+    """
+
+    def __init__(
+        self,
+        *,
+        n_channels: int,
+        n_classes: int,
+        input_scale: Sequence[float],
+        widths: Sequence[int],
+        n_positions: int,
+        n_hidden: int,
+        heads: Sequence[str] = (),
+    ) -> None:
+        super().__init__(input_scale)
+        layers: list[nn.Module] = []
+        for index, (n_in, n_out) in enumerate(zip((n_channels, *widths), widths, strict=False)):
+            if index == 0:
+                convolution = nn.Conv1d(n_in, n_out, FIRST_KERNEL, stride=FIRST_STRIDE, padding=FIRST_PADDING)
+            else:
+                convolution = nn.Conv1d(n_in, n_out, 3, padding=0 if index == len(widths) - 1 else 1)
+            layers += [convolution, nn.BatchNorm1d(n_out), nn.ReLU(), nn.MaxPool1d(2)]
+        self.blocks = nn.Sequential(*layers)
+        self.hidden = nn.Sequential(
+            nn.AdaptiveMaxPool1d(n_positions),
+            nn.Flatten(),
+            nn.Linear(n_positions * widths[-1], n_hidden),
+            nn.BatchNorm1d(n_hidden),
+            nn.ReLU(),
+        )
+        self.head = nn.Linear(n_hidden, n_classes)
+        self.add_heads(heads, n_hidden, n_classes)
+
+    def look(self, windows: torch.Tensor) -> tuple[torch.Tensor, None]:
+        """Units of the hidden layer."""
+        return self.hidden(self.blocks(windows)), None

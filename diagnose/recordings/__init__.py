@@ -1,0 +1,1 @@
+"""Trained networks on recordings and data sets: predict, evaluate, export."""

@@ -1,0 +1,314 @@
+"""The independent pieces of a study, run on every core: same results whatever their number and order.
+
+Each piece runs with one thread, in a spawned process or, when there is one core, in this one.
+"""
+
+from __future__ import annotations
+
+import multiprocessing
+from collections.abc import Callable, Iterator, Mapping, Sequence
+from concurrent.futures import ProcessPoolExecutor, as_completed
+from concurrent.futures.process import BrokenProcessPool
+from contextlib import contextmanager
+from dataclasses import dataclass, replace
+from typing import Any
+
+import numpy as np
+import torch
+
+from diagnose.baselines.classic import Prediction as BaselinePrediction
+from diagnose.baselines.classic import indicator_model, nearest_spectrum, ridge_model, rms_threshold
+from diagnose.baselines.features import Cache, FeatureTable, feature_table
+from diagnose.baselines.oracle import NETWORK as ORACLE_NETWORK
+from diagnose.baselines.oracle import Cache as OracleCache
+from diagnose.baselines.oracle import fit_oracle_indicators, oracle_windows
+from diagnose.baselines.probe import fit_probe
+from diagnose.baselines.reference import Levels, reference_table
+from diagnose.baselines.window_features import rocket_tables, spectrum_table
+from diagnose.data.protocols import HEALTHY_ONLY, OPEN_PROTOCOLS
+from diagnose.data.turns import load_inputs, wants_turns
+from diagnose.data.windows import SUBSETS, Task, WindowSet, subset_segments
+from diagnose.networks.adaptation import healthy_statistics
+from diagnose.networks.domain import Domain, fit_domain
+from diagnose.scoring.metrics import over_records
+from diagnose.scoring.predictions import Prediction, Rows
+from diagnose.settings import TrainSettings
+from diagnose.studies.novelty import NoveltyRun, fitted_runs, trained_runs
+from diagnose.training.heads import predict_heads
+from diagnose.training.sham import sham_method, sham_task
+from diagnose.training.tensorboard import epoch_log
+from diagnose.training.train import (
+    input_scale,
+    predict_windows,
+    train_network,
+    with_shuffled_labels,
+)
+from gensig.errors import GensigError
+
+# Controls beside the label shuffle, and the network that sees the level.
+PROBE, ORACLE, SHAM, LEVEL_KEPT = "probe", "oracle", "sham", "level_kept"
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class Job:
+    """One training (with or without shuffled labels), or with seed None the baselines of all the protocols.
+
+    One of `OPEN_PROTOCOLS` is a job of its own: with seed None the scores that are fitted, else those of a network.
+    ``control`` is "" or one of the controls, which then takes the place of the training or of the baselines.
+    """
+
+    protocols: tuple[str, ...]
+    seed: int | None
+    shuffled: bool = False
+    control: str = ""
+
+
+Outcome = Prediction | NoveltyRun
+
+
+def run_jobs(
+    task: Task,
+    settings: TrainSettings,
+    jobs: Sequence[Job],
+    *,
+    n_workers: int,
+    on_done: Callable[[list[Any]], None],
+    run: Callable[[Task, TrainSettings, Job], list[Any]] | None = None,
+) -> list[Any]:
+    """Run all jobs, each by `run_job` or ``run``, and collect what they give in the order of the jobs.
+
+    Raises
+    ------
+    GensigError    as raised by a job, or if a worker was killed
+    """
+    run = run or run_job
+    if n_workers == 1 or len(jobs) == 1:
+        results = []
+        with _one_thread():
+            for job in jobs:
+                results.append(run(task, settings, job))
+                on_done(results[-1])
+        _loaded.clear()
+        _domains.clear()
+        _shams.clear()
+        return [prediction for result in results for prediction in result]
+    context = multiprocessing.get_context("spawn")
+    executor = ProcessPoolExecutor(min(n_workers, len(jobs)), context, _start_worker, (task, settings, run))
+    try:
+        futures = [executor.submit(_run_in_worker, job) for job in jobs]
+        for future in as_completed(futures):
+            on_done(future.result())
+        return [prediction for future in futures for prediction in future.result()]
+    except BrokenProcessPool:
+        raise GensigError(
+            "a worker process was killed (out of memory?); set n_threads=1 or use fewer records"
+        ) from None
+    finally:
+        executor.shutdown(wait=True, cancel_futures=True)
+
+
+def run_job(task: Task, settings: TrainSettings, job: Job) -> list[Outcome]:
+    """Predictions, or scores of novelty, on the test part of each of the job's protocols."""
+    if job.protocols[0] in OPEN_PROTOCOLS:
+        name = job.protocols[0]
+        if job.seed is None:
+            return [*fitted_runs(task, settings, name, _windows(task, name))]
+        heard = None if name == HEALTHY_ONLY else settings.model  # the autoencoder hears time
+        return [*trained_runs(settings, name, job.seed, _windows(task, name, "", heard))]
+    if job.control == SHAM:
+        task = _sham(task, settings)
+    if job.seed is not None:
+        return [_run_training(task, settings, name, job.seed, job.shuffled, job.control) for name in job.protocols]
+    cache: Cache = {}
+    if job.control == PROBE:
+        return [fit_probe(task, name, results=results) for name in job.protocols for results in (False, True)]
+    if job.control == ORACLE:
+        twins: OracleCache = {}
+        return [fit_oracle_indicators(task, name, twins) for name in job.protocols]
+    found = [prediction for name in job.protocols for prediction in _run_baselines(task, settings, name, cache)]
+    return [replace(one, method=sham_method(one.method, "")) for one in found] if job.control == SHAM else [*found]
+
+
+def _run_training(
+    task: Task, settings: TrainSettings, protocol: str, seed: int, shuffled: bool, control: str
+) -> Prediction:
+    n_classes = len(task.class_names)
+    train, validation, test = (_windows(task, protocol, control, settings.model)[subset] for subset in SUBSETS)
+    if shuffled:
+        rng = np.random.default_rng([seed, 2])
+        train = with_shuffled_labels(train, n_classes, rng)
+        validation = with_shuffled_labels(validation, n_classes, rng)
+    run = "-".join(word for word in (protocol, "label_shuffle" if shuffled else control, f"seed{seed}") if word)
+    with epoch_log(settings.out, run, wanted=settings.tensorboard) as on_epoch:
+        training = train_network(
+            train,
+            validation,
+            model_config=settings.model,
+            n_classes=n_classes,
+            settings=settings,
+            seed=seed,
+            on_epoch=on_epoch,
+        )
+    by_window = predict_windows(training.model, test)
+    record, log_probability = over_records(by_window, test.record)
+    held_out, held_out_scores = over_records(predict_windows(training.model, validation), validation.record)
+    is_model = not shuffled and not control
+    domain = _domain(protocol, train, validation) if is_model else None
+    network = str(settings.model.get("name", "network"))
+    names = {ORACLE: ORACLE_NETWORK, SHAM: sham_method(network, network), LEVEL_KEPT: LEVEL_KEPT}
+    last = log_probability
+    if training.last_model is not None and not shuffled:
+        _, last = over_records(predict_windows(training.last_model, test), test.record)
+    return Prediction(
+        protocol=protocol,
+        method="label_shuffle" if shuffled else names.get(control, network),
+        seed=seed,
+        record=record,
+        log_probability=log_probability,
+        detail=f"best epoch {training.best_epoch} of {len(training.validation_loss)}",
+        validation=Rows(record=held_out, log_probability=held_out_scores),
+        windows=Rows(record=test.record, log_probability=by_window),
+        weights={key: value.numpy() for key, value in training.model.state_dict().items()} if is_model else None,
+        domain=domain,
+        healthy=None if shuffled else healthy_statistics(training.model, train, task.class_names),
+        best_epoch=training.best_epoch,
+        validation_loss=training.validation_loss,
+        temperature=training.temperature,
+        last_predicted=last.argmax(axis=1),
+        heads={} if shuffled else predict_heads(training.model, test),
+    )
+
+
+def _run_baselines(task: Task, settings: TrainSettings, protocol: str, cache: Cache) -> list[Prediction]:
+    predictions = []
+    for method in settings.baselines:
+        detail, record, log_probability = _fit_baseline(task, settings, protocol, method, cache)
+        tested = np.isin(record, subset_segments(task, protocol, "test").record)
+        held_out = Rows(record=record[~tested], log_probability=log_probability[~tested])
+        predictions.append(
+            Prediction(
+                protocol=protocol,
+                method=method,
+                seed=0,
+                record=record[tested],
+                log_probability=log_probability[tested],
+                detail=detail,
+                validation=held_out if held_out.record.size else None,
+            )
+        )
+    return predictions
+
+
+def _fit_baseline(task: Task, settings: TrainSettings, protocol: str, method: str, cache: Cache) -> BaselinePrediction:
+    """Fit one of `diagnose.settings.BASELINES` and judge it on the test and the validation records."""
+    n_classes = len(task.class_names)
+    if method in ("nearest_spectrum", "minirocket"):
+        sets = [_windows(task, protocol)[subset] for subset in SUBSETS]
+        if method == "minirocket":
+            train, validation, test = rocket_tables(*sets, n_features=settings.minirocket_features)
+            return ridge_model(train, validation, _with_validation(validation, test), n_classes=n_classes)
+        scale = input_scale(sets[0])
+        train, validation, test = (spectrum_table(windows, scale) for windows in sets)
+        return nearest_spectrum(train, _with_validation(validation, test), n_classes=n_classes)
+    if method == "reference":
+        levels: Levels = {}
+        train, validation, test = (
+            reference_table(task.part(protocol, subset), subset_segments(task, protocol, subset), levels)
+            for subset in SUBSETS
+        )
+        judged = _with_validation(validation, test)
+        return indicator_model(train, validation, judged, n_classes=n_classes, with_level=True)
+    train, validation, test = (
+        feature_table(
+            task.part(protocol, subset),
+            subset_segments(task, protocol, subset),
+            features=settings.features,
+            cache=cache,
+        )
+        for subset in SUBSETS
+    )
+    judged = _with_validation(validation, test)
+    if method == "rms_threshold":
+        return rms_threshold(train, judged, n_classes=n_classes)
+    return indicator_model(train, validation, judged, n_classes=n_classes, with_level=method == "indicators")
+
+
+def _with_validation(validation: FeatureTable, test: FeatureTable) -> FeatureTable:
+    """Rows of both parts; the test rows alone where a record is in both, as in a leaky split."""
+    if np.isin(validation.record, test.record).any():
+        return test
+    return FeatureTable(
+        values=np.concatenate([validation.values, test.values]),
+        names=test.names,
+        label=np.concatenate([validation.label, test.label]),
+        record=np.concatenate([validation.record, test.record]),
+    )
+
+
+# Windows of the protocol a process works on; jobs come protocol by protocol.
+_loaded: dict[tuple[str, str, bool, bool], dict[str, WindowSet]] = {}
+_domains: dict[str, Domain] = {}
+_shams: dict[str, Task] = {}
+_work: dict[str, Any] = {}
+
+
+def _windows(
+    task: Task, protocol: str, control: str = "", model_config: Mapping[str, Any] | None = None
+) -> dict[str, WindowSet]:
+    """Windows of time, or what a network of this configuration reads."""
+    config = model_config or {}
+    key = (str(task.dataset.folder), protocol, control == ORACLE, wants_turns(config))
+    if key not in _loaded:
+        _loaded.clear()
+        load = oracle_windows if control == ORACLE else load_inputs
+        _loaded[key] = {
+            name: load(
+                task.part(protocol, name), subset_segments(task, protocol, name), config, training=name == "train"
+            )
+            for name in SUBSETS
+        }
+    if control == LEVEL_KEPT:
+        return {name: replace(windows, normalise="none") for name, windows in _loaded[key].items()}
+    return _loaded[key]
+
+
+def _sham(task: Task, settings: TrainSettings) -> Task:
+    """The task on the sham data set, opened once a process."""
+    folder = str(settings.sham)
+    if folder not in _shams:
+        _shams[folder] = sham_task(task, folder)
+    return _shams[folder]
+
+
+def _domain(protocol: str, train: WindowSet, validation: WindowSet) -> Domain:
+    """The same for every seed."""
+    if protocol not in _domains:
+        _domains.clear()
+        _domains[protocol] = fit_domain(train, validation)
+    return _domains[protocol]
+
+
+def _start_worker(task: Task, settings: TrainSettings, run: Callable[..., list[Any]]) -> None:
+    from threadpoolctl import threadpool_limits
+
+    torch.set_num_threads(1)
+    threadpool_limits(1)
+    _work.update(task=task, settings=settings, run=run)
+
+
+def _run_in_worker(job: Job) -> list[Any]:
+    return [*_work["run"](_work["task"], _work["settings"], job)]
+
+
+@contextmanager
+def _one_thread() -> Iterator[None]:
+    """One thread for torch and the BLAS, as before afterwards."""
+    from threadpoolctl import threadpool_limits
+
+    before = torch.get_num_threads()
+    torch.set_num_threads(1)
+    try:
+        with threadpool_limits(1):
+            yield
+    finally:
+        torch.set_num_threads(before)

@@ -1,0 +1,1 @@
+"""Training of networks, and trained networks on disk."""

@@ -1,0 +1,160 @@
+"""A small convolutional autoencoder of windows: what it cannot rebuild is unlike what it was trained on."""
+
+from __future__ import annotations
+
+import copy
+from collections.abc import Sequence
+from dataclasses import dataclass
+
+import numpy as np
+import torch
+from numpy.typing import NDArray
+from torch import nn
+
+from diagnose.data.windows import WindowSet
+from diagnose.settings import TrainSettings
+from diagnose.training.train import device_of, input_scale
+from gensig.errors import ConfigError, SimulationError
+
+FloatArray = NDArray[np.floating]
+
+STRIDES = (
+    16,
+    4,
+    2,
+)  # assumed: the first kernel is four strides long, as that of configs/model/cnn.yaml, the others two
+WIDTHS = (16, 32, 8)  # assumed: the code is 8 numbers every 128 samples
+STRETCH = 64  # samples, 1.25 ms at 51.2 kHz: about one mesh period at 800 Hz
+MOST_WINDOWS = 1000  # drawn an epoch
+
+
+class WindowAutoencoder(nn.Module):
+    """Three strided convolutions, and three transposed ones that mirror them; batch normalisation and ReLU between.
+
+    Parameters
+    ----------
+    scale : (channel,) what the input is divided by
+
+    Source: Masci, Meier, Ciresan & Schmidhuber (2011), "Stacked convolutional auto-encoders for hierarchical feature
+    extraction", ICANN, with strides in place of pooling, trained as one.
+    """
+
+    scale: torch.Tensor
+
+    def __init__(self, scale: Sequence[float]) -> None:
+        super().__init__()
+        self.register_buffer("scale", torch.tensor(list(scale), dtype=torch.float32)[:, None])
+        first, second, third = STRIDES
+        wide, narrow, code = WIDTHS
+        n_channels = len(scale)
+        self.encoder = nn.Sequential(
+            nn.Conv1d(n_channels, wide, 4 * first, first, 3 * first // 2),
+            nn.BatchNorm1d(wide),
+            nn.ReLU(),
+            nn.Conv1d(wide, narrow, 2 * second, second, second // 2),
+            nn.BatchNorm1d(narrow),
+            nn.ReLU(),
+            nn.Conv1d(narrow, code, 2 * third, third, third // 2),
+        )
+        self.decoder = nn.Sequential(
+            nn.ConvTranspose1d(code, narrow, 2 * third, third, third // 2),
+            nn.BatchNorm1d(narrow),
+            nn.ReLU(),
+            nn.ConvTranspose1d(narrow, wide, 2 * second, second, second // 2),
+            nn.BatchNorm1d(wide),
+            nn.ReLU(),
+            nn.ConvTranspose1d(wide, n_channels, 4 * first, first, 3 * first // 2),
+        )
+
+    def forward(self, windows: torch.Tensor) -> torch.Tensor:
+        """Squared error (window, sample) of the rebuilt windows (window, channel, sample), mean over the channels.
+
+        Samples past the last whole step of the code are left out.
+        """
+        step = int(np.prod(STRIDES))
+        scaled = windows[..., : windows.shape[-1] // step * step] / self.scale
+        return (self.decoder(self.encoder(scaled)) - scaled).square().mean(dim=1)
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class Autoencoder:
+    """A trained autoencoder in evaluation mode; `best_epoch` of validation units counts from 1."""
+
+    model: WindowAutoencoder
+    best_epoch: int
+
+
+def check_window_for_autoencoder(window_samples: int) -> None:
+    """Refuse a window in which the code has no whole step.
+
+    Raises
+    ------
+    ConfigError    with the least number of samples
+    """
+    least = int(np.prod(STRIDES))
+    if window_samples < least:
+        raise ConfigError(f"window_samples={window_samples} is too short for the autoencoder; give at least {least}")
+
+
+def fit_autoencoder(train: WindowSet, validation: WindowSet, *, settings: TrainSettings, seed: int) -> Autoencoder:
+    """Train on windows of known kind; the weights kept are those of the least error on other units of that kind.
+
+    Parameters
+    ----------
+    train, validation : of different units; training windows start anywhere in their stretch, anew each epoch
+    settings : epochs, patience, batch size, learning rate, device
+    seed : decides initial weights, order and window starts; the same seed gives the same bits on the same processor
+
+    Raises
+    ------
+    SimulationError    if the training diverges from its first epoch
+    """
+    device = device_of(settings.device)
+    rng = np.random.default_rng([seed, 3])
+    held_out = torch.from_numpy(validation.cut(np.arange(len(validation))))
+    n_drawn = min(len(train), MOST_WINDOWS)
+    with torch.random.fork_rng(devices=[]):
+        torch.manual_seed(seed)
+        model = WindowAutoencoder(input_scale(train)).to(device)
+        optimizer = torch.optim.Adam(model.parameters(), lr=settings.learning_rate)
+        best, best_weights, best_epoch = np.inf, model.state_dict(), 0
+        for epoch in range(1, settings.epochs + 1):
+            model.train()
+            for batch in np.array_split(rng.permutation(len(train))[:n_drawn], max(n_drawn // settings.batch_size, 1)):
+                optimizer.zero_grad()
+                model(torch.from_numpy(train.cut(batch, rng)).to(device)).mean().backward()
+                optimizer.step()
+            loss = float(_errors(model, held_out).mean())
+            if loss < best:
+                best, best_weights, best_epoch = loss, copy.deepcopy(model.state_dict()), epoch
+            if epoch - best_epoch >= settings.patience:
+                break
+    if best_epoch == 0:
+        raise SimulationError("the autoencoder diverged from its first epoch; reduce learning_rate")
+    model.load_state_dict(best_weights)
+    return Autoencoder(model=model.cpu().eval(), best_epoch=best_epoch)
+
+
+def reconstruction_error(autoencoder: Autoencoder, windows: WindowSet, *, batch_size: int = 64) -> FloatArray:
+    """(window,) largest mean squared error over a stretch of `STRETCH` samples, at the planned starts.
+
+    A fault of one tooth shows for a moment once a turn: the mean over the window drowns it in the noise, which no
+    autoencoder rebuilds. The largest in place of the mean is ours.
+
+    Source of the error as novelty: Japkowicz, Myers & Gluck (1995), "A novelty detection approach to classification",
+    IJCAI.
+    """
+    every = np.arange(len(windows))
+    found = []
+    for block in np.array_split(every, -(-every.size // batch_size)):
+        error = _errors(autoencoder.model, torch.from_numpy(windows.cut(block)))
+        found.append(error.unfold(1, STRETCH, STRETCH // 2).mean(dim=2).amax(dim=1))
+    return torch.cat(found).numpy().astype(float)
+
+
+def _errors(model: WindowAutoencoder, windows: torch.Tensor, *, batch_size: int = 16) -> torch.Tensor:
+    """(window, sample) on the processor, in batches that stay in its cache."""
+    model.eval()
+    device = model.scale.device
+    with torch.inference_mode():
+        return torch.cat([model(block.to(device)).cpu() for block in windows.split(batch_size)])

@@ -1,0 +1,1 @@
+"""The verb new: a gearbox from its data sheet."""

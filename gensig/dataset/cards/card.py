@@ -1,0 +1,190 @@
+"""The data card: README.md and croissant.json of a folder, facts from the files beside caveats that always hold."""
+
+import html
+import re
+from collections.abc import Mapping
+from pathlib import Path
+
+import numpy as np
+import yaml
+
+from gensig.dataset.cards.class_figures import write_class_figures
+from gensig.dataset.cards.croissant import croissant_text
+from gensig.dataset.folder.layout import CARD, CROISSANT, SHARDS
+from gensig.dataset.reader import Dataset, open_dataset
+from gensig.dataset.storage.atomic import write_text
+
+GEOMETRY = (
+    "n_teeth_pinion", "n_teeth_wheel", "normal_module_mm", "pressure_angle_deg", "helix_angle_deg",
+    "face_width_pinion_mm", "face_width_wheel_mm", "center_distance_mm", "transverse_contact_ratio", "overlap_ratio",
+    "usable_band_hz",
+)  # fmt: skip
+
+LOAD = """```python
+import gensig
+
+with gensig.open_dataset("PATH/TO/THIS/FOLDER") as data:
+    labels = data.column("label")                    # (record,) index into data.class_names
+    signal = data.signals(0)                         # (channel, sample) float32, m/s^2
+    parts = data.split("by_unit" if "by_unit" in data.protocols else data.protocols[0])
+```
+Without gensig: every shard is plain HDF5, see `docs/format.md` of gensig. Hugging Face `datasets` takes the folder
+as it is, `load_dataset("PATH/TO/THIS/FOLDER")`; its one split, `train`, is all records, and `splits/` says which are
+for training. `croissant.json` describes the files for machines.
+"""
+
+# Limits that the Hugging Face hub knows; above the last one a card says more.
+SIZES = ((10**3, "n<1K"), (10**4, "1K<n<10K"), (10**5, "10K<n<100K"), (10**6, "100K<n<1M"), (10**7, "1M<n<10M"))
+TAGS = ("vibration", "gear", "fault-diagnosis", "condition-monitoring", "time-series", "synthetic", "simulation")
+
+LICENCE = """Data licence: CC BY 4.0 (https://creativecommons.org/licenses/by/4.0/): free to use, name the source.
+"""
+
+CAVEATS = """- The records are simulated. A model trained on them alone has proved nothing about measured signals.
+- `random_window_leaky` puts windows of one record on every side on purpose. Never report it
+  without a clean split beside it.
+- The speed and the signal power of a record are results: a fault may change them. Report results with and
+  without RMS normalization.
+- Columns of role label, fault or result (`docs/format.md`) and fault parameters in `params/` must not be
+  inputs of a classifier.
+- Records with status 'failed' are kept with their parameters; leave them out with `data.usable`.
+- Only the band given as usable is meant to be used; above it the anti-alias filter acts.
+"""
+
+
+def write_card(out: Path, *, figures: bool = True) -> None:
+    """Write `README.md`, its figures and `croissant.json` of a data-set folder whose shards are all done."""
+    with open_dataset(out, allow_incomplete=True) as data:
+        pictures = write_class_figures(data) if figures else {}
+        write_text(out / CROISSANT, croissant_text(data, CAVEATS))
+        write_text(out / CARD, card_text(data, pictures))
+
+
+def card_text(data: Dataset, pictures: Mapping[str, str] | None = None) -> str:
+    """The card as Markdown after Hugging Face front matter; every text that comes from a file is escaped.
+
+    Parameters
+    ----------
+    pictures : path in the folder by class name
+    """
+    sections = [
+        front_matter(data),
+        f"# {escape(data.folder.resolve().name)}",
+        "Gear vibration, simulated and labelled by gensig " + escape(data.manifest.generator_version) + ".",
+        _table(("fact", "value"), _facts(data)),
+        "## Classes",
+        _table(("class", "records", "severity"), _classes(data)),
+        _gallery(pictures or {}),
+        "## Splits",
+        _table(("protocol", *("train", "validation", "test")), _splits(data)),
+        "## Load it",
+        LOAD,
+        "## Caveats",
+        CAVEATS,
+        "## Licence",
+        LICENCE,
+    ]
+    return "\n\n".join(section.strip() for section in sections if section) + "\n"
+
+
+def _gallery(pictures: Mapping[str, str]) -> str:
+    """A picture a class, with what all of them show."""
+    if not pictures:
+        return ""
+    shown = [f"![{escape(name)}]({path})" for name, path in pictures.items()]
+    return "\n\n".join(["The record of median severity of each class, noise included, on the same axes:", *shown])
+
+
+def front_matter(data: Dataset) -> str:
+    """YAML that the Hugging Face hub and its `load_dataset` read: licence, tags, size, and where the records are."""
+    size = next((name for limit, name in SIZES if data.n_records < limit), "n>10M")
+    content = {
+        "pretty_name": plain(data.folder.resolve().name),
+        "license": "cc-by-4.0",
+        "task_categories": ["tabular-classification"],
+        "tags": [*TAGS, f"gensig-{plain(data.manifest.generator_version)}"],
+        "size_categories": [size],
+        "configs": [{"config_name": "default", "data_files": [{"split": "train", "path": f"{SHARDS}/*.h5"}]}],
+    }
+    return f"---\n{yaml.safe_dump(content, sort_keys=False, allow_unicode=True)}---"
+
+
+def plain(value: object) -> str:
+    """Printable text on one line."""
+    return "".join(c if c.isprintable() else " " for c in str(value))
+
+
+def escape(value: object) -> str:
+    """Text for one Markdown table cell: no HTML, no markup, no line breaks, nothing invisible."""
+    return re.sub(r"([\\`*_\[\]|#~!])", r"\\\1", html.escape(plain(value), quote=False))
+
+
+def _table(header: tuple[str, ...], rows: list[tuple[object, ...]]) -> str:
+    lines = [" | ".join(header), " | ".join("---" for _ in header)]
+    lines += [" | ".join(escape(cell) for cell in row) for row in rows]
+    return "\n".join(f"| {line} |" for line in lines)
+
+
+def _facts(data: Dataset) -> list[tuple[object, ...]]:
+    units = data.attributes.get("channel_units", ["m/s^2"] * len(data.channel_names))
+    channels = ", ".join(f"{name} ({unit})" for name, unit in zip(data.channel_names, units, strict=False))
+    n_failed = int(np.count_nonzero(~data.usable))
+    rows: list[tuple[object, ...]] = [
+        ("records", f"{data.n_records}" + (f", of which {n_failed} failed" if n_failed else "")),
+        ("duration of a record", f"{data.n_samples / data.sampling_rate:g} s ({data.n_samples} samples)"),
+        ("sampling rate", f"{data.sampling_rate:g} Hz"),
+        ("channels", channels),
+    ]
+    rows += [(name, rounded(data.attributes[name])) for name in GEOMETRY if name in data.attributes]
+    rows += [
+        (name, len(np.unique(data.column(column))))
+        for name, column in (("units", "unit_id"), ("specimens", "specimen_id"), ("gearboxes", "gearbox_id"))
+    ]
+    rows += [
+        ("speed of the driving shaft", value_range(data.column("speed_rpm"), "r/min")),
+        (torque_words(data), value_range(data.column("torque_nm"), "N m")),
+    ]
+    if "snr_db" in data.column_names:
+        rows.append(("signal-to-noise ratio", value_range(data.column("snr_db"), "dB")))
+    if data.sample_type == "int16":
+        rows.append(("acceleration in the shards", "int16; times acceleration_scale of record and channel it is m/s^2"))
+    if data.compression != "none":
+        rows.append(("compression", data.compression + " (read with hdf5plugin)" * (data.compression == "blosc2")))
+    rows += [("seed", data.manifest.seed), ("identity", data.manifest.identity)]
+    return rows
+
+
+def _classes(data: Dataset) -> list[tuple[object, ...]]:
+    names, severity = data.column("label_name"), data.column("severity")
+    order = [name for name in data.class_names if (names == name).any()]
+    order += sorted(set(names.tolist()) - set(order))
+    return [(name, int((names == name).sum()), value_range(severity[names == name], "")) for name in order]
+
+
+def _splits(data: Dataset) -> list[tuple[object, ...]]:
+    rows: list[tuple[object, ...]] = []
+    for protocol in data.protocols:
+        parts = data.split(protocol)
+        rows.append(
+            (protocol, *(f"{sum(stop - start for _, start, stop in part):g} records" for part in parts.values()))
+        )
+    return rows
+
+
+def torque_words(data: Dataset) -> str:
+    """Whose torque `torque_nm` is: a drive line's is that of its load, whichever mesh its records follow."""
+    return f"torque of the {plain(data.attributes.get('torque_of', 'driving shaft'))}"
+
+
+def rounded(value: object) -> object:
+    """A number to the fourth decimal, anything else as it is."""
+    return round(value, 4) if isinstance(value, float) else value
+
+
+def value_range(values: np.ndarray, unit: str) -> str:
+    """'1200 to 1800 r/min', over the finite values."""
+    finite = values[np.isfinite(values)]
+    if not finite.size:
+        return "none"
+    low, high = f"{finite.min():.6g}", f"{finite.max():.6g}"
+    return (low if low == high else f"{low} to {high}") + (f" {unit}" if unit else "")

@@ -1,0 +1,144 @@
+"""One small picture a class: a record of it over two turns of the driving shaft, and its spectrum, on common axes."""
+
+from __future__ import annotations
+
+import io
+import re
+from dataclasses import dataclass
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from gensig.dataset.folder.layout import FIGURES
+from gensig.dataset.reader import Dataset
+from gensig.dataset.storage.atomic import cannot_write, write_bytes
+from gensig.signals.spectrum import amplitude_spectrum
+
+BLUE, ORANGE = "#0072B2", "#D55E00"
+FIRST_CHOICE = "pinion_y"  # along the line of centers, next to the faulted gear of most sets
+TURNS = 2.0
+DECADES = 4.0  # of the spectrum's amplitude axis
+N_BINS = 500  # the largest line of each is drawn: more than there are pixels helps nobody
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class ClassExample:
+    """A record that stands for its class.
+
+    Parameters
+    ----------
+    title : str                 class, severity, record, speed, torque
+    time : (sample,)            ms
+    signal : (sample,)          m/s^2 or rad/s^2, as the channel
+    frequency : (bin,)          kHz, upper end of each bin
+    amplitude : (bin,)          largest amplitude in the bin, unit of the signal
+    mesh_frequency : float      kHz
+    """
+
+    title: str
+    time: NDArray[np.floating]
+    signal: NDArray[np.floating]
+    frequency: NDArray[np.floating]
+    amplitude: NDArray[np.floating]
+    mesh_frequency: float
+
+
+def write_class_figures(data: Dataset) -> dict[str, str]:
+    """Write a PNG for each class that has a usable record; path in the folder by class name, {} without matplotlib.
+
+    The same records, with the same version of matplotlib, give the same bytes.
+    """
+    try:
+        import matplotlib
+    except ImportError:
+        return {}
+    channel = FIRST_CHOICE if FIRST_CHOICE in data.channel_names else data.channel_names[0]
+    units = data.attributes.get("channel_units", [])
+    unit = dict(zip(data.channel_names, units, strict=False)).get(channel, "m/s^2").replace("^2", "²")
+    examples = {name: _example(data, index, channel) for name, index in example_records(data).items()}
+    if not examples:
+        return {}
+    folder = data.folder / FIGURES
+    try:
+        folder.mkdir(exist_ok=True)
+    except OSError as error:
+        raise cannot_write(folder, error) from error
+    largest = max(float(np.abs(example.signal).max()) for example in examples.values())
+    highest = max(float(example.amplitude.max()) for example in examples.values())
+    paths = {}
+    with matplotlib.rc_context():
+        matplotlib.rcdefaults()  # nobody's own style decides bytes
+        for name, example in examples.items():
+            slug = re.sub(r"[^a-z0-9_]+", "-", name.lower())[:40]
+            paths[name] = f"{FIGURES}/{data.class_names.index(name)}-{slug}.png"
+            write_bytes(data.folder / paths[name], _png(example, f"{channel}, {unit}", largest or 1.0, highest or 1.0))
+    return paths
+
+
+def example_records(data: Dataset) -> dict[str, int]:
+    """Number of one record a class, by class name: the usable one of median severity."""
+    label, severity, usable = data.column("label_name"), data.column("severity"), data.usable
+    chosen = {}
+    for name in data.class_names:
+        mine = np.flatnonzero((label == name) & usable)
+        if mine.size:
+            chosen[name] = int(mine[np.argsort(severity[mine], kind="stable")[mine.size // 2]])
+    return chosen
+
+
+def _example(data: Dataset, index: int, channel: str) -> ClassExample:
+    values = {name: data.column(name)[index] for name in ("record_id", "label_name", "severity", "speed_rpm")}
+    torque = data.column("torque_nm")[index]
+    signal = data.signals(index, channels=[channel])[0].astype(float)
+    frequency, amplitude = amplitude_spectrum(signal, data.sampling_rate)
+    step = -(-len(amplitude) // N_BINS)
+    starts = np.arange(0, len(amplitude), step)
+    mesh = data.column("mesh_frequency_hz")[index] if "mesh_frequency_hz" in data.column_names else np.nan
+    shown = int(TURNS * 60.0 / values["speed_rpm"] * data.sampling_rate) if values["speed_rpm"] > 0.0 else len(signal)
+    signal = signal[: max(shown, 2)]
+    return ClassExample(
+        title=f"{values['label_name']}, severity {values['severity']:.2f} (record {values['record_id']}, "
+        f"{values['speed_rpm']:.0f} r/min, {torque:.3g} N m)",
+        time=np.arange(len(signal)) / data.sampling_rate * 1e3,
+        signal=signal,
+        frequency=frequency[np.minimum(starts + step, len(frequency)) - 1] / 1e3,
+        amplitude=np.maximum.reduceat(amplitude, starts),
+        mesh_frequency=float(mesh) / 1e3,
+    )
+
+
+def _png(example: ClassExample, ordinate: str, largest: float, highest: float) -> bytes:
+    from matplotlib.backends.backend_agg import FigureCanvasAgg
+    from matplotlib.figure import Figure
+
+    figure = Figure(figsize=(8.6, 2.7), dpi=80)
+    FigureCanvasAgg(figure)
+    left, right = figure.subplots(1, 2)
+    figure.subplots_adjust(left=0.105, right=0.985, top=0.87, bottom=0.185, wspace=0.23)
+    figure.text(0.105, 0.93, example.title, parse_math=False)
+    _waveform(left, example, ordinate, 1.05 * largest)
+    _spectrum(right, example, ordinate, 2.0 * highest)
+    content = io.BytesIO()
+    figure.savefig(content, format="png", metadata={"Software": None})
+    return content.getvalue()
+
+
+def _waveform(axes: Any, example: ClassExample, ordinate: str, limit: float) -> None:
+    axes.plot(example.time, example.signal, color=BLUE, linewidth=0.6)
+    axes.set(xlim=(0.0, example.time[-1]), ylim=(-limit, limit), xlabel="time, ms")
+    axes.set_ylabel(ordinate, parse_math=False)
+
+
+def _spectrum(axes: Any, example: ClassExample, ordinate: str, limit: float) -> None:
+    axes.semilogy(example.frequency, np.maximum(example.amplitude, limit * 10.0**-DECADES), color=BLUE, linewidth=0.7)
+    top = float(example.frequency[-1])
+    if np.isfinite(example.mesh_frequency) and example.mesh_frequency > 0.0:
+        harmonics = np.arange(1, min(60, int(top / example.mesh_frequency)) + 1) * example.mesh_frequency
+        axes.plot(harmonics, np.full(len(harmonics), limit / 1.5), "v", color=ORANGE, markersize=2.5)
+    axes.set(
+        xlim=(0.0, top), ylim=(limit * 10.0**-DECADES, limit), xlabel="frequency, kHz; triangles: harmonics of the mesh"
+    )
+    axes.set_ylabel(f"amplitude of {ordinate.partition(',')[0]}", parse_math=False)
+    axes.yaxis.set_major_formatter("{x:g}")
+    axes.minorticks_off()

@@ -1,0 +1,1 @@
+"""The folder of a data set from its beginning to its verification."""

@@ -1,0 +1,159 @@
+"""The beginning of a data-set folder: its plan, its splits and, last, the manifest; or nothing that anyone mistakes."""
+
+import hashlib
+from collections.abc import Sequence
+from contextlib import suppress
+from pathlib import Path
+from typing import Any
+
+import yaml
+
+from gensig.dataset.folder.environment import environment
+from gensig.dataset.folder.layout import (
+    BEGINNING,
+    CONFIG,
+    OVERRIDES,
+    PLAN,
+    SHARDS,
+    SPLITS,
+    Manifest,
+    ShardEntry,
+    read_manifest,
+    shard_name,
+    write_manifest,
+)
+from gensig.dataset.folder.manifest import deciding, identity_hash, plain_data
+from gensig.dataset.plan import Plan, plan_text
+from gensig.dataset.splitting.protocols import make_splits
+from gensig.dataset.storage.atomic import TEMPORARY_SUFFIX, cannot_write, locked, write_text
+from gensig.errors import DatasetError
+
+
+def create_folder(
+    out: Path,
+    *,
+    config: dict[str, Any],
+    overrides: Sequence[str],
+    plan: Plan,
+    identity: str,
+    seed: int,
+    generator_version: str,
+) -> None:
+    """Make a data-set folder with plan, splits and manifest, ready to take shards.
+
+    The manifest is written last. Until it is there, a note says that the folder is being begun: one whose process was
+    killed meanwhile is known by it, and is begun anew by the next call.
+
+    Parameters
+    ----------
+    out : Path           a folder that does not exist, is empty, or was left by a call that was killed
+    config : dict        resolved configuration, plain values
+    overrides : list     what the user typed
+    plan : Plan          all records; it fixes the shards
+    identity : str       `identity_hash(config, generator_version)`
+    seed : int           root seed, also of the splits
+    generator_version : str
+
+    Raises
+    ------
+    DatasetError    when `out` holds anything else, before anything is touched; when the disk refuses, after which
+                    nothing new is left
+    """
+    out = Path(out)
+    if identity != identity_hash(config, generator_version):
+        raise DatasetError(
+            f"identity {identity[:12]} does not belong to this configuration; use identity_hash(config, ...)"
+        )
+    texts = {
+        CONFIG: yaml.safe_dump(plain_data(config), sort_keys=False, allow_unicode=True),
+        OVERRIDES: yaml.safe_dump([str(item) for item in overrides], allow_unicode=True),
+        PLAN: plan_text(plan),
+        **{f"{SPLITS}/{name}.csv": table.to_csv() for name, table in make_splits(plan, seed).items()},
+    }
+    manifest = Manifest(
+        generator_version=generator_version,
+        identity=identity,
+        seed=seed,
+        n_records=plan.n_records,
+        shards=tuple(ShardEntry(name=shard_name(i), rows=rows) for i, rows in enumerate(plan.shard_sizes())),
+        files={name: hashlib.sha256(text.encode()).hexdigest() for name, text in texts.items()},
+        configuration=deciding(config),
+        environment=environment(),
+    )
+    made: list[Path] = []
+    try:
+        refuse_used(out)
+        _make_folders([folder for folder in (*reversed(out.parents), out) if not folder.exists()], made)
+        with locked(out):
+            refuse_used(out)  # another process may have been faster
+            _clear(out)
+            for name, text in {BEGINNING: "This folder is being made by gensig.\n", **texts}.items():
+                made.append(out / name)
+                if not (out / name).parent.exists():
+                    _make_folders([(out / name).parent], made)
+                write_text(out / name, text)
+            _make_folders([out / SHARDS], made)
+            write_manifest(out, manifest)
+            (out / BEGINNING).unlink()
+    except BaseException as error:
+        for path in reversed(made):
+            with suppress(OSError):
+                path.rmdir() if path.is_dir() else path.unlink(missing_ok=True)
+        if isinstance(error, OSError):
+            raise cannot_write(out, error) from error
+        raise
+
+
+def refuse_used(out: Path) -> None:
+    """Raise DatasetError where a folder exists and holds something, other than a beginning that was killed."""
+    if out.is_dir():
+        if any(out.iterdir()) and not _is_killed_beginning(out):
+            raise DatasetError(f"{out} {_what_it_holds(out)}")
+    elif out.exists() or out.is_symlink():
+        raise DatasetError(f"{out} exists and is no folder; choose another out=DIR")
+
+
+def _what_it_holds(out: Path) -> str:
+    """What stands in the way of a new data set, and what to do."""
+    try:
+        manifest = read_manifest(out)
+    except DatasetError:
+        return "exists and is not empty; choose another out=DIR or empty it first"
+    if manifest.is_complete:
+        return f"is not empty: a complete data set of {manifest.n_records} records; choose another out=DIR"
+    kind = "an interrupted" if manifest.n_done else "a planned"
+    done = f"{manifest.n_made} of {manifest.n_records} records done"
+    return f"is not empty: {kind} data set, {done}; `gensig resume {out}` finishes it, another out=DIR begins one"
+
+
+def _make_folders(folders: Sequence[Path], made: list[Path]) -> None:
+    for folder in folders:
+        with suppress(FileExistsError):  # another process made it meanwhile
+            folder.mkdir()
+            made.append(folder)
+
+
+def _is_killed_beginning(out: Path) -> bool:
+    """True for a folder that holds the note of `create_folder` and nothing but what that writes before the manifest."""
+    names = {path.name for path in out.iterdir() if not _is_temporary(path)}
+    if not names:  # killed while it wrote the note
+        return all(path.name.startswith(f".{BEGINNING}.") for path in out.iterdir())
+    parts = [out / part for part in (SHARDS, SPLITS) if part in names]
+    inside = [path for part in parts if part.is_dir() for path in part.iterdir()]
+    return (
+        BEGINNING in names
+        and names <= {BEGINNING, CONFIG, OVERRIDES, PLAN, SHARDS, SPLITS}
+        and all(part.is_dir() and not part.is_symlink() for part in parts)
+        and all(path.parent.name == SPLITS and (path.suffix == ".csv" or _is_temporary(path)) for path in inside)
+    )
+
+
+def _is_temporary(path: Path) -> bool:
+    return path.name.startswith(".") and path.name.endswith(TEMPORARY_SUFFIX) and path.is_file()
+
+
+def _clear(out: Path) -> None:
+    """Remove what a killed beginning left, its note last."""
+    paths = sorted(out.rglob("*"), key=lambda path: (path.name != BEGINNING, len(path.parts)), reverse=True)
+    for path in paths:
+        path.rmdir() if path.is_dir() and not path.is_symlink() else path.unlink()

@@ -1,0 +1,56 @@
+"""Joining a data-set folder: only the version and configuration that began it may go on, for the bits' sake."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from pathlib import Path
+from typing import Any
+
+from gensig.dataset.folder.layout import CONFIG, PLAN, Manifest, read_config, read_manifest
+from gensig.dataset.folder.manifest import differing_keys, identity_hash
+from gensig.dataset.storage.atomic import sha256_file
+from gensig.dataset.storage.compression import creation_options
+from gensig.errors import DatasetError
+from gensig.version import __version__
+
+
+def joined_folder(out: Path, *, asked: Mapping[str, Any] | None = None) -> tuple[Manifest, dict[str, Any]]:
+    """Manifest and configuration of a folder that this gensig may add shards to.
+
+    Parameters
+    ----------
+    out : folder of a data set
+    asked : a configuration that must agree with the folder's in all that decides bits
+
+    Raises
+    ------
+    DatasetError    for another version, a configuration or plan that was changed (with the keys that differ), and a
+                    compression whose package is missing
+    """
+    manifest, config = read_manifest(out), read_config(out)
+    if manifest.generator_version != __version__:
+        raise DatasetError(
+            f"{out} was begun by gensig {manifest.generator_version}, this is gensig {__version__}, whose bits may "
+            "differ: go on with that version, or start a new folder"
+        )
+    if identity_hash(config, __version__) != manifest.identity:
+        begun = manifest.configuration
+        told = begun and identity_hash(begun, manifest.generator_version) == manifest.identity
+        where = f" in {_listed(differing_keys(begun, config))}" if told else ""
+        raise DatasetError(
+            f"{out / CONFIG} was changed{where} since the folder was begun; undo that, or start a new folder"
+        )
+    if asked is not None and (keys := differing_keys(config, asked)):
+        raise DatasetError(
+            f"{out} was begun with another {_listed(keys)}; leave that out, or start a new folder: only executor.* may "
+            "change"
+        )
+    if manifest.files.get(PLAN) != sha256_file(out / PLAN):
+        raise DatasetError(f"{out / PLAN} was changed since the folder was begun; restore it, or start a new folder")
+    creation_options(config["dataset"]["compression"])  # refuses one whose package is missing
+    return manifest, config
+
+
+def _listed(keys: list[str]) -> str:
+    more = f" and {len(keys) - 5} more" if len(keys) > 5 else ""
+    return ", ".join(keys[:5]) + more

@@ -1,0 +1,238 @@
+"""What lies where in a data-set folder, and its manifest: the list of shards and their states."""
+
+import json
+import re
+from dataclasses import asdict, dataclass, field
+from pathlib import Path
+from typing import Any
+
+import yaml
+
+from gensig.dataset.schema import SCHEMA_VERSION
+from gensig.dataset.storage.atomic import read_text, write_text
+from gensig.errors import DatasetError
+
+MANIFEST = "manifest.json"
+CONFIG = "config.yaml"
+OVERRIDES = "overrides.yaml"
+PLAN = "plan.csv"
+INDEX = "index.h5"
+CARD = "README.md"
+CROISSANT = "croissant.json"
+CHECKSUMS = "SHA256SUMS"
+LOG = "run.log"
+SHARDS = "shards"
+SPLITS = "splits"
+FIGURES = "figures"
+BEGINNING = ".beginning"  # in a folder that has no manifest yet
+
+TEXT_BYTES_LIMIT = 256 * 1024**2
+CONFIG_BYTES_LIMIT = 1024**2
+CONFIG_DEPTH_LIMIT = 50
+
+_HASH = re.compile(r"[0-9a-f]{64}")
+_FILE = re.compile(r"config\.yaml|overrides\.yaml|plan\.csv|index\.h5|splits/[a-z0-9_]+\.csv")
+
+
+def shard_name(index: int) -> str:
+    """File name of a shard inside the folder `shards`."""
+    return f"shard-{index:05d}.h5"
+
+
+def shard_path(folder: Path, index: int) -> Path:
+    """Path of a shard."""
+    return folder / SHARDS / shard_name(index)
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class ShardEntry:
+    """One shard in the manifest; `sha256`, `bytes` and `n_failed` mean something once `state` is 'done'."""
+
+    name: str
+    rows: int
+    state: str = "planned"
+    sha256: str = ""
+    bytes: int = 0
+    n_failed: int = 0
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class Manifest:
+    """The manifest of a data-set folder.
+
+    Parameters
+    ----------
+    identity : str         sha256 over what decides the bits
+    state : str            'incomplete', or 'complete' once everything else is on disk
+    shards : tuple         one entry a shard, in order
+    files : dict           sha256 of the other files that decide or list the records
+    configuration : dict   what `identity` was made of, so that keys changed since can be named; {} in older folders
+    environment : dict     versions, machine and times; decides nothing
+    """
+
+    schema_version: int = SCHEMA_VERSION
+    generator_version: str
+    identity: str
+    seed: int
+    n_records: int
+    state: str = "incomplete"
+    shards: tuple[ShardEntry, ...]
+    files: dict[str, str]
+    configuration: dict[str, Any] = field(default_factory=dict)
+    environment: dict[str, Any] = field(default_factory=dict)
+
+    @property
+    def is_complete(self) -> bool:
+        """True when the run was finished and closed."""
+        return self.state == "complete"
+
+    @property
+    def n_done(self) -> int:
+        """Number of finished shards."""
+        return sum(entry.state == "done" for entry in self.shards)
+
+    @property
+    def n_made(self) -> int:
+        """Number of records in the finished shards."""
+        return sum(entry.rows for entry in self.shards if entry.state == "done")
+
+    @property
+    def n_failed(self) -> int:
+        """Number of failed records in the finished shards."""
+        return sum(entry.n_failed for entry in self.shards)
+
+
+def manifest_text(manifest: Manifest) -> str:
+    """What `manifest.json` holds."""
+    return json.dumps(asdict(manifest), indent=1, ensure_ascii=False, allow_nan=False) + "\n"
+
+
+def write_manifest(folder: Path, manifest: Manifest) -> None:
+    """Replace `manifest.json` atomically."""
+    write_text(folder / MANIFEST, manifest_text(manifest))
+
+
+def read_manifest(folder: Path) -> Manifest:
+    """The manifest of a folder, every name and type checked.
+
+    Raises
+    ------
+    DatasetError    when the folder is no data set, or the manifest is damaged, newer than this gensig, or names a file
+                    that is not one of a data set (such as '../other')
+    """
+    folder = Path(folder)
+    path = folder / MANIFEST
+    if not path.is_file():
+        if (folder / BEGINNING).is_file():
+            raise DatasetError(
+                f"{folder} holds no record: its run was killed before the plan was on disk; give the same "
+                f"`gensig generate` or `gensig plan --freeze` with out={folder} again"
+            )
+        raise DatasetError(
+            f"{folder} is no gensig data set: it has no {MANIFEST}; give the folder that `gensig generate` made"
+        )
+    try:
+        content = json.loads(read_text(path, limit=TEXT_BYTES_LIMIT))
+        version = _get(content, "schema_version", int)
+        if version != SCHEMA_VERSION:
+            raise DatasetError(f"format version {version}; this gensig reads {SCHEMA_VERSION}, install a matching one")
+        shards = tuple(shard_entry(i, entry) for i, entry in enumerate(_get(content, "shards", list)))
+        manifest = Manifest(
+            schema_version=version,
+            generator_version=_get(content, "generator_version", str),
+            identity=_hash(_get(content, "identity", str), "identity"),
+            seed=_get(content, "seed", int),
+            n_records=_get(content, "n_records", int),
+            state=_one_of(_get(content, "state", str), ("incomplete", "complete"), "state"),
+            shards=shards,
+            files={name: _hash(value, name) for name, value in _get(content, "files", dict).items()},
+            configuration=_get(content, "configuration", dict) if "configuration" in content else {},
+            environment=_get(content, "environment", dict),
+        )
+        _check_manifest(manifest)
+    except DatasetError as error:
+        raise DatasetError(f"{path}: {error}") from error
+    except (ValueError, RecursionError) as error:
+        raise DatasetError(f"{path} is no JSON ({str(error)[:80]}); it is damaged, restore it from a copy") from error
+    return manifest
+
+
+def _check_manifest(manifest: Manifest) -> None:
+    rows = sum(entry.rows for entry in manifest.shards)
+    if rows != manifest.n_records or not manifest.shards:
+        raise DatasetError(f"n_records is {manifest.n_records}, the shards hold {rows}; the manifest is damaged")
+    bad = [name for name in manifest.files if not _FILE.fullmatch(name)]
+    if bad:
+        raise DatasetError(f"file {bad[0]!r} is not one of a data set; the manifest is damaged or forged")
+    if manifest.is_complete and manifest.n_done < len(manifest.shards):
+        raise DatasetError("state is complete, but not every shard is done; the manifest is damaged")
+
+
+def _get(content: Any, key: str, kind: type) -> Any:
+    value = content.get(key) if isinstance(content, dict) else None
+    if not isinstance(value, kind) or isinstance(value, bool):
+        raise DatasetError(f"'{key}' is missing or no {kind.__name__}; the manifest is damaged, restore it from a copy")
+    if isinstance(value, int) and value < 0:
+        raise DatasetError(f"'{key}' is {value}; it cannot be negative")
+    return value
+
+
+def _hash(value: Any, name: str) -> str:
+    if not isinstance(value, str) or not _HASH.fullmatch(value):
+        raise DatasetError(f"{name!r}: {str(value)[:80]!r} is no sha256; the manifest is damaged")
+    return value
+
+
+def _one_of(value: str, allowed: tuple[str, ...], name: str) -> str:
+    if value not in allowed:
+        raise DatasetError(f"{name} is {value[:40]!r}; allowed are {', '.join(allowed)}")
+    return value
+
+
+def shard_entry(index: int, content: Any) -> ShardEntry:
+    """One entry of the list of shards, every name and type checked."""
+    name = _get(content, "name", str)
+    if name != shard_name(index):  # an exact match leaves no room for a path that leads out of the folder
+        raise DatasetError(f"shard {index} is named {name[:80]!r}; the only name allowed is {shard_name(index)!r}")
+    state = _one_of(_get(content, "state", str), ("planned", "done", "failed"), f"state of {name}")
+    digest = _get(content, "sha256", str)
+    entry = ShardEntry(
+        name=name,
+        rows=_get(content, "rows", int),
+        state=state,
+        sha256=_hash(digest, name) if state == "done" else "",
+        bytes=_get(content, "bytes", int),
+        n_failed=_get(content, "n_failed", int),
+    )
+    if entry.rows == 0 or entry.n_failed > entry.rows:
+        raise DatasetError(f"{name}: {entry.n_failed} failed of {entry.rows} records; the manifest is damaged")
+    return entry
+
+
+def read_config(folder: Path) -> dict[str, Any]:
+    """`config.yaml` as plain data: no tags, no interpolation, no aliases; DatasetError when it is anything else."""
+    path = Path(folder) / CONFIG
+    text = read_text(path, limit=CONFIG_BYTES_LIMIT)
+    try:
+        _refuse_yaml_bombs(text, path)
+        content = yaml.safe_load(text)
+    except (yaml.YAMLError, RecursionError, ValueError) as error:
+        raise DatasetError(
+            f"{path} is no plain YAML ({str(error).splitlines()[0][:80]}); restore it from a copy"
+        ) from error
+    if not isinstance(content, dict):
+        raise DatasetError(f"{path} is no mapping; restore it from a copy")
+    return content
+
+
+def _refuse_yaml_bombs(text: str, path: Path) -> None:
+    """Aliases make a small file expand without bound, deep nesting makes parsing take for ever."""
+    depth = 0
+    for event in yaml.parse(text, Loader=yaml.SafeLoader):
+        if isinstance(event, yaml.AliasEvent):
+            raise DatasetError(f"{path} uses YAML aliases; a gensig configuration has none")
+        depth += isinstance(event, yaml.CollectionStartEvent) - isinstance(event, yaml.CollectionEndEvent)
+        if depth > CONFIG_DEPTH_LIMIT:
+            raise DatasetError(
+                f"{path} is nested deeper than {CONFIG_DEPTH_LIMIT} levels; it is no gensig configuration"
+            )

@@ -1,0 +1,191 @@
+"""The life of a data-set folder that has begun: filled shard by shard, closed. Only closing makes it look whole."""
+
+import hashlib
+import json
+from collections.abc import Iterator, Mapping
+from dataclasses import asdict, replace
+from pathlib import Path
+from typing import Any
+
+from gensig.dataset.cards.card import write_card
+from gensig.dataset.folder.environment import now
+from gensig.dataset.folder.layout import (
+    BEGINNING,
+    FIGURES,
+    INDEX,
+    SHARDS,
+    SPLITS,
+    Manifest,
+    ShardEntry,
+    manifest_text,
+    read_manifest,
+    shard_entry,
+    shard_path,
+    write_manifest,
+)
+from gensig.dataset.schema import SCHEMA_VERSION
+from gensig.dataset.storage.atomic import TEMPORARY_SUFFIX, locked, sha256_file
+from gensig.dataset.storage.checksums import write_checksums
+from gensig.dataset.storage.index import write_index
+from gensig.errors import DatasetError
+
+__all__ = [
+    "deciding",
+    "differing_keys",
+    "finalize",
+    "identity_hash",
+    "read_manifest",
+    "record_failed_shard",
+    "record_shard",
+    "record_shards",
+]
+
+# These change where and how a data set is made, not one bit of it.
+NOT_IDENTITY = ("out", "executor", "verbosity")
+RECEIPT_SUFFIX = ".done"
+
+
+def identity_hash(config: dict[str, Any], generator_version: str) -> str:
+    """sha256 over what decides the bits: the configuration less `NOT_IDENTITY`, schema and generator version.
+
+    Raises
+    ------
+    DatasetError    when the configuration holds something other than text, numbers, booleans, null, lists and mappings
+    """
+    content = {
+        "config": deciding(config),
+        "generator_version": generator_version,
+        "schema_version": SCHEMA_VERSION,
+    }
+    canonical = json.dumps(content, sort_keys=True, separators=(",", ":"), ensure_ascii=True)
+    return hashlib.sha256(canonical.encode()).hexdigest()
+
+
+def deciding(config: dict[str, Any]) -> dict[str, Any]:
+    """The part of a configuration that decides bits, as plain data of its own."""
+    return {key: value for key, value in plain_data(config).items() if key not in NOT_IDENTITY}
+
+
+def differing_keys(one: Mapping[str, Any], other: Mapping[str, Any]) -> list[str]:
+    """Dotted keys that decide bits and whose values differ between two configurations, in order."""
+    ours, theirs = _leaves(one), _leaves(other)
+    absent = object()
+    return [key for key in sorted({*ours, *theirs}) if repr(ours.get(key, absent)) != repr(theirs.get(key, absent))]
+
+
+def _leaves(config: Mapping[str, Any], prefix: str = "") -> dict[str, Any]:
+    leaves: dict[str, Any] = {}
+    for key, value in config.items():
+        if not prefix and key in NOT_IDENTITY:
+            continue
+        if isinstance(value, Mapping) and value:
+            leaves.update(_leaves(value, f"{prefix}{key}."))
+        else:
+            leaves[f"{prefix}{key}"] = value
+    return leaves
+
+
+def record_shard(out: Path, shard_index: int, sha256: str, bytes: int, n_failed: int) -> None:
+    """Enter a finished shard, already under its final name, in the manifest; local processes may do so at once."""
+    _record(out, {shard_index: {"sha256": sha256, "bytes": bytes, "n_failed": n_failed}})
+
+
+def record_shards(out: Path, entries: Mapping[int, ShardEntry]) -> None:
+    """Enter finished shards in the manifest in one go."""
+    _record(
+        out, {i: {"sha256": one.sha256, "bytes": one.bytes, "n_failed": one.n_failed} for i, one in entries.items()}
+    )
+
+
+def _record(out: Path, facts: Mapping[int, Mapping[str, Any]]) -> None:
+    for index in facts:
+        if not shard_path(out, index).is_file():
+            raise DatasetError(f"{shard_path(out, index)} does not exist; a shard is written before it is recorded")
+    _update(out, {index: {"state": "done", **fact} for index, fact in facts.items()})
+
+
+def record_failed_shard(out: Path, shard_index: int) -> None:
+    """Enter in the manifest that a shard could not be made; the data set cannot be closed until it is."""
+    _update(out, {shard_index: {"state": "failed", "sha256": "", "bytes": 0, "n_failed": 0}})
+
+
+def _update(out: Path, changes: Mapping[int, Mapping[str, Any]]) -> None:
+    with locked(out):
+        manifest = read_manifest(out)
+        if manifest.is_complete:
+            raise DatasetError(f"{out} is complete and closed; make another data set to change anything")
+        shards = list(manifest.shards)
+        for index, change in changes.items():
+            if not 0 <= index < len(shards):
+                raise DatasetError(f"shard {index} does not exist; {out} has shards 0 to {len(shards) - 1}")
+            shards[index] = shard_entry(index, {**asdict(shards[index]), **change})
+        write_manifest(out, replace(manifest, shards=tuple(shards)))
+
+
+def finalize(out: Path, *, figures: bool = True) -> None:
+    """Close a data set whose shards are all done: index, card, checksums, and the state 'complete' last of all.
+
+    Parameters
+    ----------
+    figures : bool    draw a picture a class for the card
+
+    Raises
+    ------
+    DatasetError    when a shard is not done, is missing or has another size than the manifest says
+    """
+    out = Path(out)
+    with locked(out):
+        manifest = read_manifest(out)
+        if manifest.is_complete:
+            return
+        missing = [entry for entry in manifest.shards if entry.state != "done"]
+        if missing:
+            named = ", ".join(f"{entry.name} is {entry.state}" for entry in missing[:3])
+            more = f" and {len(missing) - 3} more" if len(missing) > 3 else ""
+            raise DatasetError(
+                f"{out}: {manifest.n_done} of {len(manifest.shards)} shards are done, {named}{more}; run `gensig "
+                f"resume {out}` first"
+            )
+        for i, entry in enumerate(manifest.shards):
+            path = shard_path(out, i)
+            if not path.is_file() or path.stat().st_size != entry.bytes:
+                raise DatasetError(
+                    f"{path} is missing or has not the {entry.bytes} bytes recorded; run `gensig resume {out}`"
+                )
+        _remove_leftovers(out)
+        closed = replace(
+            manifest,
+            state="complete",
+            files={**manifest.files, INDEX: write_index(out, manifest)},
+            environment={**manifest.environment, "finished": now()},
+        )
+        write_card(out, figures=figures)
+        write_checksums(out, closed, hashlib.sha256(manifest_text(closed).encode()).hexdigest())
+        write_manifest(out, closed)
+
+
+def _remove_leftovers(out: Path) -> None:
+    """Remove temporary files and receipts of killed writers; every shard is done, so no writer is alive."""
+    for folder in (out, out / SHARDS, out / SPLITS, out / FIGURES):
+        for suffix in (TEMPORARY_SUFFIX, RECEIPT_SUFFIX):
+            for path in folder.glob(f".*{suffix}"):
+                path.unlink(missing_ok=True)
+    (out / BEGINNING).unlink(missing_ok=True)
+
+
+def file_digests(folder: Path, manifest: Manifest) -> Iterator[tuple[str, str, str]]:
+    """Name, recorded and actual sha256 ('' when missing) of the files beside the shards."""
+    for name, recorded in manifest.files.items():
+        path = folder / name
+        inside = path.is_file() and path.resolve().is_relative_to(folder.resolve())
+        yield name, recorded, sha256_file(path) if inside else ""
+
+
+def plain_data(config: dict[str, Any]) -> dict[str, Any]:
+    """A copy made of JSON's types only, sharing nothing with the original."""
+    try:
+        return json.loads(json.dumps(config))
+    except (TypeError, ValueError, RecursionError) as error:
+        raise DatasetError(
+            f"the configuration holds a value that is no plain data ({error}); use text, numbers, lists"
+        ) from error

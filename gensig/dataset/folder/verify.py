@@ -1,0 +1,262 @@
+"""Is a data set whole and unaltered? Every difference is named; nothing is repaired."""
+
+from dataclasses import dataclass
+from pathlib import Path
+
+import h5py
+import numpy as np
+
+from gensig.dataset.folder.inspection import inspect
+from gensig.dataset.folder.layout import (
+    CONFIG,
+    INDEX,
+    MANIFEST,
+    OVERRIDES,
+    PLAN,
+    SHARDS,
+    SPLITS,
+    Manifest,
+    ShardEntry,
+    read_config,
+    read_manifest,
+)
+from gensig.dataset.folder.manifest import file_digests, identity_hash
+from gensig.dataset.plan import Plan, read_plan
+from gensig.dataset.schema import COLUMNS, SCALES
+from gensig.dataset.splitting.split_check import split_problems
+from gensig.dataset.splitting.splits import read_split
+from gensig.dataset.storage.atomic import sha256_file
+from gensig.dataset.storage.attributes import HDF5_ERRORS, read_attributes
+from gensig.dataset.storage.checksums import differences
+from gensig.dataset.storage.guard import datasets, first_line, open_shard, read_rows
+from gensig.dataset.storage.quantization import is_scale, read_signal
+from gensig.errors import DatasetError
+
+__all__ = ["VerifyResult", "inspect", "verify"]
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class VerifyResult:
+    """What `verify` found.
+
+    Parameters
+    ----------
+    complete : bool       True only for a closed data set without any problem
+    problems : list       one line each; empty exactly when `complete`
+    n_records : int       records the data set is meant to have
+    n_failed : int        records whose simulation failed; they are no problem, but no silence either
+    """
+
+    complete: bool
+    problems: list[str]
+    n_records: int
+    n_failed: int
+
+
+def verify(folder: Path, *, quick: bool = False) -> VerifyResult:
+    """Check a data-set folder: state, sha256, sizes, rows, schema, plan against rows, splits, scales, finite values.
+
+    Parameters
+    ----------
+    folder : Path
+    quick : bool     look at the manifest, names and sizes only
+
+    Raises
+    ------
+    DatasetError    when the folder is no data set
+    """
+    folder = Path(folder)
+    try:
+        manifest = read_manifest(folder)
+    except DatasetError as error:
+        if not (folder / MANIFEST).is_file():
+            raise
+        return VerifyResult(complete=False, problems=[str(error)], n_records=0, n_failed=0)
+    problems = _state(folder, manifest) + _extra_files(folder, manifest)
+    if manifest.is_complete:
+        problems += [one.line for one in differences(folder, manifest, quick=quick)]
+    plan = None
+    if not quick:
+        found, plan = _beside_shards(folder, manifest)
+        problems += found + (_splits(folder, manifest, plan) if plan is not None else [])
+    starts = np.cumsum([0, *(entry.rows for entry in manifest.shards)])
+    reference: dict | None = None
+    for i, entry in enumerate(manifest.shards):
+        if entry.state != "done":
+            continue
+        path = folder / SHARDS / entry.name
+        damage = _bytes_differ(path, entry, manifest, quick=quick)
+        problems += damage
+        if quick or not path.is_file():
+            continue
+        try:
+            with open_shard(path, folder=folder) as file:
+                if not damage:
+                    reference = reference or _description(file, path)
+                    problems += _description_differs(file, path, reference)
+                found = _rows_differ(file, entry, plan, int(starts[i]))
+                # A file whose bytes are wrong can have thousands of wrong rows; the first line tells.
+                problems += found[:1] if damage else found
+        except DatasetError as error:
+            problems.append(str(error))
+        except HDF5_ERRORS as error:
+            problems.append(f"{entry.name} cannot be read ({first_line(error)}); it is damaged")
+    return VerifyResult(
+        complete=not problems, problems=problems, n_records=manifest.n_records, n_failed=manifest.n_failed
+    )
+
+
+def _state(folder: Path, manifest: Manifest) -> list[str]:
+    problems = [
+        f"{entry.name} could not be made; run `gensig resume {folder}`"
+        for entry in manifest.shards
+        if entry.state == "failed"
+    ]
+    if not manifest.is_complete:
+        problems.append(
+            f"incomplete: {manifest.n_done} of {len(manifest.shards)} shards are done and the data set was "
+            f"never closed; run `gensig resume {folder}`"
+        )
+    needed = [CONFIG, PLAN, OVERRIDES, *([INDEX] if manifest.is_complete else [])]
+    problems += [f"the manifest does not list {name}; it is damaged" for name in needed if name not in manifest.files]
+    problems += [f"{name} is missing" for name in manifest.files if not (folder / name).is_file()]
+    if manifest.is_complete:
+        found = sorted(f"{SPLITS}/{path.name}" for path in (folder / SPLITS).glob("*"))
+        problems += [
+            f"{name!a} is extra: the manifest does not list it" for name in found if name not in manifest.files
+        ]
+    return problems
+
+
+def _extra_files(folder: Path, manifest: Manifest) -> list[str]:
+    """Files in `shards` that the manifest does not know; an interrupted run may have unfinished ones."""
+    if not (folder / SHARDS).is_dir():
+        return [f"the folder {SHARDS} is missing"]
+    known = {entry.name for entry in manifest.shards}
+    names = sorted(path.name for path in (folder / SHARDS).iterdir())
+    if not manifest.is_complete:
+        names = [name for name in names if not name.startswith(".")]
+    return [f"{SHARDS}/{name!a} is extra: no shard of this data set" for name in names if name not in known]
+
+
+def _beside_shards(folder: Path, manifest: Manifest) -> tuple[list[str], Plan | None]:
+    """Plan, configuration, splits and index against the manifest."""
+    problems = [
+        f"{name} was altered: its sha256 is not the one in the manifest"
+        for name, recorded, actual in file_digests(folder, manifest)
+        if actual and actual != recorded
+    ]
+    try:
+        config = read_config(folder)
+        if identity_hash(config, manifest.generator_version) != manifest.identity:
+            problems.append(f"{CONFIG} and the identity in the manifest do not belong together; one was altered")
+        begun = manifest.configuration
+        if begun and identity_hash(begun, manifest.generator_version) != manifest.identity:
+            problems.append(f"{MANIFEST} has a configuration and an identity that do not belong together")
+        if "seed" in config and config["seed"] != manifest.seed:
+            problems.append(f"{CONFIG} has seed {config['seed']!r} and the manifest {manifest.seed}; one was altered")
+    except DatasetError as error:
+        problems.append(str(error))
+    try:
+        plan = read_plan(folder / PLAN)
+    except DatasetError as error:
+        return [*problems, str(error)], None
+    if plan.shard_sizes() != [entry.rows for entry in manifest.shards]:
+        return [*problems, f"{PLAN} and the manifest have different shards; one was altered"], None
+    return problems, plan
+
+
+def _splits(folder: Path, manifest: Manifest, plan: Plan) -> list[str]:
+    """Splits that do not keep apart what their protocol says."""
+    problems = []
+    for name in sorted(name for name in manifest.files if name.startswith(f"{SPLITS}/") and (folder / name).is_file()):
+        try:
+            problems += [
+                f"{SPLITS}/{line}" for line in split_problems(Path(name).stem, read_split(folder / name), plan)
+            ]
+        except DatasetError as error:
+            problems.append(str(error))
+    return problems
+
+
+def _bytes_differ(path: Path, entry: ShardEntry, manifest: Manifest, *, quick: bool) -> list[str]:
+    if not path.is_file():
+        return [f"{entry.name} is missing"]
+    size = path.stat().st_size
+    if size != entry.bytes:
+        found = "truncated" if size < entry.bytes else "not the recorded file"
+        return [f"{entry.name} is {found}: {size} bytes, recorded are {entry.bytes}"]
+    if quick:
+        return []
+    digest = sha256_file(path)
+    if digest == entry.sha256:
+        return []
+    other = next((e.name for e in manifest.shards if e.sha256 == digest), None)
+    if other is not None:
+        return [f"{entry.name} is swapped: it holds what belongs in {other}"]
+    return [f"{entry.name} was altered: its sha256 is {digest[:12]}..., recorded is {entry.sha256[:12]}..."]
+
+
+def _description(file: h5py.File, path: Path) -> dict:
+    """What all shards of one data set have in common."""
+    shapes = {name: (str(data.dtype), data.shape[1:]) for name, data in datasets(file, path).items()}
+    return {"data sets": shapes, "attributes": read_attributes(file)}
+
+
+def _description_differs(file: h5py.File, path: Path, reference: dict) -> list[str]:
+    problems = []
+    for part, found in _description(file, path).items():
+        expected = reference[part]
+        names = sorted(name for name in {*found, *expected} if repr(found.get(name)) != repr(expected.get(name)))
+        if names:
+            problems.append(
+                f"{path.name} is foreign: its {part} {', '.join(names)} differ from those of the other shards"
+            )
+    return problems
+
+
+def _rows_differ(file: h5py.File, entry: ShardEntry, plan: Plan | None, start: int) -> list[str]:
+    """Row count, rows against the plan, failed records, scales, finite signals."""
+    name = entry.name
+    n = file["record_id"].shape[0]
+    if n != entry.rows:
+        return [f"{name} has {n} rows, recorded are {entry.rows}"]
+    problems = []
+    planned_columns = plan.columns if plan is not None else {}
+    for column in COLUMNS.values():
+        # Other inputs may be refined while simulating; names and labels never.
+        if column.role not in ("id", "label", "unit") or column.name not in planned_columns or column.name not in file:
+            continue
+        planned, found = planned_columns[column.name][start : start + n], read_rows(file[column.name])
+        wrong = np.flatnonzero(planned != found)
+        if wrong.size:
+            i = int(wrong[0])
+            problems.append(
+                f"{name} row {i}: {column.name} is {found[i].item()!a}, the plan says {planned[i].item()!a} "
+                f"({wrong.size} such rows)"
+            )
+            if column.name == "record_id":
+                return problems
+    failed = read_rows(file["status"]) != "ok"
+    if int(failed.sum()) != entry.n_failed:
+        problems.append(f"{name} has {int(failed.sum())} failed records, recorded are {entry.n_failed}")
+    for row, is_failed in enumerate(failed.tolist()):
+        problems += [f"{name} row {row}: {problem}" for problem in _signal_problems(file, row, failed=is_failed)]
+    return problems
+
+
+def _signal_problems(file: h5py.File, row: int, *, failed: bool) -> list[str]:
+    """Scales that are none, and signals that are not finite although the record did not fail."""
+    problems = []
+    for name, scale_name in SCALES.items():
+        if name not in file:
+            continue
+        if file[name].dtype.kind == "i":
+            scale = file[scale_name][row]
+            wrong = ~(is_scale(scale) | (np.isnan(scale) & failed))
+            if wrong.any():
+                problems.append(f"{scale_name} is {scale[wrong][0]}; it must be positive and finite")
+                continue
+        if not failed and not np.isfinite(read_signal(file, name, row)).all():
+            problems.append(f"{name} is not finite, but its status is ok")
+    return problems

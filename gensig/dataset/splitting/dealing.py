@@ -1,0 +1,90 @@
+"""Whole groups dealt to train, validation and test, and the records that each side may then use."""
+
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+
+from gensig.dataset.plan import Plan
+from gensig.dataset.splitting.splits import SUBSETS, SplitTable
+
+TRAIN, VALIDATION, TEST = range(len(SUBSETS))
+VALIDATION_SHARE = 0.2
+MIN_TESTED = 10  # groups: an interval over fewer is too narrow
+MAX_FOR_TESTS = 0.25  # of the groups, so that training keeps more than half
+_ATTEMPTS = 200
+
+
+@dataclass(frozen=True, slots=True, kw_only=True, eq=False)
+class Deal:
+    """What a protocol asks of a deal of whole groups.
+
+    Parameters
+    ----------
+    column : text                         plan column of the groups; none of them is on two sides
+    usable : (subset, record) bool        whether a record is used if its group is dealt to that subset
+    min_groups : int                      fewer groups are no deal
+    test_share : float                    of the groups; `MIN_TESTED` where that is no more than `MAX_FOR_TESTS`
+    for_test : (record,) float or None    groups of the largest sum are tested on, as long as all classes are there
+    every_class : bool                    whether a subset needs every class of the plan, or only those it may use
+    """
+
+    column: str
+    usable: NDArray[np.bool_]
+    min_groups: int = len(SUBSETS)
+    test_share: float = 0.2
+    for_test: NDArray[np.float64] | None = None
+    every_class: bool = True
+
+
+def deal_groups(plan: Plan, deal: Deal, rng: np.random.Generator) -> SplitTable | str:
+    """The table of one deal in which every subset has every class that it needs, or in one line why there is none.
+
+    A record that its group's side may not use is in no subset. Of the groups at least one is dealt to each side.
+    """
+    if deal.column not in plan.columns:
+        return f"the plan has no column {deal.column}"
+    names, group = np.unique(plan.columns[deal.column], return_inverse=True)
+    if len(names) < deal.min_groups:
+        return f"{len(names)} {deal.column} in the plan, and at least {deal.min_groups} are needed"
+    classes, label = np.unique(plan.columns["label"], return_inverse=True)
+    holds = np.zeros((len(SUBSETS), len(names), len(classes)), dtype=bool)
+    for subset, usable in enumerate(deal.usable):
+        holds[subset, group[usable], label[usable]] = True
+    needed = holds.any(axis=1) | deal.every_class
+    if lacking := [name for name, found in zip(SUBSETS, holds.any(axis=1) >= needed, strict=True) if not found.all()]:
+        return f"a class has no record that may be used for {lacking[0]}"
+    n_validation, n_test = (max(1, round(share * len(names))) for share in (VALIDATION_SHARE, deal.test_share))
+    if MAX_FOR_TESTS * len(names) >= MIN_TESTED:
+        n_test = max(n_test, MIN_TESTED)
+    in_order = np.repeat(np.arange(len(SUBSETS)), [len(names) - n_validation - n_test, n_validation, n_test])
+    worth = None if deal.for_test is None else np.bincount(group, weights=deal.for_test).astype(float)
+    for attempt in range(_ATTEMPTS):
+        side = rng.permutation(in_order)
+        if worth is not None and attempt < _ATTEMPTS // 2:
+            side = _best_tested(side, worth, rng)
+        present = np.stack([holds[subset, side == subset].any(axis=0) for subset in range(len(SUBSETS))])
+        if (present >= needed).all():
+            return _table(plan, side[group], deal.usable)
+    return f"no deal of {len(names)} {deal.column} found that gives every subset all its classes"
+
+
+def _best_tested(
+    side: NDArray[np.integer], worth: NDArray[np.float64], rng: np.random.Generator
+) -> NDArray[np.integer]:
+    """The same numbers of groups a side, those of the largest worth tested on; ties and the rest by chance."""
+    order = np.lexsort((rng.random(len(side)), worth))
+    dealt = np.empty_like(side)
+    dealt[order] = np.concatenate([side[side != TEST], side[side == TEST]])
+    return dealt
+
+
+def _table(plan: Plan, subset: NDArray[np.integer], usable: NDArray[np.bool_]) -> SplitTable:
+    """Whole records in the order of the plan."""
+    kept = np.flatnonzero(usable[subset, np.arange(plan.n_records)])
+    return SplitTable(
+        record_id=plan.columns["record_id"][kept],
+        start_fraction=np.zeros(len(kept), dtype=int),
+        stop_fraction=np.ones(len(kept), dtype=int),
+        subset=np.array(SUBSETS)[subset[kept]],
+    )

@@ -1,0 +1,60 @@
+"""The table that says which part of which record is for training, validation and test; `protocols` makes it."""
+
+import csv
+import io
+from dataclasses import dataclass
+from pathlib import Path
+
+import numpy as np
+
+from gensig.dataset.folder.layout import TEXT_BYTES_LIMIT
+from gensig.dataset.storage.atomic import read_text
+from gensig.errors import DatasetError
+
+SUBSETS = ("train", "validation", "test")
+HEADER = ("record_id", "start_fraction", "stop_fraction", "subset")
+
+
+@dataclass(frozen=True, slots=True, kw_only=True, eq=False)
+class SplitTable:
+    """Which part of which record belongs to which subset; one row a (part of a) record.
+
+    Parameters
+    ----------
+    record_id : (row,) text
+    start_fraction, stop_fraction : (row,)    part of the record, 0 to 1
+    subset : (row,) text                      'train', 'validation' or 'test'
+    """
+
+    record_id: np.ndarray
+    start_fraction: np.ndarray
+    stop_fraction: np.ndarray
+    subset: np.ndarray
+
+    def to_csv(self) -> str:
+        """The table as CSV, floats in shortest round-trip form."""
+        buffer = io.StringIO()
+        writer = csv.writer(buffer, lineterminator="\n")
+        writer.writerow(HEADER)
+        columns = (self.record_id, self.start_fraction, self.stop_fraction, self.subset)
+        writer.writerows(zip(*(column.tolist() for column in columns), strict=True))
+        return buffer.getvalue()
+
+
+def read_split(path: Path) -> SplitTable:
+    """Read one `splits/<protocol>.csv`; DatasetError names the file and what is wrong with it."""
+    text = read_text(path, limit=TEXT_BYTES_LIMIT * 4)
+    try:
+        header, *rows = csv.reader(io.StringIO(text, newline=""), strict=True)
+        if tuple(header) != HEADER:
+            raise ValueError(f"header is {','.join(header)[:80]}, expected {','.join(HEADER)}")
+        ids, starts, stops, subsets = zip(*rows, strict=True)
+        start, stop = np.array(starts, dtype=float), np.array(stops, dtype=float)
+        if not ((start >= 0) & (start < stop) & (stop <= 1)).all():
+            raise ValueError("fractions must be 0 <= start < stop <= 1")
+        unknown = set(subsets) - set(SUBSETS)
+        if unknown:
+            raise ValueError(f"subset {min(unknown)[:40]!r} is unknown; allowed are {', '.join(SUBSETS)}")
+    except (csv.Error, ValueError) as error:
+        raise DatasetError(f"{path} is no split table ({error}); restore it from a copy") from error
+    return SplitTable(record_id=np.array(ids), start_fraction=start, stop_fraction=stop, subset=np.array(subsets))

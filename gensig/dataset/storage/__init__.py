@@ -1,0 +1,1 @@
+"""Files of a data set: shards, their index, receipts, compression and checksums."""

@@ -1,0 +1,134 @@
+"""SHA256SUMS: the digest of every file of a closed data set, in the form that `sha256sum --check` reads.
+
+The manifest holds the digests of shards, plan and splits. This file repeats them, and adds those of the manifest itself
+and of the files that are for people, so that no byte of the folder can change unnoticed.
+"""
+
+import re
+from dataclasses import dataclass
+from pathlib import Path
+
+from gensig.dataset.folder.layout import (
+    CARD,
+    CHECKSUMS,
+    CROISSANT,
+    FIGURES,
+    LOG,
+    MANIFEST,
+    SHARDS,
+    TEXT_BYTES_LIMIT,
+    Manifest,
+    read_manifest,
+)
+from gensig.dataset.storage.atomic import locked, read_text, sha256_file, write_text
+from gensig.errors import DatasetError
+
+EDITABLE = (CARD, CROISSANT)  # may be written on by hand, and then accepted
+_LINE = re.compile(
+    r"([0-9a-f]{64})  (manifest\.json|README\.md|croissant\.json|run\.log|config\.yaml|overrides\.yaml|plan\.csv|"
+    r"index\.h5|splits/[a-z0-9_]+\.csv|figures/[a-z0-9_-]+\.png|shards/shard-[0-9]{5,}\.h5)"
+)
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class Difference:
+    """A file that is not as `SHA256SUMS` says: its name, and one line."""
+
+    name: str
+    line: str
+
+
+def write_checksums(folder: Path, manifest: Manifest, manifest_digest: str) -> None:
+    """Write `SHA256SUMS` for a manifest that says 'complete'; it may be written before that manifest."""
+    digests = {MANIFEST: manifest_digest, **_recorded(manifest)}
+    digests |= {name: sha256_file(folder / name) for name in _beside(folder)}
+    write_text(folder / CHECKSUMS, "".join(f"{digest}  {name}\n" for name, digest in digests.items()))
+
+
+def _recorded(manifest: Manifest) -> dict[str, str]:
+    """Digests that the manifest holds, by path."""
+    return {**manifest.files, **{f"{SHARDS}/{entry.name}": entry.sha256 for entry in manifest.shards}}
+
+
+def _beside(folder: Path) -> list[str]:
+    """Files of the folder that the manifest does not list: card, figures, log."""
+    figures = sorted(f"{FIGURES}/{path.name}" for path in (folder / FIGURES).glob("*.png"))
+    return [name for name in (CARD, CROISSANT, LOG, *figures) if (folder / name).is_file()]
+
+
+def read_checksums(folder: Path) -> dict[str, str]:
+    """Digest by path.
+
+    Raises
+    ------
+    DatasetError    when the file is missing, or has a line that gensig does not write
+    """
+    path = folder / CHECKSUMS
+    if not path.is_file():
+        raise DatasetError(
+            f"{CHECKSUMS} is missing; restore it from a copy, or let `gensig finalize {folder}` write it where you "
+            "trust the folder as it is"
+        )
+    text = read_text(path, limit=TEXT_BYTES_LIMIT)
+    found: dict[str, str] = {}
+    for number, line in enumerate(text.split("\n")[:-1], start=1):
+        match = _LINE.fullmatch(line)
+        if match is None or match[2] in found:
+            raise DatasetError(f"{CHECKSUMS} was altered: line {number} is none of a data set; restore it from a copy")
+        found[match[2]] = match[1]
+    if not text.endswith("\n"):
+        raise DatasetError(f"{CHECKSUMS} was altered: its end is missing; restore it from a copy")
+    return found
+
+
+def differences(folder: Path, manifest: Manifest, *, quick: bool = False) -> list[Difference]:
+    """Every file whose digest is not the one in `SHA256SUMS`; those that the manifest lists are compared with it.
+
+    Parameters
+    ----------
+    quick : bool    of the files beside those that the manifest lists, look at its own digest and at names only
+    """
+    try:
+        listed = read_checksums(folder)
+    except DatasetError as error:
+        return [Difference(name=CHECKSUMS, line=str(error))]
+    recorded = _recorded(manifest)
+    found = []
+    for name in (MANIFEST, *recorded, CARD, CROISSANT, *_beside(folder)):
+        if name not in listed:
+            listed[name] = ""
+            found.append(Difference(name=CHECKSUMS, line=f"{CHECKSUMS} does not list {name}; one of them was altered"))
+    for name, digest in listed.items():
+        path = folder / name
+        if name in recorded:
+            if digest and digest != recorded[name]:
+                line = f"{CHECKSUMS} and {MANIFEST} have different sha256 of {name}; one was altered"
+                found.append(Difference(name=CHECKSUMS, line=line))
+        elif not path.is_file() or not path.resolve().is_relative_to(folder.resolve()):
+            found.append(Difference(name=name, line=f"{name} is missing; {CHECKSUMS} lists it"))
+        elif digest and (name == MANIFEST or not quick) and sha256_file(path) != digest:
+            hint = f"; if you edited it, `gensig finalize {folder}` accepts it" if name in EDITABLE else ""
+            line = f"{name} was altered: its sha256 is not the one in {CHECKSUMS}{hint}"
+            found.append(Difference(name=name, line=line))
+    return found
+
+
+def accept_edits(folder: Path) -> list[str]:
+    """Take card and description of a closed data set as they are now; returns the names of those that had changed.
+
+    Raises
+    ------
+    DatasetError    when any other file is not as it was
+    """
+    with locked(folder):
+        manifest = read_manifest(folder)
+        if not manifest.is_complete:
+            raise DatasetError(f"{folder} is incomplete; run `gensig resume {folder}` first")
+        found = differences(folder, manifest)
+        missing = not (folder / CHECKSUMS).exists()
+        refused = [one for one in found if one.name not in EDITABLE or not (folder / one.name).is_file()]
+        if refused and not missing:
+            raise DatasetError(f"{refused[0].line}; only {' and '.join(EDITABLE)} may be edited")
+        if found:
+            write_checksums(folder, manifest, sha256_file(folder / MANIFEST))
+        return [one.name for one in found]

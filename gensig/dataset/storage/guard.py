@@ -1,0 +1,209 @@
+"""Opening a shard that may come from a stranger: checked before anything is read, and never trusted afterwards."""
+
+import math
+from pathlib import Path
+
+import h5py
+import numpy as np
+
+from gensig.dataset.schema import COLUMNS, REQUIRED, REQUIRED_ATTRIBUTES, SAMPLE_TYPES, SCALES, SCHEMA_VERSION, SIGNALS
+from gensig.dataset.storage.attributes import HDF5_ERRORS, decoded, read_attributes
+from gensig.dataset.storage.compression import (
+    BLOSC2_CHUNK_LIMIT,
+    BLOSC2_FILTER,
+    filters,
+    load_blosc2,
+)
+from gensig.errors import DatasetError
+
+# gzip reaches at most 1032:1; what declares more than this over what it stores is a bomb or was never written.
+EXPANSION_LIMIT = 1100
+ATTRIBUTES_LIMIT = 1000
+
+_FILTERS = {
+    h5py.h5z.FILTER_DEFLATE, h5py.h5z.FILTER_SHUFFLE, h5py.h5z.FILTER_FLETCHER32, h5py.h5z.FILTER_LZF, BLOSC2_FILTER,
+}  # fmt: skip
+
+
+def open_file(path: Path) -> h5py.File:
+    """An HDF5 file, read-only and without locks; DatasetError when it is none."""
+    if not path.is_file():
+        raise DatasetError(f"{path} is missing or no ordinary file; restore it from a copy")
+    try:
+        return h5py.File(path, "r", locking=False)
+    except (OSError, RuntimeError) as error:
+        raise DatasetError(
+            f"{path} cannot be read as HDF5 ({first_line(error)}); it is damaged or no HDF5 file"
+        ) from error
+
+
+def open_shard(path: Path, *, folder: Path | None = None) -> h5py.File:
+    """A shard, open for reading after `check_shard`; with `folder`, refused when the name leads out of that folder."""
+    if folder is not None and not path.resolve().is_relative_to(folder.resolve()):
+        raise DatasetError(f"{path} is a link that leads out of {folder}; put the file itself there")
+    file = open_file(path)
+    try:
+        check_shard(file, path)
+    except BaseException:
+        file.close()
+        raise
+    return file
+
+
+def same_file(path: Path) -> tuple[int, ...]:
+    """Numbers that change when a file or a link to it is replaced or written to; () where there is none."""
+    try:
+        found, link = path.stat(), path.lstat()
+    except OSError:
+        return ()
+    return (found.st_dev, found.st_ino, found.st_size, found.st_mtime_ns, found.st_ctime_ns, link.st_ino)
+
+
+def check_shard(file: h5py.File, path: Path) -> None:
+    """Refuse, with one line, whatever a shard of format version 1 cannot contain.
+
+    Raises
+    ------
+    DatasetError    for soft or external links, types that are no plain numbers or text, data outside the file, filters
+                    other than gzip, lzf and blosc2, shapes larger than what is stored, missing columns, unequal row
+                    counts, blosc2 without the package that reads it
+    """
+    try:
+        found = datasets(file, path)
+        missing = [name for name in REQUIRED if name not in found]
+        if missing:
+            raise DatasetError(f"{path} has no data set {', '.join(missing)}; it is no gensig shard")
+        n_records = row_count(found["record_id"])
+        for name, data in found.items():
+            _check_dataset(name, data, n_records, path)
+        for name, scale in SCALES.items():
+            _check_scale(found, name, scale, path)
+        _check_attributes(file, path)
+    except HDF5_ERRORS as error:
+        raise DatasetError(f"{path} is damaged ({first_line(error)}); restore it from a copy") from error
+
+
+def datasets(file: h5py.File, path: Path) -> dict[str, h5py.Dataset]:
+    """All data sets of the root and of its groups one level down, by name; DatasetError for links and other objects."""
+    found: dict[str, h5py.Dataset] = {}
+
+    def collect(group: h5py.Group, prefix: str, *, deeper: bool) -> None:
+        for key in group:
+            if not isinstance(key, str):
+                raise DatasetError(f"{path}: the name {key!r} is no UTF-8 text; the file is damaged")
+            if group.id.links.get_info(key.encode()).type != h5py.h5l.TYPE_HARD:
+                raise DatasetError(f"{path}: '{_plain(prefix + key)}' is a link; a shard holds its own data only")
+            item = group[key]
+            if isinstance(item, h5py.Dataset):
+                found[prefix + key] = item
+            elif isinstance(item, h5py.Group) and deeper:
+                collect(item, f"{prefix}{key}/", deeper=False)
+            else:
+                raise DatasetError(f"{path}: '{_plain(prefix + key)}' is neither a data set nor a group of data sets")
+
+    collect(file, "", deeper=True)
+    return found
+
+
+def row_count(data: h5py.Dataset) -> int:
+    """Length of axis 0; 0 for a scalar."""
+    return int(data.shape[0]) if data.shape else 0
+
+
+def _check_dataset(name: str, data: h5py.Dataset, n_records: int, path: Path) -> None:
+    label = f"{path}: data set '{_plain(name)}'"
+    dtype = data.dtype
+    if dtype.kind not in "Siuf" or dtype.subdtype is not None:
+        raise DatasetError(f"{label} has type {dtype}; allowed are numbers and text of fixed length")
+    if data.is_virtual or data.external:
+        raise DatasetError(f"{label} keeps its data in another file; a shard holds its own data only")
+    if n_records == 0 or row_count(data) != n_records:
+        raise DatasetError(f"{label} has shape {data.shape}, record_id has {n_records} rows; all must be equal, not 0")
+    used = filters(data)
+    if not used <= _FILTERS:
+        raise DatasetError(f"{label} uses HDF5 filter {sorted(used - _FILTERS)}; allowed are gzip, lzf and blosc2")
+    if BLOSC2_FILTER in used:
+        load_blosc2(f"{path} is compressed with blosc2; reading it")
+    if not _is_stored(data, used):
+        raise DatasetError(
+            f"{label} declares {data.size * dtype.itemsize} bytes and stores {data.id.get_storage_size()}; "
+            "it was never written or is a bomb"
+        )
+    column = SIGNALS.get(name) or COLUMNS.get(name)
+    if column is not None:
+        same_kind = dtype.kind == column.storage_dtype.kind
+        if name in SCALES and dtype.kind == "i":
+            same_kind = dtype.itemsize == 2
+        if not same_kind or data.ndim != 1 + len(column.axes):
+            raise DatasetError(
+                f"{label} has type {dtype} and {data.ndim} axes; format version 1 wants "
+                f"{' or '.join(SAMPLE_TYPES) if name in SCALES else column.dtype} and {1 + len(column.axes)}"
+            )
+
+
+def holds_its_data(data: h5py.Dataset) -> bool:
+    """True for a data set whose values are all in its own file, in no more bytes than it declares."""
+    used = filters(data)
+    return not data.is_virtual and not data.external and used <= _FILTERS - {BLOSC2_FILTER} and _is_stored(data, used)
+
+
+def _is_stored(data: h5py.Dataset, used: set[int]) -> bool:
+    """False for what declares more than its bytes in the file can hold, in all or in one chunk."""
+    item, chunks = data.dtype.itemsize, data.chunks
+    chunk = math.prod(chunks) * item if chunks else 0
+    if BLOSC2_FILTER in used:
+        counts = (-(-length // step) for length, step in zip(data.shape, chunks, strict=True))
+        return chunk <= BLOSC2_CHUNK_LIMIT and data.id.get_num_chunks() == math.prod(counts)
+    limit = data.id.get_storage_size() * (EXPANSION_LIMIT if used else 1)
+    return max(data.size * item, chunk) <= limit
+
+
+def _check_scale(found: dict[str, h5py.Dataset], name: str, scale: str, path: Path) -> None:
+    """Refuse counts without their scale, one a record and channel."""
+    if name not in found or found[name].dtype.kind == "f":
+        return
+    if scale not in found:
+        raise DatasetError(f"{path}: {name} is int16 and there is no data set {scale}; its values are unknown")
+    if found[scale].shape != found[name].shape[:2]:
+        raise DatasetError(
+            f"{path}: {scale} has shape {found[scale].shape}, {name} has {found[name].shape[:2]} records and channels"
+        )
+
+
+def _check_attributes(file: h5py.File, path: Path) -> None:
+    if len(file.attrs) > ATTRIBUTES_LIMIT:
+        raise DatasetError(f"{path} has {len(file.attrs)} attributes; it is no gensig shard")
+    found = read_attributes(file)
+    missing = [name for name in REQUIRED_ATTRIBUTES if name not in found]
+    if missing:
+        raise DatasetError(f"{path} has no root attribute {', '.join(missing)}; it is no gensig shard")
+    version, rate = found["schema_version"], found["sampling_rate_hz"]
+    if version != SCHEMA_VERSION:
+        raise DatasetError(
+            f"{path} has format version {version}; this gensig reads {SCHEMA_VERSION}, get a matching one"
+        )
+    if not isinstance(rate, int | float) or not 0 < rate < float("inf"):
+        raise DatasetError(f"{path}: sampling_rate_hz is {rate}; it must be a positive number")
+    for name in ("channel_names", "class_names"):
+        value = found[name]
+        if not isinstance(value, list) or not all(isinstance(item, str) for item in value):
+            raise DatasetError(f"{path}: attribute {name} must be a list of text")
+    if len(found["channel_names"]) != file["acceleration"].shape[1]:
+        raise DatasetError(
+            f"{path}: {len(found['channel_names'])} channel names for {file['acceleration'].shape[1]} channels"
+        )
+
+
+def read_rows(data: h5py.Dataset) -> np.ndarray:
+    """The whole of a small data set, text decoded."""
+    values = data[...]
+    return decoded(values) if values.dtype.kind == "S" else values
+
+
+def first_line(error: Exception) -> str:
+    """The first line of an error's text."""
+    return (str(error).splitlines() or [type(error).__name__])[0]
+
+
+def _plain(text: str) -> str:
+    return "".join(c if c.isprintable() else "?" for c in text)[:80]

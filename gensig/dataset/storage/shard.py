@@ -1,0 +1,319 @@
+"""Writing one shard: an HDF5 file that appears whole or not at all, with the same bytes for the same input."""
+
+import difflib
+import math
+import operator
+import re
+from collections.abc import Mapping, Sequence
+from pathlib import Path
+from types import TracebackType
+
+import h5py
+import numpy as np
+
+from gensig.dataset.schema import (
+    COLUMNS,
+    DEFAULTS,
+    LIFE_COLUMNS,
+    PARAMS,
+    REQUIRED_ATTRIBUTES,
+    SAMPLE_TYPES,
+    SCALES,
+    SCHEMA_VERSION,
+    SIGNALS,
+    Column,
+    stored_reason,
+    unit_in_file,
+)
+from gensig.dataset.storage.attributes import Attribute, set_attribute
+from gensig.dataset.storage.compression import (
+    BLOSC2_CHUNK_LIMIT,
+    COMPRESSIONS,
+    creation_options,
+    fixed_settings,
+)
+from gensig.dataset.storage.image import memory_file, publish_image
+from gensig.dataset.storage.quantization import quantized
+from gensig.errors import DatasetError
+
+_PARAM_NAME = re.compile(r"[A-Za-z_][A-Za-z0-9_.\-]*")
+
+
+class ShardWriter:
+    """Context manager that writes one shard.
+
+    Parameters
+    ----------
+    path : Path          the shard's final name; nothing appears under it before the block ends cleanly
+    n_records : int      number of rows
+    signals : name -> shape of one record's array, such as {"acceleration": (4, 51200), "noise_power": (4,)}
+    params : list        names of the `params/<name>` columns
+    attributes : dict    root attributes; `sampling_rate_hz`, `channel_names` and `class_names` are required
+    compression : str    one of `COMPRESSIONS`, for the time signals
+    sample_type : str    'float32', or 'int16': accelerations become counts, and the writer adds their scales
+    lives : bool         whether records are snapshots of lives, with `LIFE_COLUMNS`
+
+    Attributes
+    ----------
+    sha256, n_bytes, n_failed    of the finished file, set when the block has ended cleanly
+
+    Raises
+    ------
+    DatasetError    for unknown names, wrong shapes or types, a row written twice or never, a disk that is full
+
+    The bytes depend neither on time, folder nor process; with `compression='none'` not on the order of `write` either.
+    The shard is built in memory, about twice its size at the end, and then written in one go.
+    """
+
+    def __init__(
+        self,
+        path: Path,
+        *,
+        n_records: int,
+        signals: Mapping[str, tuple[int, ...]],
+        params: Sequence[str],
+        attributes: Mapping[str, Attribute],
+        compression: str = "none",
+        sample_type: str = "float32",
+        lives: bool = False,
+    ) -> None:
+        self.path = Path(path)
+        self.n_records = n_records
+        self.signals = {name: tuple(shape) for name, shape in signals.items()}
+        self.attributes = {"schema_version": SCHEMA_VERSION, **attributes}
+        self.compression = compression
+        self.sample_type = sample_type
+        self.scales = {name: SCALES[name] for name in signals if name in SCALES and sample_type == "int16"}
+        self.columns = {name: column for name, column in COLUMNS.items() if lives or name not in LIFE_COLUMNS}
+        for name in params:
+            full_name = f"{PARAMS}/{name}"
+            self.columns[full_name] = Column(
+                name=full_name, dtype="float64", unit="", role="condition", description="drawn or swept value"
+            )
+        _check_declaration(self, params)
+        self._options = creation_options(compression)
+        self.sha256 = ""
+        self.n_bytes = 0
+        self.n_failed = 0
+        self._rows = {
+            **{name: np.zeros(n_records, column.storage_dtype) for name, column in self.columns.items()},
+            **{
+                name: np.zeros((n_records, *shape), SIGNALS[name].storage_dtype)
+                for name, shape in self.signals.items()
+                if not SIGNALS[name].is_bulk
+            },
+            **{scale: np.zeros((n_records, self.signals[name][0]), "<f8") for name, scale in self.scales.items()},
+        }
+        self._written = np.zeros(n_records, dtype=bool)
+        self._file: h5py.File | None = None
+
+    def __enter__(self) -> "ShardWriter":
+        self._file = memory_file()
+        try:
+            for name, value in self.attributes.items():
+                set_attribute(self._file, name, value)
+            for name, shape in self.signals.items():
+                if SIGNALS[name].is_bulk:
+                    self._create_bulk(name, shape)
+        except BaseException:
+            self._close()
+            raise
+        return self
+
+    def __exit__(
+        self, kind: type[BaseException] | None, error: BaseException | None, trace: TracebackType | None
+    ) -> None:
+        try:
+            if kind is None:
+                self._finish()
+        finally:
+            self._close()
+
+    def write(self, row: int, signals: Mapping[str, np.ndarray], values: Mapping[str, str | int | float]) -> None:
+        """Write one record.
+
+        Parameters
+        ----------
+        row : int        0 to n_records - 1, each exactly once
+        signals : dict   every declared signal; a record with status 'failed' may leave floating-point ones out (NaN)
+        values : dict    every column of `COLUMNS` but those in `DEFAULTS`; `params/<name>` left out become NaN
+        """
+        if self._file is None:
+            raise DatasetError(f"{self.path.name}: write is allowed inside the with-block only")
+        if not 0 <= row < self.n_records or self._written[row]:
+            raise DatasetError(
+                f"{self.path.name}: row {row} is out of range or written already; "
+                f"each of 0 to {self.n_records - 1} is written once"
+            )
+        self._refuse_unknown(signals, self.signals)
+        self._refuse_unknown(values, self.columns)
+        encoded = {name: _encoded(column, _value(column, values)) for name, column in self.columns.items()}
+        _check_row(values)
+        failed = encoded["status"] == b"failed"
+        arrays = {name: self._signal(name, signals, failed=failed) for name in self.signals}
+        for name, array in arrays.items():
+            if name in self.scales:
+                array, self._rows[self.scales[name]][row] = quantized(array)
+            if SIGNALS[name].is_bulk:
+                with fixed_settings():
+                    self._file[name][row] = array
+            else:
+                self._rows[name][row] = array
+        for name, value in encoded.items():
+            self._rows[name][row] = value
+        self._written[row] = True
+
+    def _signal(self, name: str, signals: Mapping[str, np.ndarray], *, failed: bool) -> np.ndarray:
+        column, shape = SIGNALS[name], self.signals[name]
+        if name not in signals:
+            if failed and column.storage_dtype.kind == "f":
+                return np.full(shape, np.nan, column.storage_dtype)
+            raise DatasetError(
+                f"{self.path.name}: signal {name} is missing; only a record with status 'failed' may omit it"
+            )
+        given = np.asarray(signals[name])
+        if given.shape != shape or given.dtype.kind not in "fiub":
+            raise DatasetError(
+                f"{self.path.name}: signal {name} has shape {given.shape} and type {given.dtype}, "
+                f"declared is {shape} of {column.dtype}"
+            )
+        with np.errstate(over="ignore"):  # beyond float32 becomes inf, refused below
+            array = given.astype(column.storage_dtype, copy=False)
+        if column.is_bulk and not failed and not np.isfinite(array).all():
+            raise DatasetError(f"{self.path.name}: {name} is not finite; write the record with status 'failed'")
+        return array
+
+    def _create_bulk(self, name: str, shape: tuple[int, ...]) -> None:
+        assert self._file is not None
+        column = SIGNALS[name]
+        scale = self.scales.get(name)
+        properties = h5py.h5p.create(h5py.h5p.DATASET_CREATE)
+        if self.compression == "none":
+            # Space is laid out now, in row order, and not filled first: every row is written anyway.
+            properties.set_alloc_time(h5py.h5d.ALLOC_TIME_EARLY)
+            properties.set_fill_time(h5py.h5d.FILL_TIME_NEVER)
+        data = self._file.create_dataset(
+            name,
+            shape=(self.n_records, *shape),
+            dtype=column.storage_dtype if scale is None else "<i2",
+            chunks=(1, *shape),
+            track_times=False,
+            dcpl=properties,
+            **self._options,
+        )
+        set_attribute(data, "unit", unit_in_file(column, self.attributes) if scale is None else "1")
+        if scale is not None:
+            set_attribute(data, "scale", scale)
+
+    def _refuse_unknown(self, given: Mapping, known: Mapping) -> None:
+        for name in given:
+            if name not in known:
+                near = difflib.get_close_matches(name, list(known), n=3) or sorted(known)[:5]
+                raise DatasetError(f"{self.path.name}: '{name}' is not declared; did you mean {', '.join(near)}?")
+
+    def _finish(self) -> None:
+        assert self._file is not None
+        missing = np.flatnonzero(~self._written)
+        if missing.size:
+            raise DatasetError(
+                f"{self.path.name}: {missing.size} of {self.n_records} rows were never written, "
+                f"the first is row {missing[0]}; write every row"
+            )
+        if len(np.unique(self._rows["record_id"])) != self.n_records:
+            raise DatasetError(f"{self.path.name}: a record_id occurs twice; ids must be unique")
+        for name, rows in self._rows.items():
+            column = SIGNALS.get(name) or self.columns[name]
+            data = self._file.create_dataset(name, data=rows, dtype=column.storage_dtype, track_times=False)
+            set_attribute(data, "unit", unit_in_file(column, self.attributes))
+        self.n_failed = int(np.count_nonzero(self._rows["status"] == b"failed"))
+        with fixed_settings():  # HDF5 compresses what is in its cache now
+            self.sha256, self.n_bytes = publish_image(self._file, self.path)
+
+    def _close(self) -> None:
+        file, self._file = self._file, None
+        if file is not None:
+            file.close()
+
+
+def _check_declaration(writer: ShardWriter, params: Sequence[str]) -> None:
+    """Refuse what could not be read back."""
+    name = writer.path.name
+    for key, given, known in (
+        ("compression", writer.compression, COMPRESSIONS),
+        ("sample_type", writer.sample_type, SAMPLE_TYPES),
+    ):
+        if given not in known:
+            raise DatasetError(f"{name}: {key} '{given}' is unknown; allowed are {', '.join(known)}")
+    if writer.n_records < 1:
+        raise DatasetError(f"{name}: {writer.n_records} records; a shard needs at least 1")
+    for signal, shape in writer.signals.items():
+        own = {key: column for key, column in SIGNALS.items() if key not in SCALES.values()}
+        if signal not in own or len(shape) != len(own[signal].axes) or min(shape) < 1:
+            allowed = ", ".join(f"{key} ({', '.join(column.axes)})" for key, column in own.items())
+            raise DatasetError(f"{name}: signal {signal} of shape {shape} is not allowed; allowed are {allowed}")
+        n_bytes = math.prod(shape) * own[signal].n_bytes
+        if writer.compression == "blosc2" and n_bytes > BLOSC2_CHUNK_LIMIT:
+            raise DatasetError(
+                f"{name}: a record's {signal} has {n_bytes} bytes, blosc2 takes {BLOSC2_CHUNK_LIMIT}; make shorter "
+                "records or choose another compression"
+            )
+    missing = [key for key in REQUIRED_ATTRIBUTES if key not in writer.attributes]
+    if missing or "acceleration" not in writer.signals:
+        raise DatasetError(
+            f"{name}: root attributes missing: {missing or 'none'}; they and the signal acceleration are required"
+        )
+    if writer.attributes["schema_version"] != SCHEMA_VERSION:
+        raise DatasetError(
+            f"{name}: schema_version {writer.attributes['schema_version']}, this writer makes {SCHEMA_VERSION}"
+        )
+    channels = writer.attributes["channel_names"]
+    if not isinstance(channels, Sequence) or len(channels) != writer.signals["acceleration"][0]:
+        raise DatasetError(f"{name}: channel_names {channels!r} for {writer.signals['acceleration'][0]} channels")
+    bad = [param for param in params if not _PARAM_NAME.fullmatch(param)]
+    if bad or len(set(params)) != len(params):
+        raise DatasetError(
+            f"{name}: params {bad or list(params)} are refused; use distinct names of letters, digits, '_', '.', '-'"
+        )
+
+
+def _value(column: Column, values: Mapping[str, str | int | float]) -> str | int | float:
+    if column.name in values:
+        return values[column.name]
+    if column.name in DEFAULTS:
+        return DEFAULTS[column.name]
+    if column.name.startswith(f"{PARAMS}/"):
+        return math.nan
+    raise DatasetError(f"column {column.name} is missing ({column.description}); every record needs it")
+
+
+def _encoded(column: Column, value: str | int | float) -> bytes | int | float:
+    """The value as it is stored; DatasetError when it does not fit the column."""
+    try:
+        if column.is_text:
+            if not isinstance(value, str) or "\0" in value:
+                raise TypeError
+            if column.name == "status_reason":
+                return stored_reason(value).encode("ascii")
+            encoded = value.encode("ascii")
+            if len(encoded) > column.n_bytes:
+                raise OverflowError
+            return encoded
+        if column.storage_dtype.kind == "f":
+            if isinstance(value, str):
+                raise TypeError
+            return math.nan if math.isnan(value) else float(value)
+        integer = operator.index(value)  # type: ignore[arg-type]
+        if not np.iinfo(column.dtype).min <= integer <= np.iinfo(column.dtype).max:
+            raise OverflowError
+        return integer
+    except (TypeError, ValueError, OverflowError) as error:
+        kind = f"ASCII text of at most {column.n_bytes} bytes" if column.is_text else f"value of type {column.dtype}"
+        raise DatasetError(f"column {column.name}: {value!a} is no {kind}; give {column.description}") from error
+
+
+def _check_row(values: Mapping[str, str | int | float]) -> None:
+    status = values.get("status", "ok")
+    if status not in ("ok", "failed"):
+        raise DatasetError(f"column status: {status!r} is unknown; allowed are 'ok' and 'failed'")
+    if not 0.0 <= float(values["severity"]) <= 1.0:
+        raise DatasetError(f"column severity: {values['severity']} is outside 0 (healthy) to 1")

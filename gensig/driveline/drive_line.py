@@ -1,0 +1,189 @@
+"""A drive line from two tables, or a single pair as one: what its modes are asked of."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from dataclasses import dataclass
+from typing import Any
+
+import numpy as np
+
+from gensig.driveline.linear.dampers import with_dampers
+from gensig.driveline.linear.matrices import LineMatrices, line_matrices
+from gensig.driveline.linear.modal import Modes, natural_modes
+from gensig.driveline.linear.shaft_line import GearMesh, LineGear, Node, Shaft, ShaftLine
+from gensig.driveline.options import Campbell, read_options
+from gensig.driveline.shaft_tables import read_gears, read_shafting, shipped_tables
+from gensig.driveline.table_rows import (
+    check_gears_in_mesh,
+    check_whole,
+    ends_of,
+    gear_of,
+    line_gear,
+    mesh_of,
+    node_of,
+    rows_of_nodes,
+    shaft_of,
+)
+from gensig.dynamics.pair import Rotor
+from gensig.errors import ConfigError
+from gensig.geometry.contact import GearPair
+from gensig.systems.pair_machine import PairMachine, Run
+from gensig.systems.registry import read_material, section
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class DriveLine:
+    """A line with what its tables say beyond its matrices.
+
+    ``numbers`` (node,) as the table counts them, rings of dampers on from there; ``pairs`` (mesh,) the driving gear as
+    pinion; ``record_mesh`` the numbers of the nodes whose mesh records are made of; ``slices_helical`` whether helical
+    meshes in time are sliced teeth; ``motor_node``, ``load_node`` those of a motor and its load; ``support_force`` N is
+    that for which the one support of all gears is taken, None without lateral motion.
+    """
+
+    name: str
+    line: ShaftLine
+    numbers: tuple[int, ...]
+    pairs: tuple[GearPair, ...]
+    lateral: bool
+    campbell: Campbell
+    record_mesh: tuple[int, ...] | None = None
+    slices_helical: bool = False
+    motor_node: int | None = None
+    load_node: int | None = None
+    support_force: float | None = None
+
+    def matrices(self, *, merge_rigid: bool = False) -> LineMatrices:
+        """Mass, damping and stiffness, the meshes apart; merged for integration, as the table has them for modes."""
+        return line_matrices(self.line, merge_rigid=merge_rigid, lateral=self.lateral)
+
+    def modes(self) -> Modes:
+        """Natural modes with every mesh at its stiffness."""
+        return natural_modes(self.matrices())
+
+    @property
+    def mesh_orders(self) -> tuple[float, ...]:
+        """Tooth meshing frequency of every mesh over the speed of the first node, (mesh,)."""
+        speed = np.abs(self.line.speed_ratio)
+        gears = self.line.gears
+        return tuple(float(speed[gears[mesh.driving].node] * gears[mesh.driving].n_teeth) for mesh in self.line.meshes)
+
+    @property
+    def campbell_orders(self) -> tuple[float, ...]:
+        """Orders of the Campbell diagram: as given, or the turn, its double, every mesh and its double."""
+        if self.campbell.orders is not None:
+            return self.campbell.orders
+        return tuple(sorted({factor * order for order in (1.0, *self.mesh_orders) for factor in (1.0, 2.0)}))
+
+
+def read_drive_line(config: Mapping[str, Any]) -> DriveLine:
+    """Build the drive line of a configuration from its tables.
+
+    Raises
+    ------
+    ConfigError    with file, row and column, for tables that make no machine
+    """
+    options = read_options(section(config, "system"))
+    if options.shafting_csv is None:
+        raise ConfigError(
+            f"system.shafting_csv is required: give a path, or one of {', '.join(shipped_tables())}; "
+            "docs/howto/your_drive_line.md says what is in it"
+        )
+    material = read_material(config)
+    shafting = read_shafting("system.shafting_csv", options.shafting_csv)
+    gear_rows = [] if options.gears_csv is None else read_gears("system.gears_csv", options.gears_csv)
+    node_rows = rows_of_nodes(shafting)
+    numbers = tuple(node_rows)
+    if options.viscous_damper_node not in (None, *numbers):
+        raise ConfigError(
+            f"system.viscous_damper_node = {options.viscous_damper_node}: {options.shafting_csv} has no such node"
+        )
+    shapes = [gear_of(row) for row in gear_rows]
+    gears = [line_gear(row, shape, numbers, options, material) for row, shape in zip(gear_rows, shapes, strict=True)]
+    nodes = tuple(node_of(row, place, gears, shapes, options, material) for place, row in enumerate(node_rows.values()))
+    shafts, meshes, pairs = [], [], []
+    for row in shafting:
+        ends = ends_of(row, numbers)
+        if ends is None:
+            continue
+        if row.text("edge_kind") == "gear_mesh":
+            pair, mesh = mesh_of(row, ends, numbers, gears, shapes, options)
+            pairs.append(pair)
+            meshes.append(mesh)
+        else:
+            shafts.append(shaft_of(row, ends, options.loss_factor))
+    line = ShaftLine(nodes=nodes, shafts=tuple(shafts), gears=tuple(gears), meshes=tuple(meshes))
+    check_gears_in_mesh(gear_rows, line)
+    check_whole(list(node_rows.values()), numbers, line)
+    line, numbers = with_dampers(line, numbers, options.dampers)
+    return DriveLine(
+        name=options.name,
+        line=line,
+        numbers=numbers,
+        pairs=tuple(pairs),
+        lateral=options.lateral,
+        campbell=options.campbell,
+        record_mesh=options.record_mesh,
+        slices_helical=options.helical_meshes == "sliced",
+        motor_node=options.motor_node,
+        load_node=options.load_node,
+        support_force=options.support.force if options.lateral else None,
+    )
+
+
+def drive_line_of_pair(system: PairMachine, name: str) -> DriveLine:
+    """A single pair, with its motor and load, as the line of two to four nodes that it is; without the soft drive.
+
+    The mesh is held at the mean stiffness of sound teeth under the set torque.
+    """
+    dynamics = Run(system=system, faults=()).dynamics()
+    pair = system.pair
+    sides = (("pinion", pair.pinion, dynamics.pinion, system.motor), ("wheel", pair.wheel, dynamics.wheel, system.load))
+    nodes = [Node(name=side, inertia=body.inertia) for side, _, body, _ in sides]
+    gears = [
+        LineGear(
+            name=side,
+            node=place,
+            n_teeth=gear.n_teeth,
+            base_radius=gear.base_radius,
+            mass=body.mass,
+            support=body.support,
+        )
+        for place, (side, gear, body, _) in enumerate(sides)
+    ]
+    shafts = []
+    for place, (rotor_name, (_, _, body, rotor)) in enumerate(zip(("motor", "load"), sides, strict=True)):
+        if rotor is not None:
+            shafts.append(_coupling(rotor, place, len(nodes), body.inertia))
+            nodes.append(Node(name=rotor_name, inertia=rotor.inertia))
+    mesh = GearMesh(
+        driving=0,
+        driven=1,
+        stiffness=dynamics.mean_mesh_stiffness,
+        damping=dynamics.mesh_damping,
+        backlash=pair.backlash,
+        pressure_angle=pair.working_pressure_angle,
+    )
+    n_teeth = pair.pinion.n_teeth
+    return DriveLine(
+        name=name,
+        line=ShaftLine(nodes=tuple(nodes), shafts=tuple(shafts), gears=tuple(gears), meshes=(mesh,)),
+        numbers=tuple(range(1, len(nodes) + 1)),
+        pairs=(pair,),
+        lateral=True,
+        campbell=Campbell(
+            low_speed=0.0,
+            high_speed=1.5 * system.operating.speed,
+            orders=(1.0, *(float(n_teeth * harmonic) for harmonic in range(1, 5))),
+        ),
+    )
+
+
+def _coupling(rotor: Rotor, gear_node: int, rotor_node: int, gear_inertia: float) -> Shaft:
+    return Shaft(
+        first=gear_node,
+        second=rotor_node,
+        stiffness=rotor.coupling_stiffness,
+        damping=rotor.coupling_damping(gear_inertia),
+    )

@@ -1,0 +1,135 @@
+"""An engine or a motor on its drive line: the group ``excitation`` on nodes of the tables, and the steady answer."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from dataclasses import dataclass, replace
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from gensig.driveline.drive_line import DriveLine, read_drive_line
+from gensig.driveline.excitation.cycle import CYCLE
+from gensig.driveline.excitation.engine import check_group, read_engine, read_wheels
+from gensig.driveline.excitation.engine_torques import Engine, engine_torques
+from gensig.driveline.excitation.line_torques import LineTorques
+from gensig.driveline.excitation.motor import KIND, read_motor
+from gensig.driveline.excitation.motor_torques import MotorDrive, motor_torques
+from gensig.driveline.linear.forced import (
+    Elements,
+    LinearLine,
+    SteadyResponse,
+    closed_line,
+    over_cycle,
+    steady_response,
+)
+from gensig.driveline.linear.matrices import LineMatrices
+from gensig.errors import ConfigError
+from gensig.sensing.toothed_wheel import ToothedWheel, draw_wheel, instantaneous_speed
+from gensig.systems.registry import LINE, section
+
+Array = NDArray[np.float64]
+
+SAMPLES_PER_CYCLE = 7200  # about 100 kHz at 1688 r/min
+SEEN_CYCLES = 6
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class EngineLine:
+    """A drive line and the engine that turns it; degrees of freedom are the nodes, then lateral motion if any.
+
+    ``engine`` may be a motor with its load: the crank is then the motor's shaft, the brake torque what the load takes.
+    """
+
+    drive: DriveLine
+    engine: Engine | MotorDrive
+    wheels: Mapping[str, ToothedWheel]
+
+    @property
+    def ratios(self) -> dict[int, float]:
+        """Speed of every node over the crank's, by its number, positive."""
+        crank = abs(self.drive.line.speed_ratio[self._place(self.engine.driving_nodes[0], "throw_nodes")])
+        ratios = np.abs(self.drive.line.speed_ratio) / crank
+        return {number: float(ratio) for number, ratio in zip(self.drive.numbers, ratios, strict=True)}
+
+    @property
+    def mesh_names(self) -> tuple[str, ...]:
+        """Numbers of the two nodes of each mesh with a slash, (mesh,)."""
+        gears, numbers = self.drive.line.gears, self.drive.numbers
+        return tuple(
+            f"{numbers[gears[mesh.driving].node]}/{numbers[gears[mesh.driven].node]}" for mesh in self.drive.line.meshes
+        )
+
+    def linear(self) -> tuple[LinearLine, Elements]:
+        """The line whose meshes never part, and its meshes."""
+        return closed_line(self.matrices())
+
+    def matrices(self, *, merge_rigid: bool = False) -> LineMatrices:
+        """Those of the line, with what the torques of motor and loads give way to speed."""
+        matrices, slopes = self.drive.matrices(merge_rigid=merge_rigid), self.engine.dampers(self.ratios)
+        if not slopes:
+            return matrices
+        damping = matrices.damping.copy()
+        for node, slope in slopes.items():
+            dof = int(np.argmax(matrices.expand[self.drive.numbers.index(node)]))
+            damping[dof, dof] += slope
+        return replace(matrices, damping=damping)
+
+    def torques(self, speed: float, torque: float | None) -> LineTorques:
+        """What acts at a speed of the crank (rad/s) and a brake torque (N m)."""
+        if isinstance(self.engine, Engine):
+            return engine_torques(self.engine, speed, torque, self.ratios)
+        assert torque is not None
+        return motor_torques(self.engine, speed, torque, self.ratios)
+
+    def load_at(self, torque: float | Array, speed_share: float | Array) -> Any:
+        """The brake torque at a share of the speed at which it is ``torque`` N m, by the law of the load."""
+        return torque * speed_share**self.engine.load_exponent
+
+    def on_line(self, torques: LineTorques) -> Array:
+        """Torques on the degrees of freedom, (dof, point) N m."""
+        rows = torques.on(self.drive.numbers)
+        n_dofs = len(self.drive.matrices().mass)
+        return np.asarray(np.concatenate([rows, np.zeros((n_dofs - len(rows), rows.shape[1]))]))
+
+    def response(self, speed: float, torque: float | None) -> SteadyResponse:
+        """Steady vibration at a speed of the crank (rad/s) and a brake torque (N m)."""
+        return steady_response(self.linear()[0], self.on_line(self.torques(speed, torque)), speed)
+
+    def seen_by(self, wheel: ToothedWheel, response: SteadyResponse, rng: np.random.Generator) -> Array:
+        """Speed that a toothed wheel of this machine shows, over `SEEN_CYCLES` cycles, (sample,) rad/s."""
+        place = self._place(wheel.node, "toothed_wheels")
+        one = over_cycle(response.angle[place], SAMPLES_PER_CYCLE)
+        crank = CYCLE / SAMPLES_PER_CYCLE * np.arange(SEEN_CYCLES * SAMPLES_PER_CYCLE)
+        angle = np.asarray(self.ratios[wheel.node] * crank + np.tile(one, SEEN_CYCLES), dtype=np.float64)
+        rate = SAMPLES_PER_CYCLE * response.speed / CYCLE
+        return instantaneous_speed(wheel, draw_wheel(rng, wheel), angle, rate)
+
+    def _place(self, number: int, key: str) -> int:
+        if number not in self.drive.numbers:
+            raise ConfigError(f"excitation.{key}: the shaft line has no node {number}")
+        return self.drive.numbers.index(number)
+
+
+def read_engine_line(config: Mapping[str, Any]) -> EngineLine:
+    """The drive line and the engine, or motor, of a configuration.
+
+    Raises
+    ------
+    ConfigError    for a system that is no drive line, none or an ill excitation, nodes that the tables have not
+    """
+    kind = section(config, "system").get("kind")
+    if kind != LINE:
+        raise ConfigError(
+            f"system.kind = {kind!r} is no drive line; take system=engine_gear_train, two_stage_gearbox or shaft_line"
+        )
+    if config.get("excitation") is None:
+        raise ConfigError(
+            "no excitation is chosen; take excitation=engine_v20, motor_and_load, or your own option of that group"
+        )
+    values = config["excitation"]
+    check_group("excitation", values)
+    drive = read_drive_line(config)
+    engine = read_motor(values, drive) if values.get("kind") == KIND else read_engine(values)
+    return EngineLine(drive=drive, engine=engine, wheels=read_wheels(values))

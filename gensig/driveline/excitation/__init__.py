@@ -1,0 +1,1 @@
+"""Torques on a drive line: engine, motor, and what they drive."""

@@ -1,0 +1,153 @@
+"""The group ``excitation`` of a configuration: an engine and what it drives."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from typing import Any
+
+from gensig.driveline.excitation.cams import Cam
+from gensig.driveline.excitation.cycle import Cylinder
+from gensig.driveline.excitation.engine_torques import Dynamometer, Engine, ValveTrain
+from gensig.driveline.excitation.firing import Layout
+from gensig.driveline.excitation.injection_pump import Plunger
+from gensig.driveline.excitation.line_torques import Load, Reference
+from gensig.driveline.excitation.pressure import PressureFile, WiebeCycle
+from gensig.errors import ConfigError
+from gensig.sensing.toothed_wheel import ToothedWheel
+from gensig.units import read, to_si
+
+PLACE = "excitation"
+KEYS = (
+    "kind",
+    "reference",
+    "cylinder",
+    "layout",
+    "pressure",
+    "crankcase_pressure_mpa",
+    "friction_mean_pressure_mpa",
+    "throw_nodes",
+    "valves",
+    "valve_nodes",
+    "injection_pump",
+    "loads",
+    "dynamometer",
+    "toothed_wheels",
+)
+
+
+def read_engine(values: Mapping[str, Any]) -> Engine:
+    """An engine of the boundary keys of the group ``excitation``.
+
+    Raises
+    ------
+    ConfigError    for unknown or missing keys, and values that make no engine
+    """
+    check_group(PLACE, values)
+    if values.get("kind", "engine") != "engine":
+        raise ConfigError(f"{PLACE}.kind = {values['kind']!r}; allowed: engine, motor_and_load")
+    if "motor" in values:
+        raise ConfigError(
+            f"{PLACE}.motor is of a motor, {PLACE}.kind = engine of an engine: a line is turned by one of them; take "
+            "excitation=engine_v20 or excitation=motor_and_load"
+        )
+    for key in values:
+        if key not in KEYS:
+            raise ConfigError(f"{PLACE}: unknown key '{key}'; known: {', '.join(KEYS)}")
+    if missing := [key for key in KEYS if key not in values]:
+        raise ConfigError(f"{PLACE}: missing {', '.join(missing)}")
+    plunger, plunger_nodes = _read_pump(values["injection_pump"])
+    return Engine(
+        cylinder=read(Cylinder, values["cylinder"], f"{PLACE}.cylinder"),
+        layout=read(Layout, values["layout"], f"{PLACE}.layout"),
+        pressure=_read_pressure(values["pressure"]),
+        crankcase_pressure=_number("crankcase_pressure_mpa", values),
+        friction_mean_pressure=_number("friction_mean_pressure_mpa", values),
+        reference=read(Reference, values["reference"], f"{PLACE}.reference"),
+        throw_nodes=_whole_numbers("throw_nodes", values["throw_nodes"]),
+        valve_trains={name: _read_train(name, one) for name, one in named_groups("valves", values["valves"])},
+        valve_nodes={
+            name: _whole_numbers(f"valve_nodes.{name}", one)
+            for name, one in named_groups("valve_nodes", values["valve_nodes"])
+        },
+        plunger=plunger,
+        plunger_nodes=plunger_nodes,
+        loads={
+            name: read_named(Load, one, f"loads.{name}", "load") for name, one in named_groups("loads", values["loads"])
+        },
+        dynamometer=read(Dynamometer, values["dynamometer"], f"{PLACE}.dynamometer"),
+    )
+
+
+def read_wheels(values: Mapping[str, Any]) -> dict[str, ToothedWheel]:
+    """The toothed wheels of the group ``excitation``, by their names; none where it is null."""
+    check_group(PLACE, values)
+    return {
+        name: read_named(ToothedWheel, one, f"toothed_wheels.{name}", "toothed_wheel")
+        for name, one in named_groups("toothed_wheels", values.get("toothed_wheels"))
+    }
+
+
+def _read_pressure(values: Any) -> WiebeCycle | PressureFile:
+    """The cycle, or the file in its place where one is given."""
+    check_group(f"{PLACE}.pressure", values)
+    cycle = read(WiebeCycle, {key: one for key, one in values.items() if key != "file"}, f"{PLACE}.pressure")
+    if values.get("file") is None:
+        return cycle
+    return read(PressureFile, {"file": values["file"]}, f"{PLACE}.pressure")
+
+
+def _read_train(name: str, values: Any) -> ValveTrain:
+    place = f"{PLACE}.valves.{name}"
+    check_group(place, values)
+    own = {key: one for key, one in values.items() if key != "cam"}
+    return read(ValveTrain, own, place, cam=read_named(Cam, values.get("cam"), f"valves.{name}.cam", "cam"))
+
+
+def _read_pump(values: Any) -> tuple[Plunger | None, dict[str, int]]:
+    """The plunger and its node for each cylinder; null is an engine without this pump, with a common rail."""
+    if values is None:
+        return None, {}
+    place = f"{PLACE}.injection_pump"
+    check_group(place, values)
+    own = {key: one for key, one in values.items() if key not in ("cam", "nodes", "cylinders")}
+    nodes, cylinders = _whole_numbers("injection_pump.nodes", values.get("nodes")), values.get("cylinders")
+    if not isinstance(cylinders, list | tuple) or len(set(cylinders)) != len(nodes) or len(cylinders) != len(nodes):
+        raise ConfigError(f"{place}.cylinders must name a different cylinder for each of its {len(nodes)} nodes")
+    plunger = read(Plunger, own, place, cam=read_named(Cam, values.get("cam"), "injection_pump.cam", "cam"))
+    return plunger, dict(zip(cylinders, nodes, strict=True))
+
+
+def read_named(cls: type[Any], values: Any, place: str, name: str) -> Any:
+    """A dataclass whose own errors begin with ``name``: with the whole place instead."""
+    check_group(f"{PLACE}.{place}", values)
+    try:
+        return read(cls, values, name)
+    except ConfigError as error:
+        raise ConfigError(f"{PLACE}.{place}{str(error).removeprefix(name)}") from None
+
+
+def named_groups(key: str, values: Any) -> list[tuple[str, Any]]:
+    """Names and values of a group that may be null."""
+    if values is None:
+        return []
+    check_group(f"{PLACE}.{key}", values)
+    return [(str(name), one) for name, one in values.items()]
+
+
+def check_group(place: str, values: Any) -> None:
+    """Raise for anything that is no group of keys."""
+    if not isinstance(values, Mapping):
+        raise ConfigError(f"{place} = {values!r} must be a group of keys, not one value")
+
+
+def _whole_numbers(key: str, values: Any) -> tuple[int, ...]:
+    if not isinstance(values, list | tuple) or not all(type(one) is int for one in values):
+        raise ConfigError(f"{PLACE}.{key} = {values!r} is not a list of whole numbers")
+    return tuple(values)
+
+
+def _number(key: str, values: Mapping[str, Any]) -> float:
+    value = values[key]
+    if isinstance(value, bool) or not isinstance(value, int | float):
+        raise ConfigError(f"{PLACE}.{key} = {value!r} is not a number")
+    return to_si(key, float(value))

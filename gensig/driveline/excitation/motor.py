@@ -1,0 +1,100 @@
+"""The group ``excitation`` of a configuration whose line a motor turns: ``kind: motor_and_load``."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from dataclasses import dataclass
+from typing import Any
+
+from gensig.driveline.drive_line import DriveLine
+from gensig.driveline.excitation.engine import KEYS as ENGINE_KEYS
+from gensig.driveline.excitation.engine import PLACE, check_group, named_groups, read_named
+from gensig.driveline.excitation.line_torques import Load, Reference
+from gensig.driveline.excitation.motor_torques import MotorDrive, TorqueRipple
+from gensig.errors import ConfigError
+from gensig.units import read
+
+KIND = "motor_and_load"
+KEYS = ("kind", "reference", "motor", "load", "loads", "toothed_wheels")
+TOGETHER = "the tables want system.motor_node, system.load_node and, for records, system.record_mesh of their own"
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class _Motor:
+    """Keys of ``excitation.motor``."""
+
+    slip: float
+    torque_ripple: TorqueRipple | None
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class _Load:
+    """Keys of ``excitation.load``."""
+
+    law: str
+
+
+def read_motor(values: Mapping[str, Any], drive: DriveLine) -> MotorDrive:
+    """A motor and its load on the nodes that ``system.motor_node`` and ``system.load_node`` name.
+
+    Raises
+    ------
+    ConfigError    for unknown or missing keys, nodes that the line has not, an engine beside the motor
+    """
+    if both := [key for key in values if key in ENGINE_KEYS and key not in KEYS]:
+        raise ConfigError(
+            f"{PLACE}.{both[0]} is of an engine, {PLACE}.kind = {KIND} of a motor: a line is turned by one of them; "
+            "take excitation=motor_and_load or excitation=engine_v20"
+        )
+    for key in values:
+        if key not in KEYS:
+            raise ConfigError(f"{PLACE}: unknown key '{key}'; known: {', '.join(KEYS)}")
+    if missing := [key for key in KEYS if key not in values]:
+        raise ConfigError(f"{PLACE}: missing {', '.join(missing)}")
+    given = values["motor"]
+    check_group(f"{PLACE}.motor", given)
+    ripple = given.get("torque_ripple")
+    own = {key: one for key, one in given.items() if key != "torque_ripple"}
+    motor = read(
+        _Motor,
+        own,
+        f"{PLACE}.motor",
+        torque_ripple=None
+        if ripple is None
+        else read_named(TorqueRipple, ripple, "motor.torque_ripple", "torque_ripple"),
+    )
+    loads = {
+        name: read_named(Load, one, f"loads.{name}", "load") for name, one in named_groups("loads", values["loads"])
+    }
+    for name, load in loads.items():
+        if load.node not in drive.numbers:
+            raise ConfigError(f"{PLACE}.loads.{name}.node: {_no_node(drive, load.node)}")
+    return MotorDrive(
+        reference=read(Reference, values["reference"], f"{PLACE}.reference"),
+        motor_node=_node(drive, "motor_node", "a motor", drive.motor_node),
+        load_node=_node(drive, "load_node", "its load", drive.load_node),
+        slip=motor.slip,
+        ripple=motor.torque_ripple,
+        load_law=read(_Load, values["load"], f"{PLACE}.load").law,
+        loads=loads,
+    )
+
+
+def _node(drive: DriveLine, key: str, what: str, node: int | None) -> int:
+    """A node of the line; the motor's turns as fast as the first one, to which all speeds refer."""
+    if node is None:
+        numbers = ", ".join(map(str, drive.numbers))
+        raise ConfigError(f"system.{key} = null: {PLACE}={KIND} needs the node of {what}, one of {numbers}; {TOGETHER}")
+    if node not in drive.numbers:
+        raise ConfigError(f"system.{key} = {node}: {_no_node(drive, node)}; {TOGETHER}")
+    ratio = abs(float(drive.line.speed_ratio[drive.numbers.index(node)]))
+    if key == "motor_node" and abs(ratio - 1.0) > 1e-9:
+        raise ConfigError(
+            f"system.motor_node = {node} turns {ratio:.4g} times as fast as the first node, to which speeds refer; put "
+            "the motor's row first in system.shafting_csv"
+        )
+    return node
+
+
+def _no_node(drive: DriveLine, node: int) -> str:
+    return f"the shaft line has no node {node}; it has {', '.join(map(str, drive.numbers))}"

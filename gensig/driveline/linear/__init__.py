@@ -1,0 +1,1 @@
+"""Linear vibration of a drive line: matrices, modes, forced response, dampers."""

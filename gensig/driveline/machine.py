@@ -1,0 +1,429 @@
+"""Records of an engine's drive line: one mesh of it by its own teeth, with the faults and units of every data set.
+
+The machine answers as a gear pair does: its ``pair`` is the driving and the driven gear of that mesh, ``operating`` its
+driving shaft. ``docs/theory/shaft_line_records.md``.
+"""
+
+from __future__ import annotations
+
+import math
+import warnings
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass, replace
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from gensig.driveline import loads
+from gensig.driveline.engine_line import EngineLine, read_engine_line
+from gensig.driveline.excitation.engine_torques import Engine
+from gensig.driveline.mesh_phase import start_phase
+from gensig.driveline.running import (
+    EngineCourse,
+    Governor,
+    OwnMesh,
+    RunningLine,
+    mesh_forces,
+    named_by_side,
+    one_thread,
+    reference_force,
+    running_line,
+    steady_course,
+    with_supports,
+)
+from gensig.driveline.teeth import (
+    ToothLaw,
+    neighbour_meshes,
+    require_drive,
+    sound_meshes,
+    start_of,
+    tooth_table,
+)
+from gensig.driveline.time.newmark import LineMotion, LineSolver
+from gensig.dynamics.integrator import Solver, check_memory
+from gensig.dynamics.pair import Body, Support
+from gensig.errors import ConfigError, SimulationError
+from gensig.faults.base import Fault
+from gensig.mesh.modification import PLAIN, sound_teeth
+from gensig.mesh.options import SliceOptions, read_mesh_options, read_slice_options
+from gensig.mesh.pair_table import PairTable
+from gensig.mesh.sliced.sliced_table import SlicedTable
+from gensig.operation.options import read_operating
+from gensig.sensing.encoder import Disc
+from gensig.sensing.manufacturing import Quality, Specimen, perfect_specimen
+from gensig.sensing.options import read_sensing
+from gensig.sensing.toothed_wheel import ToothedWheel, draw_wheel, instantaneous_speed
+from gensig.systems.pair_machine import CleanRecord, PairMachine, Run, Start
+from gensig.systems.registry import read_heat, read_material, read_modification, section
+from gensig.systems.stiffness_curves import StiffnessCurves, stiffness_curves
+from gensig.systems.supports import in_gearbox
+from gensig.units import SPEED, read
+
+Array = NDArray[np.float64]
+
+SETTLING = 0.3  # s before a record, in which what the start from the linear vibration leaves dies away
+MOST_ENERGY_RESIDUAL = 1e-3
+KNOT = 5e-3  # s between the knots of a course that changes
+AFTER = 0.2  # s for which a course is told after a record: the low-pass looks ahead
+FAR_ABOVE = 3.0  # of the force of the supports; the stiffness of a ball bearing follows its third root
+SIDES = ("pinion", "wheel")
+AXES = ("x", "y")
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class LineMachine(PairMachine):
+    """An engine on its drive line; ``place`` is the mesh of the line whose teeth are followed one by one."""
+
+    engine: EngineLine
+    place: int
+    slices: SliceOptions
+
+    @property
+    def ratio(self) -> float:
+        """Speed of the driving gear's shaft over the crank's."""
+        return self.engine.ratios[self.driving_node]
+
+    @property
+    def driving_node(self) -> int:
+        """Number of the node that carries the driving gear of the record mesh."""
+        drive = self.engine.drive
+        return drive.numbers[drive.line.gears[drive.line.meshes[self.place].driving].node]
+
+    @property
+    def line_solver(self) -> LineSolver:
+        """Steps of the integration in time, and the energy residual above which a record fails."""
+        return LineSolver(
+            sampling_rate=self.sensing.sampling_rate,
+            oversampling=self.solver.oversampling,
+            max_energy_residual=MOST_ENERGY_RESIDUAL,
+        )
+
+    @property
+    def channels(self) -> tuple[str, ...]:
+        """What can be recorded: turning and, with lateral motion, bearing of both gears, and the toothed wheels."""
+        lateral = [f"{side}_{axis}" for side in SIDES for axis in AXES] if self.engine.drive.lateral else []
+        return (*(f"{side}_rotation" for side in SIDES), *lateral, *(f"{name}{SPEED}" for name in self.engine.wheels))
+
+    @property
+    def most_pairs(self) -> int:
+        """Nothing: the loads of teeth are not told."""
+        raise ConfigError("dataset.store_mesh_state: a drive line does not tell the loads of its teeth; take false")
+
+    @property
+    def torque_of(self) -> str:
+        """The load or the brake: torques are told at the shaft that turns the line, whichever mesh is followed."""
+        return "brake, at the crank" if isinstance(self.engine.engine, Engine) else "load, as the motor feels it"
+
+    @property
+    def load_exponent(self) -> int:
+        """Power of the speed that the torque of the load follows."""
+        return self.engine.engine.load_exponent
+
+    @property
+    def mesh_force(self) -> float:
+        """Mean normal force of the mesh at the set-point, N, or what closes it by 2 um."""
+        return reference_force(self.engine, self.place, float(self.mesh_forces[self.place]))
+
+    @property
+    def mesh_forces(self) -> Array:
+        """Mean normal forces of all meshes at the set-point, (mesh,) N."""
+        return mesh_forces(self.engine, self.operating.speed / self.ratio, self.operating.torque)
+
+    @property
+    def law(self) -> ToothLaw:
+        """What all teeth have in common."""
+        return ToothLaw(material=self.material, options=self.mesh, slices=self.slices)
+
+    def mesh_table(self, faults: Sequence[Fault] = ()) -> PairTable | SlicedTable:
+        """Tables of the mesh with the given faults."""
+        return tooth_table(self.law, self.pair, tuple(faults), self.mesh_force)
+
+    def stiffness_curves(
+        self, faults: Sequence[Fault] = (), *, n_positions: int = 201, points_per_tooth: int = 100
+    ) -> StiffnessCurves:
+        """Those of the mesh that records follow, under its mean force; ConfigError where its gears are helical."""
+        table = self.mesh_table(faults)
+        if not isinstance(table, PairTable):
+            raise ConfigError(
+                f"system.record_mesh {self.engine.mesh_names[self.place]} is of helical gears, which have their "
+                "stiffness slice by slice; choose a spur mesh, or take its gears with gensig stiffness "
+                "system=helical_pair"
+            )
+        whole = sound_teeth(self.pair, PLAIN)
+        return stiffness_curves(self, table, faults, whole, n_positions=n_positions, points_per_tooth=points_per_tooth)
+
+    def require_drive(self) -> None:
+        """Raise unless at least one pair is always in contact, by the overlap of the face too."""
+        require_drive(self.pair, self.slices)
+
+    def check(self) -> None:
+        """Raise for what would stop every record."""
+        self.require_drive()
+        sensing = self.sensing
+        if unknown := [name for name in sensing.channels if name not in self.channels]:
+            more = "" if self.engine.drive.lateral else "; with system.lateral=true also pinion_x and the like"
+            raise ConfigError(
+                f"sensing.channels: no channel {', '.join(unknown)}; allowed: {', '.join(self.channels)}{more}"
+            )
+        if sensing.path is not None or sensing.n_lead or sensing.nuisances:
+            raise ConfigError(
+                "sensing: records of a drive line have no transfer path, nuisances or sensor dynamics; take "
+                "sensing=shaft_line"
+            )
+        if self.mesh.law != "one_sided":
+            raise ConfigError(f"mesh.law = {self.mesh.law}: the meshes of a drive line are one-sided")
+        if self.solver.precision != "float64":
+            raise ConfigError(f"solver.precision = {self.solver.precision}: a drive line is integrated in float64")
+        self._warn_of_supports()
+        self.quality.check_covered(self.pair.pinion, self.pair.wheel)
+        check_memory(self.operating.duration, sensing.sampling_rate, len(sensing.channels), self.solver.precision)
+        self.mesh_table()
+
+    def _warn_of_supports(self) -> None:
+        """Warn where gears bear far more than the one support that all of them are on is taken for."""
+        drive, rated = self.engine.drive, self.engine.drive.support_force
+        if rated is None:
+            return
+        force = np.abs(self.mesh_forces)
+        heavy = [place for place in range(len(force)) if force[place] > FAR_ABOVE * rated]
+        if heavy:
+            told = ", ".join(f"{self.engine.mesh_names[place]} {force[place]:.0f} N" for place in heavy)
+            warnings.warn(
+                f"{drive.name}: mean tooth forces of meshes {told}, but every gear is on a support for "
+                f"system.support.force_n = {rated:g} N, less stiff than bearings so loaded; set it, and bearing and "
+                "shaft, to those of the gears of system.record_mesh",
+                UserWarning,
+                stacklevel=2,
+            )
+
+    def driven_tooth(self, tooth_pinion: int, drawn: int) -> int:
+        """Tooth of the driven gear at the start: in a drive that turns once a cycle the marks of its timing say it.
+
+        Where the gears do not come back to each other after every cycle, the drawn one.
+        """
+        pinion, wheel = self.pair.pinion.n_teeth, self.pair.wheel.n_teeth
+        is_timed = isinstance(self.engine.engine, Engine) and round(2.0 * self.ratio) == 1 and pinion % wheel == 0
+        return tooth_pinion % wheel if is_timed else drawn
+
+    def draw_discs(self, rng: np.random.Generator) -> tuple[Disc, ...]:
+        """The toothed wheels of one gearbox with their errors."""
+        return tuple(draw_wheel(rng, wheel) for wheel in self.engine.wheels.values())
+
+    def mesh_torques(self, speed: float, torque: float) -> Array:
+        """Loads that a tooth of the record mesh meets at a set-point, one a mesh, as torques of the pinion.
+
+        Parameters
+        ----------
+        speed : rad/s    of the pinion's shaft
+        torque : N m     brake torque at the crank
+
+        Returns
+        -------
+        (mesh,) N m      all equally likely
+
+        The sound, nominal machine runs ``loads.SECONDS`` s at the set-point. Every pair of teeth that
+        meets gives one load, as ISO 6336-6 counts damage. The mean load alone would miss the impacts of
+        a mesh that rattles.
+
+        Raises
+        ------
+        ConfigError        for helical record meshes and machines that do not run steadily
+        SimulationError    for a motion that cannot be integrated
+        """
+        if self.pair.pinion.helix_angle != 0.0:
+            raise ConfigError(
+                "life: on a drive line damage grows in a spur record mesh; choose one, system.record_mesh"
+            )
+        if not self.operating.is_steady:
+            raise ConfigError("life: on a drive line set-points are steady; take operating=rated")
+        machine = replace(self, operating=replace(self.operating, speed=speed, torque=torque))
+        line = machine.line(Run(system=machine, faults=()))
+        shaft = line.dof(machine.driving_node)
+        motion = line.run(
+            machine.line_solver,
+            duration=loads.SECONDS,
+            channels=[("mesh_force", machine.place), ("angle", shaft)],
+            settling=SETTLING,
+        )
+        angle = machine.ratio * motion.nominal_angle + motion.signals["angle", shaft]
+        return loads.greatest_loads(machine.pair, angle, motion.signals["mesh_force", machine.place])
+
+    def simulate_alone(self, run: Run) -> CleanRecord | SimulationError | None:
+        """One record; nothing of a drive line is simulated side by side."""
+        try:
+            return self._record(run)
+        except SimulationError as error:
+            return error
+
+    @one_thread
+    def _record(self, run: Run) -> CleanRecord:
+        sensing, rate = self.sensing, self.sensing.sampling_rate
+        line = self.line(run)
+        kinds = {name: self._channel(line, name) for name in sensing.channels}
+        shaft = line.dof(self.driving_node)
+        motion = line.run(
+            self.line_solver,
+            duration=self.operating.duration,
+            channels=list(dict.fromkeys([*kinds.values(), ("angle", shaft)])),
+            settling=SETTLING,
+        )
+        angle = self.ratio * motion.nominal_angle + motion.signals["angle", shaft]
+        gain = np.ones(len(kinds)) if run.gearbox is None else run.gearbox.gain
+        rows = [
+            self._seen(run, line, motion, name, kind) if kind[0] == "angle" else own * motion.signals[kind]
+            for (name, kind), own in zip(kinds.items(), gain, strict=True)
+        ]
+        return CleanRecord(
+            acceleration=np.array(rows),
+            shaft_angle=angle,
+            mean_speed=float(angle[-1] - angle[0]) * rate / max(len(angle) - 1, 1),
+            contact_loss_fraction=float(motion.contact_loss[self.place]),
+            integration_error=motion.energy_residual,
+            integration_check="energy",
+        )
+
+    def line(self, run: Run) -> RunningLine:
+        """The line of one run, ready to be integrated."""
+        specimen = run.specimen or perfect_specimen(self.pair.pinion, self.pair.wheel)
+        start = run.start or Start(tooth_pinion=0, tooth_wheel=0, phase=0.0)
+        engine = self.engine
+        if run.gearbox is not None and engine.drive.lateral:
+            bodies = (self.pinion, slice(0, 2)), (self.wheel, slice(2, 4))
+            held = [in_gearbox(body, run.gearbox, axes, self.quality).support for body, axes in bodies]
+            engine = with_supports(engine, self.place, held)
+        turned, forces = self.crank_angle(start), self.mesh_forces
+        teeth = start.tooth_pinion, start.tooth_wheel
+        beside = neighbour_meshes(
+            engine,
+            self.law,
+            forces,
+            self.place,
+            start_of(self.pair, teeth, start.phase),
+            faults=run.faults,
+            specimen=specimen,
+            turned=turned,
+        )
+        own = OwnMesh(
+            table=self._line_table(run.faults, specimen),
+            errors=(specimen.pinion_error, specimen.wheel_error),
+            start_teeth=teeth,
+            start_phase=start.phase,
+        )
+        sound = sound_meshes(engine, self.law, forces, besides={self.place, *beside})
+        frequency, ratio = self.operating.drive_frequency, self.operating.drive_damping_ratio
+        return running_line(
+            engine,
+            self._course(),
+            governor=Governor(frequency=frequency, damping_ratio=ratio),
+            own={**sound, **beside, self.place: own},
+            turned=turned,
+        )
+
+    def crank_angle(self, start: Start) -> float:
+        """Where the crank stands in its cycle when given teeth of the mesh are at a phase, rad.
+
+        The driving gear's teeth are tied to the crank: the same tooth meets the same cylinder's firing in every record.
+        Where its shaft turns more than once a cycle, the driven gear's tooth chooses the turn. A motor has no cycle:
+        its turns go on being counted, so that the other meshes stand as the teeth allow.
+        """
+        pitches = start.tooth_pinion + start.phase - start_phase(self.engine.drive, self.place)
+        if not isinstance(self.engine.engine, Engine):
+            return 2.0 * math.pi * (pitches / self.pair.pinion.n_teeth + start.tooth_wheel) / self.ratio
+        turns = pitches / self.pair.pinion.n_teeth + start.tooth_wheel % max(1, round(2.0 * self.ratio))
+        return 2.0 * math.pi * turns / self.ratio % (4.0 * math.pi)
+
+    def _line_table(self, faults: Sequence[Fault], specimen: Specimen) -> PairTable | SlicedTable:
+        table = self.mesh_table((*specimen.forms, *faults))
+        return replace(table, pair=replace(self.pair, backlash=self.pair.backlash * specimen.backlash_factor))
+
+    def _course(self) -> EngineCourse:
+        operating = self.operating
+        if operating.is_steady:
+            return steady_course(operating.speed / self.ratio, operating.torque)
+        time = np.arange(-2.0 * SETTLING, operating.duration + AFTER, KNOT)
+        nominal = operating.nominal(time)
+        load = self.engine.load_at(operating.torque, nominal.speed / operating.speed)
+        return EngineCourse(time=time, speed=nominal.speed / self.ratio, torque=load * nominal.torque_factor)
+
+    def _channel(self, line: RunningLine, name: str) -> tuple[str, int]:
+        """What the integration gives for a channel: a kind and a degree of freedom."""
+        if name.endswith(SPEED):
+            return "angle", line.dof(self._wheel(name)[1].node)
+        side, _, what = name.rpartition("_")
+        drive = self.engine.drive
+        mesh = drive.line.meshes[self.place]
+        gear = mesh.driving if side == "pinion" else mesh.driven
+        if what in AXES:
+            return "acceleration", line.matrices.names.index(f"{drive.line.gears[gear].name} {what}")
+        return "acceleration", line.dof(drive.numbers[drive.line.gears[gear].node])
+
+    def _wheel(self, name: str) -> tuple[int, ToothedWheel]:
+        wanted = name.removesuffix(SPEED)
+        return next((k, wheel) for k, (own, wheel) in enumerate(self.engine.wheels.items()) if own == wanted)
+
+    def _seen(self, run: Run, line: RunningLine, motion: LineMotion, name: str, kind: tuple[str, int]) -> Array:
+        """Deviation from the nominal speed that a toothed wheel shows, (sample,) rad/s."""
+        place, wheel = self._wheel(name)
+        disc = (
+            run.discs[place] if run.discs else Disc(index=0.0, places=wheel.spacing * np.arange(float(wheel.n_teeth)))
+        )
+        ratio = self.engine.ratios[wheel.node]
+        angle = ratio * (line.turned + motion.nominal_angle) + motion.signals[kind]
+        return instantaneous_speed(wheel, disc, angle, self.sensing.sampling_rate) - ratio * motion.nominal_speed
+
+
+def read_line_machine(config: Mapping[str, Any]) -> LineMachine:
+    """The machine of a configuration whose system is a drive line.
+
+    Raises
+    ------
+    ConfigError    for keys or tables that make no engine, and for a mesh that records cannot be made of
+    """
+    engine = read_engine_line(config)
+    drive = engine.drive
+    place = _record_mesh(engine)
+    pair, mesh = drive.pairs[place], drive.line.meshes[place]
+    if read_heat(config).is_any or read_modification(config).is_any:
+        raise ConfigError("heat and modification are of a single gear pair; a drive line takes heat=none")
+    operating, quality = (
+        read_operating(section(config, "operating")),
+        read(Quality, section(config, "quality"), "quality"),
+    )
+    bodies = []
+    for place_of_gear in (mesh.driving, mesh.driven):
+        gear = drive.line.gears[place_of_gear]
+        still = Support(stiffness_x=0.0, stiffness_y=0.0, damping_x=0.0, damping_y=0.0)
+        inertia = drive.line.nodes[gear.node].inertia
+        bodies.append(Body(mass=gear.mass or 0.0, inertia=inertia, support=gear.support or still))
+    machine = LineMachine(
+        pair=named_by_side(pair),
+        material=read_material(config),
+        mesh=read_mesh_options(section(config, "mesh")),
+        pinion=bodies[0],
+        wheel=bodies[1],
+        operating=operating,
+        sensing=read_sensing(section(config, "sensing")),
+        quality=quality,
+        solver=read(Solver, section(config, "solver"), "solver"),
+        engine=engine,
+        place=place,
+        slices=read_slice_options(section(config, "mesh")),
+    )
+    return replace(machine, operating=replace(operating, speed=operating.speed * machine.ratio))
+
+
+def _record_mesh(engine: EngineLine) -> int:
+    drive, names = engine.drive, engine.mesh_names
+    if drive.record_mesh is None:
+        raise ConfigError(
+            f"system.record_mesh = null: records follow the teeth of one mesh; give its two nodes, one of "
+            f"{', '.join(names) or 'none: this line has no mesh'}"
+        )
+    wanted = "/".join(str(node) for node in drive.record_mesh)
+    if wanted not in names:
+        raise ConfigError(
+            f"system.record_mesh = {list(drive.record_mesh)}: no such mesh; there are {', '.join(names)}, the driving "
+            "node first"
+        )
+    return names.index(wanted)

@@ -1,0 +1,108 @@
+"""Where each mesh of a line stands when the line starts: the meshes of one gear are not in phase by chance.
+
+A gear has one set of teeth, so that its meshes follow from each other by the directions of its mates. Angles are those
+of tooth centres in the common plane, counted against the clock; ``docs/theory/shaft_line.md``.
+"""
+
+from __future__ import annotations
+
+import math
+
+import numpy as np
+from numpy.typing import NDArray
+
+from gensig.driveline.drive_line import DriveLine
+from gensig.driveline.linear.shaft_line import GearMesh
+from gensig.geometry.contact import GearPair
+
+Array = NDArray[np.float64]
+
+
+def tooth_angles(line: DriveLine, turned: float = 0.0) -> Array:
+    """Angle of a tooth's centre of every gear, (gear,) rad, when the first node has turned by ``turned`` rad.
+
+    At 0 the gears of the first node, or those nearest to it, have a tooth at angle 0. Mates take up all backlash on the
+    driving side. Gears on one shaft have a tooth at one angle (assumed: how they are keyed is not in the tables), and
+    so has a gear that closes a loop, whatever the loop says.
+    """
+    gears, ratio = line.line.gears, line.line.speed_ratio
+    by_node: list[float | None] = [None] * len(line.line.nodes)
+    by_node[0] = 0.0
+    joints = list(line.line.shafts)
+    meshes = list(zip(line.line.meshes, line.pairs, strict=True))
+    while any(angle is None for angle in by_node):
+        before = list(by_node)
+        for shaft in joints:
+            _spread(by_node, shaft.first, shaft.second)
+        for mesh, pair in meshes:
+            one, other = gears[mesh.driving].node, gears[mesh.driven].node
+            sense = math.copysign(1.0, ratio[one])
+            known, sought = by_node[one], by_node[other]
+            if known is not None and sought is None:
+                by_node[other] = _driven_angle(mesh, pair, sense, _past_pitch_point(mesh, pair, sense, known))
+            elif sought is not None and known is None:
+                by_node[one] = _driving_angle(mesh, pair, sense, sought)
+        if by_node == before:
+            break  # the rest belongs to no part that holds the first node
+    angles = np.array([0.0 if angle is None else angle for angle in by_node])
+    return np.array([angles[gear.node] + turned * ratio[gear.node] for gear in gears])
+
+
+def start_rolls(line: DriveLine, turned: float = 0.0) -> Array:
+    """Distance of a pair of every mesh from A along the line of action, (mesh,) m, within one base pitch from A on.
+
+    In the middle of the face, when the first node has turned by ``turned`` rad. Gears on one shaft have the middles of
+    their faces in one plane (assumed: the tables have no place along the shaft).
+    """
+    angles = tooth_angles(line, turned)
+    rolls = []
+    for mesh, pair in zip(line.line.meshes, line.pairs, strict=True):
+        sense = math.copysign(1.0, line.line.speed_ratio[line.line.gears[mesh.driving].node])
+        past = _past_pitch_point(mesh, pair, sense, float(angles[mesh.driving]))
+        rolls.append((pair.pitch_point + past * pair.base_pitch) % pair.base_pitch)
+    return np.array(rolls)
+
+
+def first_slice_lead(pair: GearPair) -> float:
+    """How far the slice that enters first is ahead of the middle of the face, where teeth are told, m; spur: 0."""
+    return 0.5 * pair.face_width * math.tan(pair.base_helix_angle)
+
+
+def start_phase(line: DriveLine, place: int, turned: float = 0.0) -> float:
+    """Pitches that the first slice of a pair of one mesh is past A; what a mesh table takes as its start."""
+    pair = line.pairs[place]
+    return float(start_rolls(line, turned)[place] + first_slice_lead(pair)) / pair.base_pitch
+
+
+def _spread(by_node: list[float | None], one: int, other: int) -> None:
+    """Gears on one shaft have a tooth at one angle."""
+    if by_node[one] is None:
+        by_node[one] = by_node[other]
+    elif by_node[other] is None:
+        by_node[other] = by_node[one]
+
+
+def _half_teeth(pair: GearPair) -> tuple[float, float]:
+    """Half tooth angles on the working pitch circles; together with the other's they fill a pitch."""
+    cosine = math.cos(pair.working_pressure_angle)
+    first, second = (gear.half_tooth_angle_at(gear.base_radius / cosine) for gear in (pair.pinion, pair.wheel))
+    return first, second
+
+
+def _past_pitch_point(mesh: GearMesh, pair: GearPair, sense: float, angle: float) -> float:
+    """Base pitches by which the driving flank of the tooth at ``angle`` has passed the pitch point."""
+    flank = angle + sense * _half_teeth(pair)[0]
+    return sense * (flank - mesh.center_line) * pair.pinion.n_teeth / (2.0 * math.pi)
+
+
+def _driven_angle(mesh: GearMesh, pair: GearPair, sense: float, past: float) -> float:
+    """Tooth of the driven gear whose rear flank, as it turns, the driving flank touches."""
+    turned = _half_teeth(pair)[1] + past * 2.0 * math.pi / pair.wheel.n_teeth
+    return mesh.center_line + math.pi - sense * turned
+
+
+def _driving_angle(mesh: GearMesh, pair: GearPair, sense: float, driven_angle: float) -> float:
+    """The reverse of the two above."""
+    turned = sense * (mesh.center_line + math.pi - driven_angle) - _half_teeth(pair)[1]
+    past = turned * pair.wheel.n_teeth / (2.0 * math.pi)
+    return mesh.center_line + sense * (past * 2.0 * math.pi / pair.pinion.n_teeth - _half_teeth(pair)[0])

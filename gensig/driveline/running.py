@@ -1,0 +1,324 @@
+"""An engine's drive line in time: one-sided meshes with backlash, some from tables of their teeth; steady and run-up.
+
+``docs/theory/shaft_line_records.md``.
+"""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Callable, Mapping, Sequence
+from dataclasses import dataclass, replace
+
+import numpy as np
+from numpy.typing import NDArray
+from threadpoolctl import threadpool_limits
+
+from gensig.driveline.engine_line import EngineLine
+from gensig.driveline.excitation.cycle import CYCLE
+from gensig.driveline.linear.forced import SteadyResponse, closed_line, steady_response
+from gensig.driveline.linear.matrices import LineMatrices
+from gensig.driveline.linear.modal import with_viscous_losses
+from gensig.driveline.mesh_phase import first_slice_lead, start_rolls
+from gensig.driveline.time.chords import sliced_pair_mesh
+from gensig.driveline.time.course import LineCourse, ShaftTorque, constant_speed
+from gensig.driveline.time.geared_line import GearedLine
+from gensig.driveline.time.line_mesh import LineMesh, pair_mesh, phase_mesh
+from gensig.driveline.time.newmark import LineMotion, LineSolver, integrate_line, static_start
+from gensig.errors import ConfigError, StepError
+from gensig.geometry.contact import GearPair
+from gensig.mesh.pair_table import PairTable
+from gensig.mesh.sliced.sliced_table import SlicedTable
+
+Array = NDArray[np.float64]
+
+CONSTANT_NODES = 8  # of a pitch whose stiffness is constant
+LEAST_APPROACH = 2e-6  # m, at which a mesh that carries next to nothing is taken
+TABLE_STEP = 100.0 * math.pi / 30.0  # rad/s of the crank between torques that a run-up goes over
+TABLE_SHARE = 0.1  # of the largest torque between them
+MOST_TABLES = 24
+MOST_STEPS = 64  # per sample, that are tried where steps turn out to be too long
+LEAD_SAMPLES = 256  # before time 0: more than the low-pass looks back
+ROUNDED = 1e-12  # of the largest torque, below which a course of it over the cycle is constant
+
+# More threads of the linear algebra sum in another order; a line that rattles makes another motion of the last digit.
+one_thread = threadpool_limits.wrap(limits=1)
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class Governor:
+    """What holds the mean speed: a spring and a damper on the rigid motion alone, so that no vibration feels it."""
+
+    frequency: float
+    damping_ratio: float
+
+
+@dataclass(frozen=True, slots=True, kw_only=True, eq=False)
+class OwnMesh:
+    """A mesh by its own teeth: table, errors of the teeth (tooth,) m, and teeth that enter at the start.
+
+    ``start_phase`` in pitches must agree with where the crank stands; None follows from it.
+    """
+
+    table: PairTable | SlicedTable
+    errors: tuple[Array, Array] | None = None
+    start_teeth: tuple[int, int] = (0, 0)
+    start_phase: float | None = None
+
+
+@dataclass(frozen=True, slots=True, kw_only=True, eq=False)
+class EngineCourse:
+    """Speed of the crank and brake torque over time: ``time`` (knot,) s, ``speed`` rad/s, ``torque`` N m."""
+
+    time: Array
+    speed: Array
+    torque: Array
+
+    def __post_init__(self) -> None:
+        if not len(self.time) == len(self.speed) == len(self.torque) >= 1:
+            raise ConfigError("the course of an engine needs as many speeds and torques as times")
+        if not self.speed.min() > 0.0:
+            raise ConfigError(f"the speed of the crank, {self.speed.min() * 30.0 / math.pi:g} r/min, must be positive")
+
+
+def steady_course(speed: float, torque: float) -> EngineCourse:
+    """One speed (rad/s) and one brake torque (N m)."""
+    return EngineCourse(time=np.zeros(1), speed=np.array([speed]), torque=np.array([torque]))
+
+
+@dataclass(frozen=True, slots=True, kw_only=True, eq=False)
+class RunningLine:
+    """A line ready to be integrated; ``turned`` rad is where the crank stands at time 0.
+
+    ``linear`` is the steady vibration at the first speed if no mesh parts, on the same degrees of freedom;
+    ``mesh_force`` (mesh,) N are the mean forces in it.
+    """
+
+    machine: EngineLine
+    matrices: LineMatrices
+    line: GearedLine
+    course: LineCourse
+    torques: tuple[ShaftTorque, ...]
+    linear: SteadyResponse
+    mesh_force: Array
+    turned: float
+
+    def dof(self, node: int) -> int:
+        """Place of the degree of freedom that a node, by its number, turns with."""
+        return int(np.argmax(self.matrices.expand[self.machine.drive.numbers.index(node)]))
+
+    @one_thread
+    def run(
+        self, solver: LineSolver, *, duration: float, channels: Sequence[tuple[str, int]], settling: float
+    ) -> LineMotion:
+        """Integrate, from the static place with the linear vibration on it, at least ``settling`` s before time 0.
+
+        What turns out to be too long a step is halved, as a gear pair's, up to ``MOST_STEPS`` a sample.
+        """
+        lead = max(settling, LEAD_SAMPLES / solver.sampling_rate)
+        lead = math.ceil(lead * solver.sampling_rate) / solver.sampling_rate
+        turned, speed = (float(one[0]) for one in self.course.nominal(np.array([-lead])))
+        phasor = np.exp(1j * self.linear.orders * (self.turned + turned))
+        still = static_start(self.line, self.course, self.torques, time=-lead)
+        start = (
+            still + np.real(self.linear.angle @ phasor),
+            np.real((1j * self.linear.orders * speed * self.linear.angle) @ phasor),
+        )
+        while True:
+            try:
+                return integrate_line(
+                    self.line,
+                    self.course,
+                    self.torques,
+                    solver,
+                    duration=duration,
+                    channels=channels,
+                    lead_in=lead,
+                    start=start,
+                )
+            except StepError:
+                if 2 * solver.oversampling > MOST_STEPS:
+                    raise
+                solver = replace(solver, oversampling=2 * solver.oversampling)
+
+
+@one_thread
+def running_line(
+    machine: EngineLine,
+    course: EngineCourse,
+    *,
+    governor: Governor,
+    own: Mapping[int, OwnMesh] | None = None,
+    turned: float = 0.0,
+) -> RunningLine:
+    """The line of an engine with what turns and loads it along a course.
+
+    Parameters
+    ----------
+    own : by the place of a mesh its teeth; all others hold the stiffness of the table
+    turned : rad, where the crank stands in its cycle at time 0; all meshes and torques follow from it
+
+    Raises
+    ------
+    ConfigError    for courses that the engine cannot run
+    """
+    matrices = with_viscous_losses(machine.matrices(merge_rigid=True))
+    first = _tables(machine, matrices, float(course.speed[0]), float(course.torque[0]))
+    closed, elements = closed_line(matrices)
+    linear = steady_response(closed, first, float(course.speed[0]))
+    mesh_force = linear.element_forces(elements)[0]
+    return RunningLine(
+        machine=machine,
+        matrices=matrices,
+        line=_geared(machine, matrices, governor, mesh_force, own or {}, turned),
+        course=constant_speed(float(course.speed[0]))
+        if len(course.time) == 1
+        else LineCourse(time=course.time, speed=course.speed),
+        torques=_torques(machine, matrices, course, turned, first),
+        linear=linear,
+        mesh_force=mesh_force,
+        turned=turned,
+    )
+
+
+def mesh_forces(machine: EngineLine, speed: float, torque: float) -> Array:
+    """Mean normal forces of the meshes at a speed of the crank and a brake torque, (mesh,) N."""
+    closed, elements = machine.linear()
+    response = steady_response(closed, machine.on_line(machine.torques(speed, torque)), speed, n_orders=1)
+    return response.element_forces(elements)[0]
+
+
+def named_by_side(pair: GearPair) -> GearPair:
+    """The pair with its gears named as faults and tables name them; in a line they have names of their own."""
+    return replace(pair, pinion=replace(pair.pinion, name="pinion"), wheel=replace(pair.wheel, name="wheel"))
+
+
+def reference_force(machine: EngineLine, place: int, force: float) -> float:
+    """The force at which a mesh's contact and damping are taken, N: its mean, and what closes it by 2 um at least."""
+    return max(abs(force), machine.drive.line.meshes[place].stiffness * LEAST_APPROACH)
+
+
+def _geared(
+    machine: EngineLine,
+    matrices: LineMatrices,
+    governor: Governor,
+    forces: Array,
+    own: Mapping[int, OwnMesh],
+    turned: float,
+) -> GearedLine:
+    rotation = matrices.rigid[0]
+    momentum = matrices.mass @ rotation
+    rigid = np.outer(momentum, momentum) / float(rotation @ momentum)
+    rate = 2.0 * math.pi * governor.frequency
+    phases = start_rolls(machine.drive, turned)
+    return GearedLine(
+        names=matrices.names,
+        mass=matrices.mass,
+        damping=matrices.damping + 2.0 * governor.damping_ratio * rate * rigid,
+        stiffness=matrices.stiffness + rate**2 * rigid,
+        rotation=rotation,
+        meshes=tuple(
+            _mesh(machine, matrices, place, float(force), own.get(place), float(roll))
+            for place, (force, roll) in enumerate(zip(forces, phases, strict=True))
+        ),
+    )
+
+
+def _mesh(
+    machine: EngineLine, matrices: LineMatrices, place: int, force: float, own: OwnMesh | None, roll: float
+) -> LineMesh:
+    drive = machine.drive
+    pair, mesh = drive.pairs[place], drive.line.meshes[place]
+    direction = matrices.directions[place]
+    roll_dof = int(np.argmax(matrices.expand[drive.line.gears[mesh.driving].node]))
+    # so many N s/m under the mean force; a mesh that carries less is damped less
+    damping = float(matrices.mesh_damping[place]) / reference_force(machine, place, force)
+    name, phase = machine.mesh_names[place], (roll + first_slice_lead(pair)) / pair.base_pitch
+    if own is not None:
+        make: Callable[..., LineMesh] = sliced_pair_mesh if isinstance(own.table, SlicedTable) else pair_mesh
+        return make(
+            name,
+            own.table,
+            direction=direction,
+            roll_dof=roll_dof,
+            damping=damping,
+            errors=own.errors,
+            start_teeth=own.start_teeth,
+            start_phase=phase if own.start_phase is None else own.start_phase,
+        )
+    return phase_mesh(
+        name,
+        direction=direction,
+        roll_dof=roll_dof,
+        n_teeth=(pair.pinion.n_teeth, pair.wheel.n_teeth),
+        stiffness=np.full((1, CONSTANT_NODES), float(matrices.mesh_stiffness[place])),
+        backlash=float(matrices.backlash[place]),
+        damping=damping,
+        start_phase=phase,
+        mirror=2.0 * pair.pitch_point / pair.base_pitch + 0.5,
+    )
+
+
+def _tables(machine: EngineLine, matrices: LineMatrices, speed: float, torque: float) -> Array:
+    """Torques on the degrees of freedom over the cycle of the crank, (dof, point) N m."""
+    on_nodes = machine.torques(speed, torque).on(machine.drive.numbers)
+    return np.asarray(matrices.expand[: len(on_nodes)].T @ on_nodes)
+
+
+def _torques(
+    machine: EngineLine, matrices: LineMatrices, course: EngineCourse, turned: float, first: Array
+) -> tuple[ShaftTorque, ...]:
+    """The torques of the engine along a course: between tables at some times they go straight."""
+    rotation, crank = matrices.rigid[0], abs(float(matrices.rigid[0][_crank(machine, matrices)]))
+    at = _table_times(course)
+    found: list[ShaftTorque] = []
+    for place, time in enumerate(at):
+        speed, torque = (float(np.interp(time, course.time, one)) for one in (course.speed, course.torque))
+        tables = first if place == 0 else _tables(machine, matrices, speed, torque)
+        share = np.interp(course.time, at, np.eye(len(at))[place]) if len(at) > 1 else None
+        least = ROUNDED * float(np.abs(tables).max())
+        for dof in np.flatnonzero(np.any(tables != 0.0, axis=1)):
+            table, ratio = tables[dof], abs(float(rotation[dof])) / crank
+            constant = np.ptp(table) <= least
+            found.append(
+                ShaftTorque(
+                    dof=int(dof),
+                    table=table[:1] if constant else table,
+                    period=CYCLE * ratio,
+                    phase=turned * ratio % (CYCLE * ratio),
+                    factor=share,
+                )
+            )
+    if len(course.time) > 1:  # what speeds the whole line up comes from the throws, or the motor
+        rise = float(rotation @ matrices.mass @ rotation) / crank * np.gradient(course.speed / crank, course.time)
+        driving = machine.engine.driving_nodes
+        for node in driving:
+            throw = int(np.argmax(matrices.expand[machine.drive.numbers.index(node)]))
+            found.append(ShaftTorque(dof=throw, table=np.array([1.0 / len(driving)]), factor=rise))
+    return tuple(found)
+
+
+def _table_times(course: EngineCourse) -> Array:
+    """Times between whose torques a course goes straight."""
+    if len(course.time) == 1:
+        return course.time
+    greatest = max(float(np.abs(course.torque).max()), 1e-9)
+    steps = np.abs(np.diff(course.speed)) / TABLE_STEP + np.abs(np.diff(course.torque)) / (TABLE_SHARE * greatest)
+    gone = np.concatenate([[0.0], np.cumsum(steps)])
+    n_tables = min(MOST_TABLES, 1 + math.ceil(gone[-1]))
+    if n_tables < 2:
+        return course.time[:1]
+    places = np.searchsorted(gone, np.linspace(0.0, gone[-1], n_tables)[1:-1])
+    return np.asarray(course.time[np.unique([0, *places, len(gone) - 1])])
+
+
+def _crank(machine: EngineLine, matrices: LineMatrices) -> int:
+    return int(np.argmax(matrices.expand[machine.drive.numbers.index(machine.engine.driving_nodes[0])]))
+
+
+def with_supports(machine: EngineLine, place: int, supports: Sequence[object]) -> EngineLine:
+    """The same with other supports of the two gears of a mesh, driving and driven."""
+    line = machine.drive.line
+    mesh, gears = line.meshes[place], list(line.gears)
+    for gear, support in zip((mesh.driving, mesh.driven), supports, strict=True):
+        gears[gear] = replace(gears[gear], support=support)  # type: ignore[arg-type]
+    return replace(machine, drive=replace(machine.drive, line=replace(line, gears=tuple(gears))))

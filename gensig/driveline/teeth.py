@@ -1,0 +1,199 @@
+"""The teeth of the meshes of a line: tables of spur and helical pairs, and what a gear takes along from mesh to mesh.
+
+``docs/theory/shaft_line_records.md``.
+"""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Collection, Sequence
+from dataclasses import dataclass, replace
+from functools import lru_cache
+
+import numpy as np
+from numpy.typing import NDArray
+
+from gensig.driveline.drive_line import DriveLine
+from gensig.driveline.engine_line import EngineLine
+from gensig.driveline.mesh_phase import first_slice_lead, start_rolls
+from gensig.driveline.running import OwnMesh, named_by_side, reference_force
+from gensig.driveline.time.line_mesh import mesh_start, tooth_angle
+from gensig.errors import ConfigError, GeometryError
+from gensig.faults.base import Fault, faulty_teeth
+from gensig.faults.flank_form import Misalignment
+from gensig.faults.other_flank import on_other_flank
+from gensig.geometry.contact import GearPair
+from gensig.material import Material
+from gensig.mesh.load_distribution import loaded_pair_table
+from gensig.mesh.options import MeshOptions, SliceOptions
+from gensig.mesh.pair_table import PairTable
+from gensig.mesh.sliced.sliced_table import SlicedTable, sliced_table
+from gensig.sensing.manufacturing import Specimen
+
+Array = NDArray[np.float64]
+
+SOUND_NODES = 128  # most of a pitch of sound helical teeth: short tables are read faster, and these ripple slowly
+FORCES_PER_OCTAVE = 2  # at which sound helical teeth are tabulated: chords reach over all depths of bite
+SIDES = ("pinion", "wheel")
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class ToothLaw:
+    """Material, conventions and slices of all teeth of a line."""
+
+    material: Material
+    options: MeshOptions
+    slices: SliceOptions
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class ToothStart:
+    """The teeth of a mesh that are in place at time 0, and how far the middle of their faces is past A, pitches."""
+
+    teeth: tuple[int, int]
+    phase: float
+
+
+@lru_cache(maxsize=48)
+def tooth_table(law: ToothLaw, pair: GearPair, faults: tuple[Fault, ...], force: float) -> PairTable | SlicedTable:
+    """Table of a pair under a mean force in N: of spur teeth as they are, of helical ones in slices."""
+    teeth = faulty_teeth(pair, faults)
+    if pair.pinion.helix_angle == 0.0:
+        return loaded_pair_table(pair, law.material, law.options, teeth, force=force)
+    return sliced_table(pair, law.material, law.options, law.slices, teeth, force=force)
+
+
+def require_drive(pair: GearPair, slices: SliceOptions) -> None:
+    """Raise unless at least one pair of teeth is always in contact, by the overlap of the face too."""
+    if pair.pinion.helix_angle == 0.0:
+        pair.require_continuous_drive()
+    elif slices.slices_in_phase:
+        raise ConfigError("mesh.slices_in_phase = true is for comparing statics; a line has the helix in: take false")
+    elif pair.total_contact_ratio < 1.0:
+        raise GeometryError(
+            f"the total contact ratio {pair.total_contact_ratio:.4f} is below 1, so the drive is interrupted at every "
+            f"tooth; use more teeth, a wider face or a larger helix angle"
+        )
+
+
+def sound_meshes(
+    machine: EngineLine, law: ToothLaw, forces: Array, *, besides: Collection[int] = ()
+) -> dict[int, OwnMesh]:
+    """Sound teeth of the meshes by their place, each under its mean force of ``forces`` (mesh,) N.
+
+    Helical meshes only with ``system.helical_meshes=sliced``; those of ``besides`` are left out.
+    """
+    n_nodes = min(law.options.points_per_pitch, SOUND_NODES)
+    thin = replace(law, options=replace(law.options, points_per_pitch=n_nodes))
+    found = {}
+    for place, pair in enumerate(machine.drive.pairs):
+        if place not in besides and (machine.drive.slices_helical or pair.pinion.helix_angle == 0.0):
+            own = law if pair.pinion.helix_angle == 0.0 else thin
+            found[place] = OwnMesh(table=_table_in_line(machine, own, place, (), float(forces[place])))
+    return found
+
+
+def _table_in_line(
+    machine: EngineLine, law: ToothLaw, place: int, faults: tuple[Fault, ...], force: float
+) -> PairTable | SlicedTable:
+    pair, force = machine.drive.pairs[place], reference_force(machine, place, force)
+    require_drive(pair, law.slices)
+    if pair.pinion.helix_angle:
+        force = 2.0 ** (math.ceil(FORCES_PER_OCTAVE * math.log2(force)) / FORCES_PER_OCTAVE)
+    return tooth_table(law, named_by_side(pair), faults, force)
+
+
+def neighbours(drive: DriveLine, place: int) -> dict[int, tuple[int, int]]:
+    """Other meshes of the two gears of a mesh: by place, the side of the gear in this mesh and in the other one."""
+    found, own = {}, (drive.line.meshes[place].driving, drive.line.meshes[place].driven)
+    for other, mesh in enumerate(drive.line.meshes):
+        for there, gear in enumerate((mesh.driving, mesh.driven)):
+            if other != place and gear in own:
+                found[other] = own.index(gear), there
+    return found
+
+
+def neighbour_meshes(
+    machine: EngineLine,
+    law: ToothLaw,
+    forces: Array,
+    place: int,
+    start: ToothStart,
+    *,
+    faults: Sequence[Fault],
+    specimen: Specimen,
+    turned: float,
+) -> dict[int, OwnMesh]:
+    """The other meshes of the two gears of a mesh with what these gears have, sound or not, by their place.
+
+    A gear that drives in both meshes, or is driven in both, is met on the same flanks: its faults and errors come
+    along, but for misalignment, which is a pair's. Else its other flanks are met, which are without errors, and feel of
+    the faults what ``on_other_flank`` says. Mates are perfect.
+    """
+    found = {}
+    for other, (here, there) in neighbours(machine.drive, place).items():
+        seen = [one for one in (*specimen.forms, *faults) if one.gear == SIDES[here]]
+        seen = [one for one in seen if not isinstance(one, Misalignment)]
+        errors = [np.zeros(gear.n_teeth) for gear in _gears(machine.drive.pairs[other])]
+        if here == there:
+            errors[there] = specimen.wheel_error if here else specimen.pinion_error
+        else:
+            seen = [felt for one in seen if (felt := on_other_flank(one)) is not None]
+        carried = tuple(replace(one, gear=SIDES[there]) for one in seen)
+        teeth = [0, 0]
+        teeth[there] = tooth_there(machine.drive, (place, here), (other, there), start, turned)
+        found[other] = OwnMesh(
+            table=_table_in_line(machine, law, other, carried, float(forces[other])),
+            errors=(errors[0], errors[1]),
+            start_teeth=(teeth[0], teeth[1]),
+        )
+    return found
+
+
+def tooth_there(
+    drive: DriveLine, here: tuple[int, int], there: tuple[int, int], start: ToothStart, turned: float
+) -> int:
+    """The tooth of a gear that is in place in another of its meshes when ``turned`` rad of the first node.
+
+    ``here``, ``there`` are the place of a mesh and the gear's side in it, 0 driving and 1 driven.
+    """
+    n_teeth = _gears(drive.pairs[here[0]])[here[1]].n_teeth
+    angle = tooth_angle(
+        n_teeth,
+        mate_angle=_mate_angle(drive, *here),
+        drives=here[1] == 0,
+        start=(start.teeth[here[1]], start.phase),
+        pitch_point=_pitch_point(drive, here[0]),
+    )
+    tooth, phase = mesh_start(
+        n_teeth,
+        mate_angle=_mate_angle(drive, *there),
+        drives=there[1] == 0,
+        tooth_angle=angle,
+        pitch_point=_pitch_point(drive, there[0]),
+    )
+    place, pair = there[0], drive.pairs[there[0]]
+    # where the line says that a tooth is; play and profile shift move it by some hundredths of a pitch
+    in_place = float(start_rolls(drive, turned)[place]) / pair.base_pitch
+    return round(tooth + phase - in_place) % n_teeth
+
+
+def _gears(pair: GearPair) -> tuple:
+    return pair.pinion, pair.wheel
+
+
+def _pitch_point(drive: DriveLine, place: int) -> float:
+    return drive.pairs[place].pitch_point / drive.pairs[place].base_pitch
+
+
+def _mate_angle(drive: DriveLine, place: int, side: int) -> float:
+    """From a gear's centre to its mate's, counted as the gear turns, rad."""
+    mesh, gears = drive.line.meshes[place], drive.line.gears
+    gear = (mesh.driving, mesh.driven)[side]
+    sense = math.copysign(1.0, drive.line.speed_ratio[gears[gear].node])
+    return sense * (mesh.center_line + side * math.pi)
+
+
+def start_of(pair: GearPair, teeth: tuple[int, int], phase: float) -> ToothStart:
+    """From the phase at which the first slices of teeth begin, pitches."""
+    return ToothStart(teeth=teeth, phase=phase - first_slice_lead(pair) / pair.base_pitch)

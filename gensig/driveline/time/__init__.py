@@ -1,0 +1,1 @@
+"""Drive lines in time: meshes that part, integrated by Newmark's method."""

@@ -1,0 +1,245 @@
+"""Compiled core of a shaft line's gear meshes: the law of one, and the forces of all that agree with each other.
+
+The symbols are those of ``docs/theory/shaft_line_integration.md``. Scalar code without reassociation, own loops instead
+of library calls: bits depend on nothing but the numbers given.
+"""
+
+from __future__ import annotations
+
+import math
+
+import numpy as np
+
+from gensig.driveline.time import _layout as layout
+from gensig.driveline.time._layout import COAST, DRIVE
+from gensig.dynamics._vector import compiled
+
+MOST_ROUNDS = 60
+UNDAMPED = 20  # rounds of Newton's method after which every step is halved
+SETTLED, SETTLED_LEAST = 1e-9, 1e-13  # of an approach, and m: what forces and approaches may disagree by
+ROUNDED = 1e-14  # of what forces take off an approach
+
+
+@compiled
+def between(table, low, high, share, per_cell, out):
+    """Value and slope, ``share`` of the way between two nodes whose values and slopes stand at ``low`` and ``high``.
+
+    Of the cubic through both. ``per_cell`` is the slope asked for over that per cell.
+    """
+    rise, slope, slope_1 = table[high] - table[low], table[low + 1], table[high + 1]
+    bend, twist = 3.0 * rise - 2.0 * slope - slope_1, slope + slope_1 - 2.0 * rise
+    out[0] = table[low] + share * (slope + share * (bend + share * twist))
+    out[1] = per_cell * (slope + share * (2.0 * bend + 3.0 * share * twist))
+
+
+@compiled
+def gather(meshes, mesh, flank, turned, within, pairs):
+    """Gap and stiffnesses of the pairs of a flank and their slopes, where the mesh has rolled ``turned`` pitches.
+
+    ``pairs`` (mesh, flank, pair, what is gathered) takes them; pairs that do not exist stand infinitely far back. The
+    back flanks meet along the mirrored roll, so their teeth count backwards. Of several springs those are left out that
+    begin beyond ``within`` m and a depth more.
+
+    Returns
+    -------
+    up to where what was gathered is all that touches, m
+    """
+    place = meshes.place[mesh]
+    first, n_nodes, n_pairs = place[layout.FIRST], place[layout.NODES], place[layout.N_PAIRS]
+    sense, at_rows = 1, place[layout.AT_ROWS]
+    if flank == COAST:
+        sense, at_rows = -1, place[layout.AT_COAST_ROWS]
+        turned = meshes.number[mesh, layout.MIRROR] - turned
+    newest = math.floor(turned) - first
+    n_cells = n_pairs * n_nodes
+    n_springs, at_depth = place[layout.N_SPRINGS], place[layout.AT_DEPTH]
+    n_columns, reach = layout.STIFFNESS + layout.PER_SPRING * n_springs, np.inf
+    if n_springs > 1:
+        reach = within + meshes.depth[at_depth + 1]
+    for j in range(n_pairs):
+        index = newest - j
+        tooth_a = (place[layout.START_A] + sense * index) % place[layout.TEETH_A]
+        tooth_b = (place[layout.START_B] + sense * index) % place[layout.TEETH_B]
+        kind_a = meshes.kind[place[layout.AT_KIND_A] + tooth_a]
+        kind_b = meshes.kind[place[layout.AT_KIND_B] + tooth_b]
+        row = meshes.rows[at_rows + kind_a * place[layout.N_KINDS_B] + kind_b]
+        here = pairs[mesh, flank, j]
+        if row < 0:
+            here[layout.GAP] = np.inf
+            continue
+        x = (turned - (index + first)) * n_nodes
+        cell = min(max(int(x), 0), n_cells - 1)
+        at = place[layout.AT_TABLE] + (row * (n_cells + 1) + cell) * n_columns
+        between(meshes.table, at, at + n_columns, x - cell, sense * n_nodes, here[layout.GAP :])
+        if flank == DRIVE:
+            here[layout.GAP] += (
+                meshes.error[place[layout.AT_ERROR_A] + tooth_a] + meshes.error[place[layout.AT_ERROR_B] + tooth_b]
+            )
+        for spring in range(n_springs):
+            if here[layout.GAP] + meshes.depth[at_depth + spring] > reach:
+                break
+            to = layout.STIFFNESS + layout.PER_SPRING * spring
+            between(meshes.table, at + to, at + n_columns + to, x - cell, sense * n_nodes, here[to:])
+    return reach
+
+
+@compiled
+def flank_law(pairs, depth, damping, shared, within, rate, roll_rate):
+    """Law of the gathered pairs of a flank, ``within`` m beyond where sound teeth touch; their springs begin at
+    ``depth`` (spring,) m beyond the gap.
+
+    Returns
+    -------
+    what ``_line_layout.N_LAW`` names: force, its slopes over approach and rate, stored energy, power lost, force along
+    the roll
+    """
+    total, least = 0.0, 0.0
+    for _ in range(len(pairs) * len(depth) + 1):
+        stiffness, force = 0.0, 0.0
+        for j in range(len(pairs)):
+            for spring in range(len(depth)):
+                bite = within - pairs[j, layout.GAP] - depth[spring]
+                if not bite > least:
+                    break
+                own = pairs[j, layout.STIFFNESS + layout.PER_SPRING * spring]
+                stiffness += own
+                force += own * bite
+        total = force / (1.0 + shared * stiffness)
+        # each pair that the shared deflection lifts off raises the total, and may so lift another
+        if shared * total <= least:
+            break
+        least = shared * total
+    if not total > 0.0:
+        return 0.0, 0.0, 0.0, 0.0, 0.0, 0.0
+    softer = 1.0 / (1.0 + shared * stiffness)
+    normal, tangent, rate_tangent, lost, along = 0.0, 0.0, 0.0, 0.0, 0.0
+    stored = 0.5 * shared * total * total
+    for j in range(len(pairs)):
+        for spring in range(len(depth)):
+            bite = within - pairs[j, layout.GAP] - depth[spring] - shared * total
+            if not bite > 0.0:
+                break
+            at = layout.STIFFNESS + layout.PER_SPRING * spring
+            own, slope = pairs[j, at], pairs[j, layout.GAP_SLOPE]
+            elastic = own * bite
+            speed = rate - slope * roll_rate
+            grown = 1.0 + damping * speed
+            pressed = 0.0
+            if grown > 0.0:
+                pressed = elastic * grown
+                tangent += own * softer * grown
+                rate_tangent += elastic * damping
+            normal += pressed
+            stored += 0.5 * elastic * bite
+            lost += (pressed - elastic) * speed
+            along += pressed * slope - 0.5 * bite * bite * pairs[j, at + 1]
+    return normal, tangent, rate_tangent, stored, lost, along
+
+
+@compiled
+def mesh_law(meshes, mesh, turned, roll_rate, approach, rate, law, work):
+    """Law of one mesh on whichever flank it touches, into ``law`` (mesh, N_LAW).
+
+    ``work.reach`` (mesh, flank) says up to where ``work.pairs`` holds all that touches for this roll, -inf where it
+    holds nothing yet; what is missing is gathered when it may touch.
+    """
+    number, place, found = meshes.number[mesh], meshes.place[mesh], law[mesh]
+    n_pairs, at_depth = place[layout.N_PAIRS], place[layout.AT_DEPTH]
+    depth = meshes.depth[at_depth : at_depth + place[layout.N_SPRINGS]]
+    found[:] = 0.0
+    for flank in range(layout.N_FLANKS):
+        within, least, sense = approach, number[layout.LEAST_GAP], 1.0
+        if flank == COAST:
+            within, least, sense = -approach - number[layout.BACKLASH], number[layout.LEAST_COAST_GAP], -1.0
+        if not within > least:
+            continue
+        if not within <= work.reach[mesh, flank]:
+            work.reach[mesh, flank] = gather(meshes, mesh, flank, turned, within, work.pairs)
+        normal, tangent, rate_tangent, stored, lost, along = flank_law(
+            work.pairs[mesh, flank, :n_pairs],
+            depth,
+            number[layout.DAMPING],
+            number[layout.SHARED],
+            within,
+            sense * rate,
+            roll_rate,
+        )
+        found[layout.FORCE] += sense * normal
+        found[layout.TANGENT] += tangent
+        found[layout.RATE_TANGENT] += rate_tangent
+        found[layout.STORED] += stored
+        found[layout.LOST] += lost
+        found[layout.ALONG] += along
+
+
+@compiled
+def eliminate(matrix, right):
+    """Solve ``matrix`` x = ``right`` in place without pivoting: I + W J needs none, see ``solve_contact``."""
+    n = len(right)
+    for i in range(n):
+        for j in range(i + 1, n):
+            if matrix[j, i] != 0.0:
+                share = matrix[j, i] / matrix[i, i]
+                for k in range(i + 1, n):
+                    matrix[j, k] -= share * matrix[i, k]
+                right[j] -= share * right[i]
+    for i in range(n - 1, -1, -1):
+        for k in range(i + 1, n):
+            right[i] -= matrix[i, k] * right[k]
+        right[i] /= matrix[i, i]
+
+
+@compiled
+def solve_contact(
+    meshes, compliance, free, carried, turned, roll_rate, before, rate_before, per_step, approach, law, work
+):
+    """Approaches and forces of all meshes with delta = free - W (F(delta) - carried), by a semi-smooth Newton method.
+
+    Parameters
+    ----------
+    compliance : (mesh, mesh) m/N   W, symmetric and positive: what forces take off the approaches
+    free : (mesh,) m                approaches if the meshes went on with the forces ``carried`` (mesh, N_LAW)
+    before, rate_before : (mesh,)   approaches and their rates where the step began
+    per_step : 1/s                  2 / h: the rate is per_step (delta - before) - rate_before; 0 for statics
+    approach : (mesh,) m            first guess, takes the solution
+    law : (mesh, N_LAW)             what the meshes do there, at the guess and then at the solution
+    work : ``Work``
+
+    Forces grow with the approaches, J >= 0 their slopes, so the equation has one solution, and I + W J is similar to a
+    symmetric positive matrix once J is shared out; its elimination needs no pivots.
+
+    Returns
+    -------
+    rounds of Newton's method, or -1 where it found no solution
+    """
+    n = len(free)
+    matrix, right, near = work.matrix, work.right, work.near
+    for round_ in range(MOST_ROUNDS):
+        largest, longest = 0.0, 0.0
+        for m in range(n):
+            off, most = free[m] - approach[m], 0.0
+            for k in range(n):
+                off -= compliance[m, k] * (law[k, layout.FORCE] - carried[k, layout.FORCE])
+                most += abs(compliance[m, k]) * (abs(law[k, layout.FORCE]) + abs(carried[k, layout.FORCE]))
+            right[m] = off
+            if not abs(off) < np.inf:
+                return -1
+            near[m] = SETTLED * abs(approach[m]) + SETTLED_LEAST + ROUNDED * most
+            largest = max(largest, abs(off) / near[m])
+        if largest <= 1.0:
+            return round_
+        for k in range(n):
+            slope = law[k, layout.TANGENT] + per_step * law[k, layout.RATE_TANGENT]
+            for m in range(n):
+                matrix[m, k] = compliance[m, k] * slope
+            matrix[k, k] += 1.0
+        eliminate(matrix, right)
+        share = 1.0 if round_ < UNDAMPED else 0.5
+        for m in range(n):
+            approach[m] += share * right[m]
+            longest = max(longest, abs(right[m]) / near[m])
+            rate = per_step * (approach[m] - before[m]) - rate_before[m]
+            mesh_law(meshes, m, turned[m], roll_rate[m], approach[m], rate, law, work)
+        if longest <= 1.0:
+            return round_ + 1
+    return -1

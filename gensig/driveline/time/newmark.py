@@ -1,0 +1,330 @@
+"""Integrate a geared shaft line in time: Newmark's average acceleration, contact converged in every step.
+
+Formulas and what is measured of them: ``docs/theory/shaft_line_integration.md``.
+"""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Sequence
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+
+from gensig.driveline.time import _layout as layout
+from gensig.driveline.time import _newmark_kernels as kernels
+from gensig.driveline.time._layout import Work
+from gensig.driveline.time.course import LineCourse, ShaftTorque
+from gensig.driveline.time.geared_line import (
+    GearedLine,
+    elimination_order,
+    pack_line,
+    pack_meshes,
+    pack_torques,
+)
+from gensig.dynamics._vector import LANES
+from gensig.dynamics.decimation import decimator
+from gensig.errors import ConfigError, SimulationError, StepError
+
+Array = NDArray[np.float64]
+
+KINDS = ("angle", "speed", "acceleration", "mesh_force")
+BLOCK = 512  # output samples that are integrated between two passes of the low-pass
+OUT_OF_BOUNDS = 1e6  # m, rad, m/s or rad/s
+LONGEST_STEP = 0.25  # pitches that a mesh may roll in a step
+STILL = (2.0 * math.pi) ** 2  # 1/s2, below elastic modes but not so far that rounding moves a free line
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class LineSolver:
+    """How finely to integrate: ``oversampling`` steps per sample at ``sampling_rate``.
+
+    A run whose energy residual exceeds ``max_energy_residual`` is an error.
+    """
+
+    sampling_rate: float
+    oversampling: int
+    max_energy_residual: float
+
+    def __post_init__(self) -> None:
+        if not 0.0 < self.sampling_rate < math.inf:
+            raise ConfigError(f"line solver: sampling rate {self.sampling_rate:g} Hz must be positive")
+        if not 2 <= self.oversampling <= 256:
+            raise ConfigError(f"line solver: oversampling {self.oversampling} must lie in 2..256")
+        if not 0.0 < self.max_energy_residual <= 1.0:
+            raise ConfigError(f"line solver: max_energy_residual {self.max_energy_residual:g} must lie in 0..1")
+
+    @property
+    def step(self) -> float:
+        """Internal step, s."""
+        return 1.0 / (self.sampling_rate * self.oversampling)
+
+
+@dataclass(frozen=True, slots=True, kw_only=True, eq=False)
+class LineMotion:
+    """What a line did.
+
+    signals : by channel, (sample,)    deviations from nominal rotation in rad, rad/s, rad/s2 (m for a translation), and
+        mesh forces in N; low-passed means, flat to 0.39 of the sampling rate
+    nominal_angle, nominal_speed : (sample,)    of the reference, rad and rad/s
+    energy_residual : input - dissipated - change of what is stored, over ``throughput`` in J, from the start of the
+        integration to its end
+    contact_loss, back_contact : (mesh,)    shares of the steps without contact, and on the back flanks
+    largest_force, least_force : (mesh,) N  at the internal rate
+    newton_rounds : mean of a step
+    end : (2, dof)    deviations and their rates where the integration ended
+    """
+
+    signals: dict[tuple[str, int], Array]
+    nominal_angle: Array
+    nominal_speed: Array
+    energy_residual: float
+    throughput: float
+    contact_loss: Array
+    back_contact: Array
+    largest_force: Array
+    least_force: Array
+    newton_rounds: float
+    end: Array
+
+
+def integrate_line(
+    line: GearedLine,
+    course: LineCourse,
+    torques: Sequence[ShaftTorque],
+    solver: LineSolver,
+    *,
+    duration: float,
+    channels: Sequence[tuple[str, int]],
+    lead_in: float = 0.0,
+    start: tuple[Array, Array] | None = None,
+) -> LineMotion:
+    """Integrate from ``lead_in`` s before time 0 or earlier, and give out ``duration`` s from time 0 on.
+
+    Parameters
+    ----------
+    channels : ("angle" | "speed" | "acceleration", degree of freedom) or ("mesh_force", mesh)
+    start : deviations and their rates, (dof,) each, where the integration begins; None is ``static_start``
+
+    The low-pass looks ahead and back: integration begins at least ``decimation.Decimator.margin`` samples and one
+    before time 0, and ends as many after the last.
+
+    Raises
+    ------
+    ConfigError        for channels, torques or starts that the line has not
+    StepError          where the contact does not converge, the energies do not balance, or a step passes a tooth
+    SimulationError    where the motion leaves all bounds
+    """
+    n = len(line.names)
+    _check_channels(line, channels)
+    n_samples = round(duration * solver.sampling_rate)
+    if n_samples < 1 or not 0.0 <= lead_in < math.inf:
+        raise ConfigError(f"line: duration {duration:g} s and lead-in {lead_in:g} s hold no sample, or no start")
+    if start is not None and any(part.shape != (n,) or not np.isfinite(part).all() for part in start):
+        raise ConfigError(f"line: start must be finite deviations and rates, ({n},) each")
+    step, low_pass = solver.step, decimator(solver.oversampling)
+    _check_step(line, course, step)
+    first_sample = -max(low_pass.margin + 1, math.ceil(lead_in * solver.sampling_rate))
+    if start is None:
+        start = static_start(line, course, torques, time=first_sample / solver.sampling_rate), np.zeros(n)
+    run = _Run(line, course, torques, solver, start, channels)
+    run.begin(first_sample * solver.oversampling)
+    run.skip((-low_pass.margin - first_sample) * solver.oversampling - 1)
+    signals = run.record(n_samples)
+    angle, speed = course.nominal(np.arange(n_samples) / solver.sampling_rate)
+    motion = run.told(signals, angle, speed)
+    if not motion.energy_residual <= solver.max_energy_residual:
+        missed = _told_above(motion.energy_residual, solver.max_energy_residual)
+        raise StepError(
+            f"line: the energy balance misses {missed} of what goes through, more than "
+            f"{solver.max_energy_residual:g}; raise the oversampling above {solver.oversampling}"
+        )
+    return motion
+
+
+def _told_above(value: float, limit: float) -> str:
+    """A value in three digits, or in as many as show that it is above a limit."""
+    texts = (f"{value:.{digits}g}" for digits in range(3, 18))
+    return next((text for text in texts if float(text) > limit), f"{value:.3g}")
+
+
+def static_start(line: GearedLine, course: LineCourse, torques: Sequence[ShaftTorque], *, time: float = 0.0) -> Array:
+    """Deviations at which the line turns without vibrating under its mean torques at a time, (dof,).
+
+    Torques over an angle act with the mean of their tables. What they do not balance accelerates a free line as one
+    rigid body, and the line is at rest in that motion.
+
+    Raises
+    ------
+    SimulationError    where it does not come to rest
+    """
+    order = elimination_order(line)
+    still = pack_line(line, order, STILL, 0.0, "at rest")
+    meshes, pushed = pack_meshes(line, order), pack_torques(line, order, torques, course)
+    means = np.array([torque.table.mean() for torque in torques])
+    pushed = pushed._replace(first=np.arange(len(torques) + 1), table=means)
+    angle, _, gain, knot, share = kernels.nominal(course.knots, time, 0)
+    q, force = np.zeros((2, len(order)))
+    kernels.push(still, pushed, angle, gain, knot, share, q, force)
+    free = line.rotation @ line.stiffness @ line.rotation
+    if free <= 1e-12 * float(np.abs(line.rotation) @ np.abs(line.stiffness) @ np.abs(line.rotation)):
+        force -= still.carried * (force @ still.rotation) / (still.carried @ still.rotation)
+    law = np.zeros((len(line.meshes), layout.N_LAW))
+    if kernels.rest(still, meshes, force, angle, q, law, _scratch(line)) < 0:
+        raise SimulationError(
+            "line: it does not come to rest under its mean torques; give a start, or check torques and springs"
+        )
+    return np.asarray(q[np.argsort(order)])
+
+
+class _Run:
+    """A line on its way."""
+
+    def __init__(
+        self,
+        line: GearedLine,
+        course: LineCourse,
+        torques: Sequence[ShaftTorque],
+        solver: LineSolver,
+        start: tuple[Array, Array],
+        channels: Sequence[tuple[str, int]],
+    ) -> None:
+        self.line, self.course, self.solver, self.channels = line, course.knots, solver, tuple(channels)
+        self.order = elimination_order(line)
+        at_of, step = np.argsort(self.order), solver.step
+        self.packed = pack_line(line, self.order, 4.0 / step**2, 2.0 / step, f"with a step of {step:.3g} s")
+        self.meshes = pack_meshes(line, self.order)
+        self.torques = pack_torques(line, self.order, torques, course)
+        self.law, self.work = np.zeros((len(line.meshes), layout.N_LAW)), _scratch(line)
+        q, v = (np.array(part[self.order], dtype=np.float64) for part in start)
+        mean, force = np.zeros((2, len(q)))
+        approach, rate = np.zeros((2, len(line.meshes)))
+        self.state = q, v, mean, force, approach, rate, self.law
+        self.tally = np.zeros((len(line.meshes), layout.N_TALLY))
+        self.sums = np.zeros(layout.N_SUMS)
+        self.chosen = np.array(
+            [(KINDS.index(kind), i if kind == "mesh_force" else at_of[i]) for kind, i in channels], dtype=np.int64
+        ).reshape(-1, 2)
+        self.place, self.n_steps, self.energy = 0, 0, 0.0
+
+    def begin(self, place: int) -> None:
+        """Look at the start, ``place`` steps from time 0."""
+        self.place = place
+        time = place * self.solver.step
+        kernels.look(self.packed, self.meshes, self.torques, self.course, time, self.state, self.work)
+        self.energy = self._energy()
+
+    def _energy(self) -> float:
+        q, v, *_ = self.state
+        return float(kernels.energy(self.packed, q, v, self.law, self.work))
+
+    def advance(self, n_steps: int, channels: NDArray[np.int64], out: Array) -> None:
+        """Integrate on, and give out the means of channels over every step, (step, column)."""
+        failed = kernels.advance(
+            self.packed, self.meshes, self.torques, self.course, self.state, self.solver.step, self.place, n_steps,
+            channels, out, self.tally, self.sums, self.work,
+        )  # fmt: skip
+        q, v, *_ = self.state
+        if failed >= 0:
+            raise StepError(
+                f"line: the mesh forces do not converge at {failed * self.solver.step:.6g} s; raise the oversampling"
+            )
+        self.place += n_steps
+        self.n_steps += n_steps
+        if not max(np.abs(q).max(), np.abs(v).max()) < OUT_OF_BOUNDS:
+            worst = self.line.names[self.order[int(np.argmax(np.maximum(np.abs(q), np.abs(v))))]]
+            raise SimulationError(
+                f"line: '{worst}' left all bounds before {self.place * self.solver.step:.6g} s; the torques are not "
+                f"balanced, or the step is too long"
+            )
+
+    def skip(self, n_steps: int) -> None:
+        """Integrate on and give out nothing."""
+        nothing, n_block = np.empty((0, 2), dtype=np.int64), BLOCK * self.solver.oversampling
+        while n_steps > 0:
+            self.advance(min(n_steps, n_block), nothing, np.empty((0, 0)))
+            n_steps -= n_block
+
+    def record(self, n_samples: int) -> Array:
+        """Integrate on from a step before the low-pass's reach, and decimate block by block, (channel, sample)."""
+        factor, low_pass = self.solver.oversampling, decimator(self.solver.oversampling)
+        n_groups = -(-len(self.channels) // LANES)
+        n_kept = 2 * low_pass.margin * factor + 1
+        means = np.zeros((n_kept + BLOCK * factor, n_groups * LANES))
+        self.advance(n_kept, self.chosen, means)
+        samples = np.empty((n_samples, n_groups * LANES))
+        for done in range(0, n_samples, BLOCK):
+            n_now = min(BLOCK, n_samples - done)
+            self.advance(n_now * factor, self.chosen, means[n_kept:])
+            filled = means[: n_kept + n_now * factor].reshape(-1, n_groups, LANES)
+            samples[done : done + n_now] = low_pass.apply(filled).transpose(2, 1, 0).reshape(n_now, -1)
+            means[:n_kept] = means[n_now * factor : n_now * factor + n_kept].copy()
+        return samples[:, : len(self.channels)].T
+
+    def told(self, signals: Array, angle: Array, speed: Array) -> LineMotion:
+        """The motion, and what the run tells about itself."""
+        q, v, *_ = self.state
+        into = self.sums[layout.INPUT] + self.sums[layout.PASSING]
+        # a free vibration has no input: what it began with goes through it
+        throughput = self.sums[layout.THROUGHPUT] + self.energy
+        residual = into - self.sums[layout.DISSIPATED] - (self._energy() - self.energy)
+        at_of = np.argsort(self.order)
+        return LineMotion(
+            signals={channel: np.ascontiguousarray(s) for channel, s in zip(self.channels, signals, strict=True)},
+            nominal_angle=angle,
+            nominal_speed=speed,
+            energy_residual=abs(residual) / throughput if throughput > 0.0 else 0.0,
+            throughput=float(throughput),
+            contact_loss=self.tally[:, layout.APART] / self.n_steps,
+            back_contact=self.tally[:, layout.BEHIND] / self.n_steps,
+            largest_force=self.tally[:, layout.LARGEST].copy(),
+            least_force=self.tally[:, layout.LEAST].copy(),
+            newton_rounds=float(self.sums[layout.ROUNDS]) / self.n_steps,
+            end=np.array([q[at_of], v[at_of]]),
+        )
+
+
+def _scratch(line: GearedLine) -> Work:
+    n, m = len(line.names), len(line.meshes)
+    most = max([1, *[mesh.n_pairs for mesh in line.meshes]])
+    n_columns = layout.STIFFNESS + layout.PER_SPRING * max([1, *[len(mesh.depth) for mesh in line.meshes]])
+    ahead_q, ahead_v, moved, force = np.zeros((4, n))
+    turned, roll_rate, free, approach, before, rate, right, near = np.zeros((8, m))
+    return Work(
+        ahead_q=ahead_q,
+        ahead_v=ahead_v,
+        moved=moved,
+        force=force,
+        turned=turned,
+        roll_rate=roll_rate,
+        free=free,
+        approach=approach,
+        before=before,
+        rate=rate,
+        right=right,
+        near=near,
+        matrix=np.zeros((m, m)),
+        law=np.zeros((m, layout.N_LAW)),
+        pairs=np.zeros((m, layout.N_FLANKS, most, n_columns)),
+        reach=np.full((m, layout.N_FLANKS), -math.inf),
+    )
+
+
+def _check_channels(line: GearedLine, channels: Sequence[tuple[str, int]]) -> None:
+    if not channels:
+        raise ConfigError("line: no channel to give out; name at least one")
+    for kind, i in channels:
+        n = len(line.meshes) if kind == "mesh_force" else len(line.names)
+        if kind not in KINDS or not 0 <= i < n:
+            raise ConfigError(f"line: no channel ({kind!r}, {i}); allowed: {', '.join(KINDS)} of 0..{n - 1}")
+
+
+def _check_step(line: GearedLine, course: LineCourse, step: float) -> None:
+    for mesh in line.meshes:
+        rate = mesh.n_teeth[0] * abs(float(line.rotation[mesh.roll_dof])) / (2.0 * math.pi) * course.speed.max()
+        if rate * step > LONGEST_STEP:
+            raise StepError(
+                f"mesh '{mesh.name}' rolls {rate * step:.2g} pitches in a step, its teeth pass at {rate:.4g} Hz; raise "
+                f"the oversampling {math.ceil(rate * step / LONGEST_STEP)} times"
+            )

@@ -1,0 +1,1 @@
+"""Root stress and strength of teeth."""

@@ -1,0 +1,239 @@
+"""Bending stress at the tooth's root: ISO 6336-3 at its own load point, and through the mesh under given loads.
+
+Theory, limits and choices: ``docs/theory/root_stress.md``.
+"""
+
+from __future__ import annotations
+
+import math
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+
+from gensig.errors import ConfigError, GeometryError
+from gensig.geometry.contact import GearPair
+from gensig.geometry.gear import Gear
+from gensig.life.root.tooth_root import root_loading, root_section
+
+Array = NDArray[np.float64]
+
+LOAD_POINTS = ("outer_single_pair", "tip")
+EDITIONS = (2019, 2006)
+DEEP_TOOTH_RATIOS = (2.05, 2.5)  # of eps_alpha_n, between which Y_DT falls
+DEEP_TOOTH_GRADE = 4  # the coarsest ISO 1328 grade whose teeth share the load that well
+RIM_SHARES = (0.5, 1.2)  # of the tooth height: no thinner rims; from here on the rim does not matter
+OVERHANG_MODULES = 1.0  # of a wider gear at either end that helps its root
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class RootFactors:
+    """Every factor of the nominal root stress of one gear, sigma_F0 = F_t / (b m_n) times their product.
+
+    ``width`` b in m, at most one normal module wider than the mate at either end; ``form_factor`` Y_F (without f_eps),
+    ``stress_correction_factor`` Y_S, ``load_distribution_factor`` f_eps, ``contact_ratio_factor`` Y_eps (load at the
+    tip only), ``helix_factor`` Y_beta, ``rim_thickness_factor`` Y_B, ``deep_tooth_factor`` Y_DT.
+    """
+
+    width: float
+    normal_module: float
+    form_factor: float
+    stress_correction_factor: float
+    load_distribution_factor: float
+    contact_ratio_factor: float
+    helix_factor: float
+    rim_thickness_factor: float
+    deep_tooth_factor: float
+    notch_parameter: float
+
+    @property
+    def stress_per_force(self) -> float:
+        """Nominal stress over tangential force, Pa/N."""
+        factors = (
+            self.form_factor,
+            self.stress_correction_factor,
+            self.load_distribution_factor,
+            self.contact_ratio_factor,
+            self.helix_factor,
+            self.rim_thickness_factor,
+            self.deep_tooth_factor,
+        )
+        return math.prod(factors) / (self.width * self.normal_module)
+
+
+def gears_of(pair: GearPair) -> dict[str, Gear]:
+    """The gears by name."""
+    return {"pinion": pair.pinion, "wheel": pair.wheel}
+
+
+def normal_contact_ratio(pair: GearPair) -> float:
+    """Contact ratio of the virtual spur gears, eps_alpha_n = eps_alpha / cos^2(beta_b)."""
+    return pair.transverse_contact_ratio / math.cos(pair.base_helix_angle) ** 2
+
+
+def root_width(pair: GearPair, gear: Gear) -> float:
+    """Width that bears at the root, m: the gear's own, of a wider one no more than a module beyond either end."""
+    mate = pair.wheel if gear is pair.pinion else pair.pinion
+    return min(gear.face_width, mate.face_width + 2.0 * OVERHANG_MODULES * gear.normal_module)
+
+
+def root_factors(
+    pair: GearPair,
+    *,
+    load_point: str = "outer_single_pair",
+    edition: int = 2019,
+    grade: float | None = None,
+    allow_extrapolation: bool = False,
+) -> dict[str, RootFactors]:
+    """Factors of both gears, by name.
+
+    Parameters
+    ----------
+    load_point : ``outer_single_pair`` (Method B of ISO 6336-3) or ``tip``, the whole load there times Y_eps
+    edition : of ISO 6336-3; 2006 has neither f_eps nor 1 / cos^3(beta) in Y_beta
+    grade : of ISO 1328, None for perfect gears; only fine teeth with a high contact ratio have a Y_DT below 1
+
+    Raises
+    ------
+    ConfigError, GeometryError, ExtrapolationError    for unknown choices, too thin a rim, a notch out of range
+
+    Source: ISO 6336-3, 6 to 10, external gears; the tip with Y_eps = 0.25 + 0.75 / eps_alpha_n is its former Method C
+    (also DIN 3990-3). Y_DT is taken with the edition 2006 only: f_eps of 2019 already shares the load.
+    """
+    if load_point not in LOAD_POINTS:
+        raise ConfigError(f"strength.load_point = {load_point!r}; allowed: {', '.join(LOAD_POINTS)}")
+    if edition not in EDITIONS:
+        raise ConfigError(f"strength.edition = {edition!r}; allowed: {', '.join(map(str, EDITIONS))}")
+    ratio, at_tip = normal_contact_ratio(pair), load_point == "tip"
+    found = {}
+    for name, gear in gears_of(pair).items():
+        normal_pitch = math.pi * gear.normal_module * math.cos(gear.pressure_angle)
+        place = 0.0 if at_tip else normal_pitch * (ratio - 1.0)
+        loading = root_loading(gear, place, allow_extrapolation=allow_extrapolation)
+        if not loading.lever_arm[0] > 0.0:
+            raise GeometryError(
+                f"{name}: the outer point of single pair contact lies below the critical section (contact ratio "
+                f"{ratio:.4g}); take strength.load_point=tip"
+            )
+        found[name] = RootFactors(
+            width=root_width(pair, gear),
+            normal_module=gear.normal_module,
+            form_factor=float(loading.form_factor[0]),
+            stress_correction_factor=float(loading.stress_correction_factor[0]),
+            load_distribution_factor=1.0 if at_tip or edition == 2006 else load_distribution_factor(pair),
+            contact_ratio_factor=0.25 + 0.75 / max(ratio, 1.0) if at_tip else 1.0,
+            helix_factor=helix_factor(pair, edition=edition),
+            rim_thickness_factor=rim_thickness_factor(gear),
+            deep_tooth_factor=1.0 if at_tip or edition == 2019 else deep_tooth_factor(ratio, grade),
+            notch_parameter=root_section(gear).notch_parameter,
+        )
+    return found
+
+
+def load_distribution_factor(pair: GearPair) -> float:
+    """f_eps: how the pairs in contact share the load, as the overlap grows from 0 to 1.
+
+    Source: ISO 6336-3:2019, 6.2: 1 (0.7 from eps_alpha_n = 2 on) without overlap, eps_alpha_n^-0.5 from 1 on.
+    """
+    ratio, overlap = normal_contact_ratio(pair), min(pair.overlap_ratio, 1.0)
+    if overlap == 0.0 and ratio >= 2.0:
+        return 0.7
+    alone = 1.0 if ratio < 2.0 else 0.5
+    return math.sqrt((1.0 - overlap) * alone + overlap / ratio)
+
+
+def helix_factor(pair: GearPair, *, edition: int) -> float:
+    """Y_beta = 1 - eps_beta beta / 120 degrees, over cos^3(beta) from 2019 on; overlap up to 1, helix up to 30 degrees.
+
+    Source: ISO 6336-3, 8.
+    """
+    helix = min(abs(pair.pinion.helix_angle), math.radians(30.0))
+    factor = 1.0 - min(pair.overlap_ratio, 1.0) * math.degrees(helix) / 120.0
+    return factor if edition == 2006 else factor / math.cos(helix) ** 3
+
+
+def rim_thickness_factor(gear: Gear) -> float:
+    """Y_B of the ring between bore and root: 1 from 1.2 tooth heights on, 1.6 ln(2.242 h_t / s_R) below.
+
+    Source: ISO 6336-3, 9, external gears; no thinner rims than half a tooth height.
+    """
+    height, rim = gear.tip_radius - gear.root_radius, gear.root_radius - gear.bore_radius
+    if rim <= RIM_SHARES[0] * height:
+        raise GeometryError(
+            f"{gear.name}: the rim between bore and root is {rim * 1e3:.3g} mm, {rim / height:.2g} tooth heights; ISO "
+            f"6336-3 covers more than {RIM_SHARES[0]:g}; reduce bore_radius_mm"
+        )
+    return 1.0 if rim >= RIM_SHARES[1] * height else 1.6 * math.log(2.242 * height / rim)
+
+
+def deep_tooth_factor(ratio: float, grade: float | None) -> float:
+    """Y_DT of teeth of ISO 1328 grade 4 or finer (None: perfect) with a contact ratio eps_alpha_n above 2.05.
+
+    Source: ISO 6336-3:2006, 10: -0.666 eps_alpha_n + 2.366 up to 2.5, 0.7 beyond.
+    """
+    low, high = DEEP_TOOTH_RATIOS
+    if ratio <= low or (grade is not None and grade > DEEP_TOOTH_GRADE):
+        return 1.0
+    return 2.366 - 0.666 * ratio if ratio <= high else 0.7
+
+
+def stress_factor_on_path(pair: GearPair, gear: Gear, position: Array, *, allow_extrapolation: bool = False) -> Array:
+    """Y_F Y_S of one gear for a contact at any position along the path.
+
+    Parameters
+    ----------
+    position : m    from A in the transverse section; beyond the path the tip's corner touches, so its ends count
+
+    Returns
+    -------
+    of the shape of ``position``; in the normal section the way from the tip is 1 / cos(beta_b) longer
+    """
+    on_path = np.clip(position, 0.0, pair.path_of_contact)
+    from_tip = pair.path_of_contact - on_path if gear is pair.pinion else on_path
+    distance = np.ravel(from_tip) / math.cos(pair.base_helix_angle)
+    found = root_loading(gear, distance, allow_extrapolation=allow_extrapolation)
+    return found.stress_factor.reshape(np.shape(position))
+
+
+def pair_root_stress(
+    pair: GearPair, gear: Gear, position: Array, load: Array, *, allow_extrapolation: bool = False
+) -> Array:
+    """Root stress of a spur tooth under the load of its pair, static or dynamic, of the shape of ``position``, Pa.
+
+    Parameters
+    ----------
+    position : m    of the contact from A
+    load : N        of this pair along the line of action
+    """
+    factor = stress_factor_on_path(pair, gear, position, allow_extrapolation=allow_extrapolation)
+    tangential = load * math.cos(gear.transverse_pressure_angle)
+    return tangential * factor / (root_width(pair, gear) * gear.normal_module)
+
+
+def spread_along_face(own: Array, structure: Array, coupling: float) -> Array:
+    """What the root carries where slices bend their neighbours, (..., slice).
+
+    Parameters
+    ----------
+    own : (..., slice)              what each slice's own load would do to it
+    structure : (..., slice) m2/N   compliance of teeth and bodies per width
+    coupling : squared length over which slices couple, over the squared width of a slice; 0 leaves ``own`` as it is
+
+    The reaction k w of the foundation with shear that the mesh has for its slices, k w - (k coupling w')' = own,
+    k = 1 / structure, w' = 0 at both ends: the sum over the face stays. Thomas's algorithm, whose pivots are positive.
+    """
+    if coupling == 0.0 or own.shape[-1] == 1:
+        return own
+    between = 2.0 * coupling / (structure[..., 1:] + structure[..., :-1])
+    pivot, deflection = 1.0 / structure, own.copy()
+    pivot[..., 1:] += between
+    pivot[..., :-1] += between
+    n_slices = own.shape[-1]
+    for j in range(1, n_slices):
+        ratio = between[..., j - 1] / pivot[..., j - 1]
+        pivot[..., j] -= ratio * between[..., j - 1]
+        deflection[..., j] += ratio * deflection[..., j - 1]
+    deflection[..., -1] /= pivot[..., -1]
+    for j in range(n_slices - 2, -1, -1):
+        deflection[..., j] = (deflection[..., j] + between[..., j] * deflection[..., j + 1]) / pivot[..., j]
+    return deflection / structure

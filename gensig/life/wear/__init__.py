@@ -1,0 +1,1 @@
+"""Wear of flanks over a life."""

@@ -1,0 +1,97 @@
+"""Flanks that wear under a history of loads: lives under steady torques, looked up between them."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from dataclasses import dataclass
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from gensig.life.growth import GrowthLaw
+from gensig.life.wear.wear_case import WearCase
+from gensig.life.wear.wear_life import WearLife, wear_life
+
+Array = NDArray[np.float64]
+
+N_DEPTHS = 121
+N_TORQUES = 3  # life goes nearly as a power of the torque
+
+
+@dataclass(frozen=True, slots=True, kw_only=True, eq=False)
+class WearTable:
+    """Lives under steady torques (torque,) N m, ascending; made by ``wear_table``.
+
+    ``turns`` (torque, node) of the pinion to each of the depths ``sizes`` (node,) m by the case's criterion;
+    ``reached`` (time,) m are those at which each life tells its flanks.
+    """
+
+    torque: Array
+    lives: tuple[WearLife, ...]
+    reached: tuple[Array, ...]
+    sizes: Array
+    turns: Array
+
+    def worn(self, size: float, torque: float) -> Array:
+        """Depth off both flanks, (2, slice, node) m, of a steady torque's life where its depth is ``size``."""
+        found = []
+        for life, reached in zip(self.lives, self.reached, strict=True):
+            place = float(np.interp(size, reached, np.arange(len(reached))))
+            low = min(int(place), len(reached) - 2)
+            found.append(life.depth[low] + (place - low) * (life.depth[low + 1] - life.depth[low]))
+        return _between(self.torque, np.array(found), torque)
+
+
+def wear_table(case: WearCase, least: float, greatest: float) -> WearTable:
+    """Lives of a case between two torques in N m.
+
+    Raises
+    ------
+    GensigError    for what ``wear_life`` refuses
+    """
+    torques = np.array([least]) if least == greatest else np.geomspace(least, greatest, N_TORQUES)
+    lives = tuple(wear_life(case.under(float(torque))) for torque in torques)
+    # a limit of the transmission error may end lives at unlike depths: the least of them ends all
+    sizes = np.linspace(0.0, min(life.threshold for life in lives), N_DEPTHS)
+    reached = tuple(np.array([life.case.judged(depth) for depth in life.depth]) for life in lives)
+    turns = np.array([np.interp(sizes, depths, life.turns) for depths, life in zip(reached, lives, strict=True)])
+    return WearTable(torque=torques, lives=lives, reached=reached, sizes=sizes, turns=turns)
+
+
+@dataclass(frozen=True, slots=True, kw_only=True, eq=False)
+class WearGrowth(GrowthLaw):
+    """The law of one unit's flanks; its size is the depth that the wear criterion looks at, m.
+
+    ``torque`` in N m is the unit's mean one, whose steady life gives the worn profile: the order of the loads changes
+    how fast a flank wears, and its shape not (assumed; all loads take off most where flanks slide most).
+    ``as_fault`` makes a fault of the depth off both flanks.
+    """
+
+    table: WearTable
+    torque: float
+    as_fault: Callable[[Array], dict[str, Any]]
+
+    @property
+    def sizes(self) -> Array:  # type: ignore[override]
+        """Depths of the table, (node,) m."""
+        return self.table.sizes
+
+    def rate(self, size: Array, torque: float) -> Array:
+        """Depth a turn of the pinion, (size,) m."""
+        taken = np.diff(self.table.turns, axis=1)
+        turns = np.exp(_between(self.table.torque, np.log(taken), torque))
+        return (np.diff(self.sizes) / turns)[np.clip(np.searchsorted(self.sizes, size) - 1, 0, len(turns) - 1)]
+
+    def fault(self, size: float) -> dict[str, Any]:
+        """Both flanks."""
+        return self.as_fault(self.table.worn(size, self.torque))
+
+
+def _between(torques: Array, values: Array, torque: float) -> Array:
+    """Values (torque, ...) at one torque, linear over its logarithm."""
+    if len(torques) == 1:
+        return values[0]
+    place = float(np.interp(np.log(torque), np.log(torques), np.arange(len(torques))))
+    low = min(int(place), len(torques) - 2)
+    return values[low] + (place - low) * (values[low + 1] - values[low])

@@ -1,0 +1,1 @@
+"""Gear meshes cut into slices over the face width: helical pairs and part-width faults."""

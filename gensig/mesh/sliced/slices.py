@@ -1,0 +1,396 @@
+"""Loaded tooth contact of a spur or helical pair: slices of the face, each a spur pair at its own place of the mesh.
+
+Theory, limits and choices: ``docs/theory/helical_mesh.md``.
+"""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Mapping
+from dataclasses import dataclass
+from functools import lru_cache
+
+import numpy as np
+from numpy.typing import NDArray
+
+from gensig.errors import ConfigError, ExtrapolationError, GeometryError
+from gensig.geometry.contact import GearPair, corner_gap_by_pinion
+from gensig.geometry.tooth import Tooth, healthy_tooth
+from gensig.material import Material
+from gensig.mesh.body_coupling import shared_body_compliance
+from gensig.mesh.local_contact import contact_law
+from gensig.mesh.options import MeshOptions, SliceOptions
+from gensig.mesh.pair_table import FIRST_PITCH, LAST_PITCH, node_positions, structural_compliance
+from gensig.mesh.sliced._slice_kernels import solve_slices
+from gensig.mesh.sliced.slice_teeth import (
+    NO_FLANK,
+    GearSlices,
+    check_independent,
+    merged_edges,
+    slices_of_gears,
+)
+
+Array = NDArray[np.float64]
+
+
+@dataclass(frozen=True, slots=True, kw_only=True, eq=False)
+class SlicedMesh:
+    """A gear pair cut into slices: what each is made of, by position s along the path.
+
+    Parameters
+    ----------
+    position : (node,) m             from A, as ``node_positions``
+    structure : (node,) m2/N         compliance of both teeth and bodies per width, less what pairs share
+    contact_factor : m2/N, contact_constant : (node,), log_weight : see ``ContactLaw``
+    gap : (slice, node) m            corner gap and what the flanks of all teeth stand back
+    shared_compliance : m/N
+    deviation : (slice, node) m      what the flanks stand back, in slices of equal width; None: nothing
+    edges : (slice + 1,) m           of the slices, from the end that enters first
+    pinion, wheel : what single teeth have beyond that
+    """
+
+    pair: GearPair
+    options: MeshOptions
+    slices: SliceOptions
+    position: Array
+    structure: Array
+    contact_factor: float
+    contact_constant: Array
+    log_weight: float
+    gap: Array
+    shared_compliance: float
+    deviation: Array | None
+    edges: Array
+    pinion: GearSlices
+    wheel: GearSlices
+
+    @property
+    def slice_width(self) -> Array:
+        """Width of the slices, (slice,) m."""
+        return np.diff(self.edges)
+
+    @property
+    def slice_place(self) -> Array:
+        """Middle of each slice from the end that enters first, (slice,) m."""
+        return 0.5 * (self.edges[1:] + self.edges[:-1])
+
+    @property
+    def coupling_length_squared(self) -> float:
+        """Square of the length over which slices couple, m2."""
+        length = self.slices.coupling_modules * self.pair.pinion.normal_module
+        return length**2 if self.slices.slice_coupling == "coupled" else 0.0
+
+    @property
+    def lag(self) -> Array:
+        """How much later each slice meets the same phase, (slice,) m along the path."""
+        if self.slices.slices_in_phase:
+            return np.zeros_like(self.slice_place)
+        return self.slice_place * math.tan(self.pair.base_helix_angle)
+
+
+@dataclass(frozen=True, slots=True, kw_only=True, eq=False)
+class LoadedContact:
+    """Equilibrium under one force, phase by phase.
+
+    Parameters
+    ----------
+    roll : (phase,) m                     pinion's roll along the line of action
+    pair_index : (phase, pair)            0 is the pair whose first slice enters at roll 0, 1 the next one
+    position : (phase, pair, slice) m     from A; may lie beyond the path, where corners touch
+    approach : (phase,) m                 of the gears along the transverse line of action
+    stiffness : (phase,) N/m              secant of the contact term, tangent of everything else
+    line_load : (phase, pair, slice) N/m  along the transverse line of action per width
+    """
+
+    roll: Array
+    pair_index: NDArray[np.int64]
+    position: Array
+    approach: Array
+    stiffness: Array
+    line_load: Array
+
+
+def sliced_mesh(
+    pair: GearPair,
+    material: Material,
+    options: MeshOptions,
+    slices: SliceOptions,
+    *,
+    deviation: Array | None = None,
+    teeth: Mapping[tuple[str, int], Tooth] | None = None,
+) -> SlicedMesh:
+    """Cut a pair into slices: `n_slices` of equal width, and where the faults of a tooth begin and end.
+
+    Parameters
+    ----------
+    deviation : (slice, node) m    how far both flanks of all teeth together stand back of perfect ones at the table's
+        positions, in the middle of slices of equal width (`slice_places`)
+    teeth : the teeth that are not sound, by (gear, tooth), as ``faulty_teeth`` gives them
+
+    Raises
+    ------
+    ConfigError    for uncoupled slices with a fault over part of the width that nobody asked for
+    """
+    odd = dict(teeth or {})
+    check_independent(odd.values(), slices)
+    edges = merged_edges(pair, slices.n_slices, odd.values())
+    place = 0.5 * (edges[1:] + edges[:-1])
+    position = node_positions(pair, options)
+    structure, shared = _structure(pair, material, options)
+    law = contact_law(pair, np.clip(position, 0.0, pair.path_of_contact), material, options)
+    # the paper's law knows no corners: the edge of the field of action ends contact
+    corner = np.zeros_like(position) if options.law == "paper" else corner_gap_by_pinion(pair, position)
+    gap = np.repeat(corner[None], len(place), axis=0)
+    if deviation is not None:
+        gap = gap + _across(
+            slice_places(pair, slices), np.broadcast_to(deviation, (slices.n_slices, len(position))), place
+        )
+    sides = slices_of_gears(pair, material, options, odd, edges, structure)
+    return SlicedMesh(
+        pair=pair,
+        options=options,
+        slices=slices,
+        position=position,
+        structure=structure,
+        contact_factor=law.factor,
+        contact_constant=np.array(np.broadcast_to(law.constant, position.shape)),
+        log_weight=law.log_weight,
+        gap=gap,
+        shared_compliance=shared,
+        deviation=deviation,
+        edges=edges,
+        pinion=sides["pinion"],
+        wheel=sides["wheel"],
+    )
+
+
+def _across(known: Array, values: Array, place: Array) -> Array:
+    """Values (slice, node) at places across the face from those at known ones, straight on beyond the outer two."""
+    if len(place) == len(known):
+        return values
+    if len(known) == 1:
+        return np.repeat(values, len(place), axis=0)
+    left = np.clip(np.searchsorted(known, place) - 1, 0, len(known) - 2)
+    part = ((place - known[left]) / (known[left + 1] - known[left]))[:, None]
+    return (1.0 - part) * values[left] + part * values[left + 1]
+
+
+def slice_places(pair: GearPair, slices: SliceOptions) -> Array:
+    """Middle of every slice from the end that enters first, (slice,) m."""
+    edges = np.linspace(0.0, pair.face_width, slices.n_slices + 1)
+    return 0.5 * (edges[1:] + edges[:-1])
+
+
+@lru_cache(maxsize=16)
+def _structure(pair: GearPair, material: Material, options: MeshOptions) -> tuple[Array, float]:
+    """Compliance of both sound teeth and bodies per width (node,) m2/N, and what pairs share, m/N."""
+    on_path, place = np.unique(np.clip(node_positions(pair, options), 0.0, pair.path_of_contact), return_inverse=True)
+    in_plane = material.in_plane(options.elasticity)
+    whole = np.zeros_like(on_path)
+    for gear, curvature in ((pair.pinion, pair.pinion_curvature), (pair.wheel, pair.wheel_curvature)):
+        own = structural_compliance(healthy_tooth(gear), np.asarray(curvature(on_path)), in_plane, options)
+        whole += own * gear.face_width
+    shared = 0.0
+    if options.pair_coupling == "coupled":
+        shared = shared_body_compliance(pair, in_plane)
+    left = whole - shared * pair.face_width
+    if left.min() <= 0.05 * whole.min():
+        raise ExtrapolationError(
+            f"the gear bodies share {shared:.3g} m/N of the stiffest pair's {whole.min() / pair.face_width:.3g} m/N; "
+            f"use a larger bore_radius_mm or mesh.pair_coupling=sum"
+        )
+    return left[place], shared
+
+
+@dataclass(frozen=True, slots=True, kw_only=True, eq=False)
+class Meeting:
+    """Which teeth meet, and how far each stands back of where its kind has it.
+
+    Parameters
+    ----------
+    start_tooth_pinion, start_tooth_wheel : the teeth whose first slices enter at A at roll 0
+    pinion_error, wheel_error : (tooth,) m      as a gap at the pitch point
+    pinion_tilt, wheel_tilt : (tooth,) m/m      how fast that grows with the contact's position along the path
+    """
+
+    start_tooth_pinion: int = 0
+    start_tooth_wheel: int = 0
+    pinion_error: Array | None = None
+    wheel_error: Array | None = None
+    pinion_tilt: Array | None = None
+    wheel_tilt: Array | None = None
+
+
+def pair_positions(mesh: SlicedMesh, roll: Array) -> tuple[Array, NDArray[np.int64]]:
+    """Positions s of every pair's slices, (phase, pair, slice) m, and numbers of the pairs, (phase, pair), that of
+    roll 0 being 0; in order of entry, newest first."""
+    pitch = mesh.pair.base_pitch
+    newest = np.floor(roll / pitch).astype(np.int64) - FIRST_PITCH
+    n_pairs = math.ceil(LAST_PITCH - FIRST_PITCH + float(mesh.lag[-1]) / pitch)
+    index = newest[:, None] - np.arange(n_pairs)
+    return (roll[:, None] - index * pitch)[:, :, None] - mesh.lag, index
+
+
+@dataclass(frozen=True, slots=True, kw_only=True, eq=False)
+class ContactPhases:
+    """What every slice of every pair is at given rolls, whatever the force; new gaps are all that wear changes.
+
+    Parameters
+    ----------
+    roll : (phase,) m
+    pair_index : (phase, pair)    see ``LoadedContact``
+    position, structure, constant, gap, width : (phase, pair, slice), m, m2/N, 1, m, m: see ``SlicedMesh``; ``width`` is
+        that of the slice, less where the field of action cuts it
+    """
+
+    mesh: SlicedMesh
+    roll: Array
+    pair_index: NDArray[np.int64]
+    position: Array
+    structure: Array
+    constant: Array
+    gap: Array
+    width: Array
+
+
+def contact_phases(mesh: SlicedMesh, roll: Array, meeting: Meeting | None = None) -> ContactPhases:
+    """Prepare the loaded contact at rolls, (phase,) m; at 0 the first slice of a pair enters at A."""
+    position, index = pair_positions(mesh, roll)
+    share = np.ones_like(position)
+    if mesh.options.law == "paper":  # elsewhere the corners' gaps tell where contact ends
+        position, share = cut_by_field(mesh, position)
+    structure, gap = np.interp(position, mesh.position, mesh.structure), _gaps(mesh, position)
+    _add_teeth(mesh, position, index, meeting or Meeting(), structure, gap)
+    return ContactPhases(
+        mesh=mesh,
+        roll=roll,
+        pair_index=index,
+        position=position,
+        structure=structure,
+        constant=np.interp(position, mesh.position, mesh.contact_constant),
+        gap=gap,
+        width=mesh.slice_width * share,
+    )
+
+
+def loaded_contact(mesh: SlicedMesh, roll: Array, force: float, meeting: Meeting | None = None) -> LoadedContact:
+    """Load of every slice of every pair under a total force along the transverse line of action.
+
+    Parameters
+    ----------
+    roll : (phase,) m    at 0 the first slices of the start teeth enter at A
+    force : N
+
+    Raises
+    ------
+    ConfigError    for a force that is not positive
+    GeometryError    where no slice can touch, or the bearing slices never settle
+    """
+    return settled_contact(contact_phases(mesh, roll, meeting), force)
+
+
+def settled_contact(phases: ContactPhases, force: float) -> LoadedContact:
+    """The same at rolls that are prepared already."""
+    if not force > 0.0:
+        raise ConfigError(
+            f"the mesh force is {force:g} N and must be positive; give a torque that the pinion drives with"
+        )
+    mesh, roll = phases.mesh, phases.roll
+    approach, stiffness = np.empty_like(roll), np.empty_like(roll)
+    line_load = np.empty_like(phases.position)
+    n_unsettled = solve_slices(
+        phases.structure, mesh.contact_factor, phases.constant, mesh.log_weight, phases.gap, phases.width,
+        mesh.slice_width, mesh.coupling_length_squared, mesh.shared_compliance, force, force / mesh.pair.face_width,
+        approach, stiffness, line_load,
+    )  # fmt: skip
+    if n_unsettled or not np.isfinite(approach).all():
+        raise GeometryError(
+            f"no contact at {int(np.sum(~np.isfinite(approach)))} and no settled one at {n_unsettled} of {len(roll)} "
+            f"phases under {force:.4g} N; reduce the modification or raise the torque"
+        )
+    return LoadedContact(
+        roll=roll,
+        pair_index=phases.pair_index,
+        position=phases.position,
+        approach=approach,
+        stiffness=stiffness,
+        line_load=line_load,
+    )
+
+
+def _gaps(mesh: SlicedMesh, position: Array) -> Array:
+    """(phase, pair, slice) m; inf beyond the table, where no corner reaches."""
+    gap = np.empty_like(position)
+    for j in range(position.shape[-1]):
+        gap[..., j] = np.interp(position[..., j], mesh.position, mesh.gap[j], left=np.inf, right=np.inf)
+    return gap
+
+
+def _add_teeth(
+    mesh: SlicedMesh, position: Array, index: NDArray[np.int64], meeting: Meeting, structure: Array, gap: Array
+) -> None:
+    """Add what single teeth have to structure and gap, (phase, pair, slice)."""
+    for side, start, error, tilt in (
+        (mesh.pinion, meeting.start_tooth_pinion, meeting.pinion_error, meeting.pinion_tilt),
+        (mesh.wheel, meeting.start_tooth_wheel, meeting.wheel_error, meeting.wheel_tilt),
+    ):
+        tooth = (index + start) % len(side.kind)
+        kinds = side.kind[tooth]
+        for kind in np.unique(kinds[kinds > 0]):
+            here = kinds == kind
+            softer, back = _of_kind(mesh, side, int(kind), position[here])
+            structure[here] += softer
+            gap[here] += back
+        if error is not None:
+            gap += error[tooth][:, :, None]
+        if tilt is not None:
+            gap += tilt[tooth][:, :, None] * (position - mesh.pair.pitch_point)
+        gap[~side.present[kinds]] = np.inf
+    gap[gap > 0.1 * NO_FLANK] = np.inf
+
+
+def _of_kind(mesh: SlicedMesh, side: GearSlices, kind: int, position: Array) -> tuple[Array, Array]:
+    """How much softer, m2/N, and how far back, m, the slices of one kind of tooth are at positions (phase, slice)."""
+    softer, gap = np.empty_like(position), np.empty_like(position)
+    for j in range(position.shape[1]):
+        softer[:, j] = np.interp(position[:, j], mesh.position, side.softening[kind, j])
+        gap[:, j] = np.interp(position[:, j], mesh.position, side.gap[kind, j])
+    return softer, gap
+
+
+def cut_by_field(mesh: SlicedMesh, position: Array) -> tuple[Array, Array]:
+    """Slices that the edge of the field of action cuts: the middle of what lies on the path and its share of the slice,
+    of the shape of ``position`` both."""
+    half = 0.5 * mesh.slice_width * math.tan(mesh.pair.base_helix_angle) * (not mesh.slices.slices_in_phase)
+    path = mesh.pair.path_of_contact
+    if not half.any():
+        return position, ((position >= 0.0) & (position <= path)).astype(np.float64)
+    low, high = np.maximum(position - half, 0.0), np.minimum(position + half, path)
+    share = np.clip((high - low) / (2.0 * half), 0.0, 1.0)
+    return np.where(share > 0.0, 0.5 * (low + high), position), share
+
+
+def single_pair_stiffness(
+    mesh: SlicedMesh, position: Array, force: float, kinds: tuple[int, int] = (0, 0), closed: float = 0.1 * NO_FLANK
+) -> Array:
+    """Stiffness of the slices of one pair that lie on the path, flanks taken as touching, (phase,) N/m.
+
+    Parameters
+    ----------
+    position : (phase,) m    of the first slice, from A
+    force : N                at whose even load per width a load-dependent contact term is taken
+    kinds : of the pinion's and the wheel's tooth
+    closed : m               slices whose flanks stand further back than this count for nothing
+
+    The slices bend by themselves here: the sum over the face of 1 / (structure + contact).
+    """
+    middle, share = cut_by_field(mesh, position[:, None] - mesh.lag)
+    constant = np.interp(middle, mesh.position, mesh.contact_constant)
+    contact = mesh.contact_factor * (constant - mesh.log_weight * math.log(force / mesh.pair.face_width))
+    softness = np.interp(middle, mesh.position, mesh.structure) + contact
+    for side, kind in zip((mesh.pinion, mesh.wheel), kinds, strict=True):
+        if kind:
+            softer, gap = _of_kind(mesh, side, kind, middle)
+            softness, share = softness + softer, share * (gap < closed) * side.present[kind]
+    alone = np.sum(mesh.slice_width * share / softness, axis=1)
+    return alone / (1.0 + mesh.shared_compliance * alone)

@@ -1,0 +1,1 @@
+"""Temperatures of gears and what they change of flanks and mesh."""

@@ -1,0 +1,127 @@
+"""Steady temperature of a gear: a hollow disc that teeth heat, faces and teeth cool, and the bore may hold."""
+
+from __future__ import annotations
+
+import math
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+
+from gensig.errors import ConfigError
+from gensig.geometry.gear import Gear
+from gensig.mesh.thermal.heat import Heat
+
+Array = NDArray[np.float64]
+
+N_RADII = 201
+N_TOOTH_HEIGHTS = 65
+
+
+@dataclass(frozen=True, slots=True, kw_only=True, eq=False)
+class BodyHeat:
+    """Temperature of one gear.
+
+    Parameters
+    ----------
+    radius : (point,) m            from the bore to the root circle
+    temperature : (point,) degC    the teeth have that of the root circle
+    input : W                      friction heat that the gear takes
+    to_oil, to_bore : W            where it leaves
+    """
+
+    radius: Array
+    temperature: Array
+    input: float
+    to_oil: float
+    to_bore: float
+
+    @property
+    def tooth(self) -> float:
+        """Temperature of the teeth, degC."""
+        return float(self.temperature[-1])
+
+    @property
+    def mean(self) -> float:
+        """Temperature of the body, degC, mean over its volume."""
+        weight = self.temperature * self.radius
+        return float(np.trapezoid(weight, self.radius) / np.trapezoid(self.radius, self.radius))
+
+
+def tooth_surface(gear: Gear) -> float:
+    """Surface of all teeth: flanks, lands, spaces between, and the ends; m2.
+
+    Flanks are the involute down to its base circle and go straight to the root circle from there; the surface is as
+    long as the helix.
+    """
+    start = max(gear.base_radius, gear.root_radius)
+    roll = [math.sqrt(radius**2 - gear.base_radius**2) for radius in (start, gear.tip_radius)]
+    flank = (roll[1] ** 2 - roll[0] ** 2) / (2.0 * gear.base_radius) + start - gear.root_radius
+    tip_land = 2.0 * gear.half_tooth_angle_at(gear.tip_radius) * gear.tip_radius
+    root_land = 2.0 * (math.pi / gear.n_teeth - gear.half_tooth_angle_at(start)) * gear.root_radius
+    outline = 2.0 * flank + tip_land + max(root_land, 0.0)
+    radius = np.linspace(gear.root_radius, gear.tip_radius, N_TOOTH_HEIGHTS)
+    thickness = [2.0 * gear.half_tooth_angle_at(max(one, start)) * one for one in radius]
+    ends = 2.0 * float(np.trapezoid(thickness, radius))
+    return gear.n_teeth * (outline * gear.face_width / math.cos(gear.helix_angle) + ends)
+
+
+def face_surface(gear: Gear) -> float:
+    """Both faces of the body, from the bore to the root circle, m2."""
+    return 2.0 * math.pi * (gear.root_radius**2 - gear.bore_radius**2)
+
+
+def uniform_body(gear: Gear, temperature: float) -> BodyHeat:
+    """A gear whose temperature is known and the same all over."""
+    radius = np.linspace(gear.bore_radius, gear.root_radius, N_RADII)
+    return BodyHeat(radius=radius, temperature=np.full_like(radius, temperature), input=0.0, to_oil=0.0, to_bore=0.0)
+
+
+def solved_body(gear: Gear, input_heat: float, heat: Heat, *, bore_temperature: float | None) -> BodyHeat:
+    """Temperature of a gear that takes ``input_heat`` (W) at its teeth.
+
+    Source: (1/r) d/dr(r dT/dr) = 2 h (T - T_oil) / (g b), the annular fin of heat transfer text books (Incropera &
+    DeWitt, section 3.6), in modified Bessel functions. Without convection at the faces it is eq. (4) of the thermal
+    paper, which takes the temperatures of bore and rim as known.
+
+    Raises
+    ------
+    ConfigError    where nothing cools the gear
+    """
+    if heat.face_convection == heat.tooth_convection == 0.0 and bore_temperature is None:
+        raise ConfigError(
+            f"{gear.name}: nothing cools it; give heat.face_convection_w_per_m2k, heat.tooth_convection_w_per_m2k, "
+            f"heat.{gear.name}_bore_temperature_degc or heat.{gear.name}_temperature_degc"
+        )
+    radius = np.linspace(gear.bore_radius, gear.root_radius, N_RADII)
+    values, slopes = _solutions(radius, math.sqrt(2.0 * heat.face_convection / (heat.conductivity * gear.face_width)))
+    per_slope = 2.0 * math.pi * radius * gear.face_width * heat.conductivity  # W for 1 K/m through the cylinder
+    from_teeth = heat.tooth_convection * tooth_surface(gear)
+    at_bore = slopes[:, 0] if bore_temperature is None else values[:, 0]
+    bore_rise = 0.0 if bore_temperature is None else bore_temperature - heat.oil_temperature
+    at_rim = per_slope[-1] * slopes[:, -1] + from_teeth * values[:, -1]
+    weights = np.linalg.solve(np.array([at_bore, at_rim]), np.array([bore_rise, input_heat]))
+    to_bore = float(per_slope[0] * (weights @ slopes[:, 0]))
+    return BodyHeat(
+        radius=radius,
+        temperature=heat.oil_temperature + weights @ values,
+        input=input_heat,
+        to_oil=input_heat - to_bore,
+        to_bore=to_bore,
+    )
+
+
+def _solutions(radius: Array, fin: float) -> tuple[Array, Array]:
+    """Two solutions of the disc's equation and their slopes, (2, point) each; ``fin`` 1/m, 0 without convection.
+
+    Scaled to about 1 at either end, so that they neither overflow nor run together.
+    """
+    if fin == 0.0:
+        values = np.array([np.ones_like(radius), np.log(radius / radius[-1])])
+        return values, np.array([np.zeros_like(radius), 1.0 / radius])
+    from scipy.special import i0e, i1e, k0e, k1e
+
+    argument = fin * radius
+    inward, outward = np.exp(argument - argument[-1]), np.exp(argument[0] - argument)
+    values = np.array([i0e(argument) * inward, k0e(argument) * outward])
+    return values, fin * np.array([i1e(argument) * inward, -k1e(argument) * outward])

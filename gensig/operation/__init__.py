@@ -1,0 +1,1 @@
+"""Speed and load of a machine, and their courses over time."""

@@ -1,0 +1,1 @@
+"""Hydra's door: overrides in, a plain resolved configuration out, and its typed sections."""

@@ -1,0 +1,230 @@
+"""The only door to Hydra: overrides in, a plain resolved dictionary out, mistakes as one line.
+
+Nothing of Hydra's own (working directories, logs, ``outputs/``) is created, and nothing is instantiated.
+"""
+
+from __future__ import annotations
+
+import difflib
+import re
+from collections.abc import Sequence
+from pathlib import Path
+from typing import Any
+
+from hydra import compose as hydra_compose
+from hydra import initialize_config_module
+from hydra.core.global_hydra import GlobalHydra
+from hydra.core.override_parser.overrides_parser import OverridesParser
+from hydra.core.override_parser.types import QuotedString
+from hydra.errors import HydraException
+from omegaconf import ListConfig, OmegaConf
+from omegaconf.errors import OmegaConfBaseException
+
+from gensig.errors import ConfigError
+from gensig.options import files as option_files
+from gensig.text import nearest
+
+CONFIG_MODULE = "gensig.configs"
+
+
+def compose(config_name: str, overrides: Sequence[str] = (), *, config_dir: str | Path | None = None) -> dict[str, Any]:
+    """Compose one configuration.
+
+    Parameters
+    ----------
+    config_name : the primary file, for instance ``"generate"``
+    overrides : Hydra overrides as typed, ``group=option`` and ``key=value``
+    config_dir : folder with a user's own groups and options, searched beside the package's
+
+    Returns
+    -------
+    dict, every interpolation resolved
+
+    Raises
+    ------
+    ConfigError    for an unknown key or option, a value of the wrong form, or a missing folder
+    """
+    words = list(overrides)
+    if config_dir is not None:
+        folder = Path(config_dir).expanduser().resolve()
+        if not folder.is_dir():
+            raise ConfigError(f"--config-dir {config_dir} is not a folder")
+        words.append(f"hydra.searchpath=[file://{folder}]")
+    with _hydra():
+        try:
+            config = hydra_compose(config_name=config_name, overrides=words)
+            resolved = OmegaConf.to_container(config, resolve=True, throw_on_missing=True)
+        except (HydraException, OmegaConfBaseException, ValueError) as error:
+            raise ConfigError(_explain(error, config_name, words, config_dir)) from None
+    assert isinstance(resolved, dict)
+    return {str(key): value for key, value in resolved.items()}
+
+
+def sweep(overrides: Sequence[str]) -> list[list[str]]:
+    """Expand comma and range sweeps into one list of overrides a job (the Cartesian product, first key slowest)."""
+    jobs: list[list[str]] = [[]]
+    for override in _parse(overrides):
+        key = override.get_key_element()
+        if override.is_sweep_override():
+            values = [f"{key}={value}" for value in override.sweep_string_iterator()]
+        else:
+            values = [override.input_line or key]
+        jobs = [[*job, value] for job in jobs for value in values]
+    return jobs
+
+
+def job_folders(jobs: Sequence[Sequence[str]]) -> list[str]:
+    """Folder names of the jobs of a sweep: number and the values that differ between jobs."""
+    varied = [{job[index] for job in jobs} for index in range(len(jobs[0]))]
+    names = []
+    for number, job in enumerate(jobs):
+        text = ",".join(word for word, values in zip(job, varied, strict=True) if len(values) > 1)
+        safe = re.sub(r"[^A-Za-z0-9_.,=+-]+", "_", text)[:120]
+        names.append(f"{number}-{safe}" if safe else str(number))
+    return names
+
+
+def override_keys(overrides: Sequence[str]) -> dict[str, str]:
+    """Keys and groups that were typed, each with its value as text; refuses a sweep."""
+    keys: dict[str, str] = {}
+    for override in _parse(overrides):
+        if override.is_sweep_override():
+            raise ConfigError(
+                f"{override.input_line}: several values need -m (one data set for each){_one_value(override)}"
+            )
+        keys[str(override.key_or_group)] = override.get_value_element_as_str()
+    return keys
+
+
+def _one_value(override: Any) -> str:
+    """What was perhaps meant by several values: a decimal comma, or a list without its brackets."""
+    key, text = str(override.key_or_group), str(override.input_line).partition("=")[2]
+    parts = [part.strip() for part in text.split(",")]
+    default = None
+    for primary in option_files.PRIMARY:
+        with _hydra():
+            default = OmegaConf.select(hydra_compose(config_name=primary), key) if default is None else default
+    numbers = re.fullmatch(r"[-+]?\d+, ?\d+", text)
+    if isinstance(default, ListConfig) or (default is None and "." in key and not numbers):
+        return f"; or is it a list? Then write '{key}=[{','.join(parts)}]'"
+    if numbers:
+        return f"; or is it a decimal point? Then write {key}={'.'.join(parts)}"
+    return ""
+
+
+def typed_mapping(overrides: Sequence[str], key: str) -> dict[str, Any]:
+    """What was typed as ``key={name: value, ...}``; such a mapping may have names that no option has yet."""
+    result: dict[str, Any] = {}
+    for override in _parse([word for word in overrides if word.startswith(f"{key}=")]):
+        value = override.value()
+        if not isinstance(value, dict):
+            raise ConfigError(f"{key} must be a mapping, for instance '{key}={{name: value}}'")
+        result.update({str(name): _plain(item) for name, item in value.items()})
+    return result
+
+
+def _plain(value: Any) -> Any:
+    """Hydra's quoted strings and nested values as plain Python."""
+    if isinstance(value, dict):
+        return {str(name): _plain(item) for name, item in value.items()}
+    if isinstance(value, list):
+        return [_plain(item) for item in value]
+    return str(value) if isinstance(value, QuotedString) else value
+
+
+def options(group: str) -> list[str]:
+    """Names that a group offers in the package, sorted."""
+    with _hydra() as hydra:
+        return sorted(hydra.config_loader().get_group_options(group))
+
+
+class _hydra:
+    """Hydra's global state, set up for one call and always left clean."""
+
+    def __enter__(self) -> GlobalHydra:
+        GlobalHydra.instance().clear()
+        self._context = initialize_config_module(CONFIG_MODULE, version_base="1.3")
+        self._context.__enter__()
+        return GlobalHydra.instance()
+
+    def __exit__(self, *details: Any) -> None:
+        self._context.__exit__(*details)
+        GlobalHydra.instance().clear()
+
+
+def _parse(overrides: Sequence[str]) -> list[Any]:
+    for word in overrides:
+        if not isinstance(word, str):
+            raise ConfigError(f"an override is a text such as 'seed=1', not {word!r}; give each as its own argument")
+        if "=" not in word and not word.startswith("~"):
+            text = "is neither group=option nor key=value, such as fault=crack or seed=1"
+            raise ConfigError(f"cannot read the override: '{word}' {text}")
+    try:
+        return list(OverridesParser.create().parse_overrides(overrides=list(overrides)))
+    except HydraException as error:
+        raise ConfigError(f"cannot read the override: {_first_line(error)}") from None
+
+
+def _explain(error: Exception, config_name: str, overrides: Sequence[str], config_dir: str | Path | None) -> str:
+    """One line for a failed composition, with the nearest existing names."""
+    text = " ".join(str(error).split())
+    if "Config group override must be" in text:
+        groups = set(_groups())
+        for one in _parse(overrides):
+            key, value = str(one.key_or_group), one.value()
+            if key in groups and not isinstance(value, str | list):
+                return f"{one.input_line}: a group takes one of its options: {', '.join(options(key))}"
+    if isinstance(error, ValueError) and not isinstance(error, HydraException):
+        return text
+    for pattern in (r"Could not override '([^']+)'", r"Key '([^']+)' is not in struct"):
+        if found := re.search(pattern, text):
+            key = found.group(1)
+            return f"unknown key '{key}'{_nearest(key, _known_keys(config_name))}"
+    if found := re.search(r"Could not find '([^']+)'", text):
+        group, _, wanted = found.group(1).rpartition("/")
+        names = [one.name for one in option_files.options(group, config_dir)] if group else []
+        there = option_files.elsewhere(group, wanted) or nearest.hint(wanted, names)
+        return f"no option '{wanted}' of {group or 'the configuration'}; {there}"
+    if "mismatched input" in text or "extraneous input" in text or "no viable alternative" in text:
+        return f"cannot read the override: {text}"
+    if found := re.search(r"Could not override '([^']+)'\. No match in the defaults list", text):
+        return f"unknown group '{found.group(1)}'{_nearest(found.group(1), _groups())}"
+    if found := re.search(r"Missing mandatory value: (\S+)", text):
+        key = getattr(error, "full_key", None) or found.group(1)
+        return f"{key} is required: give {key}=..."
+    return text.removesuffix(".")
+
+
+def _known_keys(config_name: str) -> list[str]:
+    """Every dotted key of the default configuration."""
+    with _hydra():
+        tree = OmegaConf.to_container(hydra_compose(config_name=config_name), resolve=False)
+    return list(_dotted(tree))
+
+
+def _groups() -> list[str]:
+    with _hydra() as hydra:
+        return list(hydra.config_loader().list_groups(""))
+
+
+def _dotted(tree: Any, prefix: str = "") -> list[str]:
+    if not isinstance(tree, dict):
+        return []
+    keys = []
+    for key, value in tree.items():
+        keys += [f"{prefix}{key}", *_dotted(value, f"{prefix}{key}.")]
+    return keys
+
+
+def _nearest(key: str, names: Sequence[str]) -> str:
+    """'; did you mean ...?' over whole keys, then over their last part."""
+    close = difflib.get_close_matches(key, names, n=3, cutoff=0.6)
+    if not close:
+        leaf = key.rpartition(".")[2]
+        leaves = difflib.get_close_matches(leaf, [name.rpartition(".")[2] for name in names], n=3, cutoff=0.75)
+        close = [name for name in names if name.rpartition(".")[2] in leaves][:3]
+    return f"; did you mean {' or '.join(repr(name) for name in close)}?" if close else ""
+
+
+def _first_line(error: Exception) -> str:
+    return str(error).strip().splitlines()[0]

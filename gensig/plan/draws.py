@@ -1,0 +1,131 @@
+"""What plans draw: values of varied keys, and whole faults with their sizes."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from gensig.dataset.distributions import GRID, design_points, level_values, n_levels, values_at
+from gensig.errors import ConfigError
+from gensig.faults.registry import COMPOUND, fault_parts, read_faults
+from gensig.geometry.tooth_profile import root_curve_point
+from gensig.record.machines import read_machine
+from gensig.systems.registry import LINE, read_pair
+from gensig.units import from_si, split_unit, to_si
+
+SCALED = ("low", "high", "mean", "std", "values")  # of a distribution that is a share of a size
+CEILING = "at_most_of_root_chord"  # beside ``of``: the highest value, over the root chord of the faulted gear
+OWN = ("of", CEILING)
+
+
+def draw_values(
+    config: Mapping[str, Any], vary: Mapping[str, Any], points: NDArray[np.int64], rng: np.random.Generator, where: str
+) -> dict[str, list[Any]]:
+    """Values of every varied key, (condition,) each.
+
+    In a grid a key with levels has that of the condition's point, the first key slowest. All others are drawn together
+    from one space-filling design.
+    """
+    design = config["plan"]["design"]
+    names = {key: f"{where}.vary.{key}" for key in vary}
+    crossed = [key for key in vary if design == GRID and n_levels(names[key], vary[key]) is not None]
+    drawn = [key for key in vary if key not in crossed]
+    unit = design_points(design, len(points), len(drawn), rng)
+    values = {key: values_at(names[key], vary[key], unit[:, k]) for k, key in enumerate(drawn)}
+    step = 1
+    for key in reversed(crossed):
+        levels = level_values(names[key], vary[key])
+        values[key] = [levels[point // step % len(levels)] for point in points.tolist()]
+        step *= len(levels)
+    return {key: values[key] for key in vary}
+
+
+def fault_sizes(fault: Mapping[str, Any]) -> dict[str, float]:
+    """The numbers of a fault by key; those of a compound one carry the place of their part."""
+    if "parts" in fault:
+        numbered = enumerate(fault["parts"])
+        return {f"parts.{place}.{key}": value for place, part in numbered for key, value in fault_sizes(part).items()}
+    numbers = {key: value for key, value in fault.items() if isinstance(value, int | float) and key != "tooth"}
+    return {key: float(value) for key, value in numbers.items()}
+
+
+def fault_specs(
+    config: Mapping[str, Any], fault: Mapping[str, Any]
+) -> tuple[dict[str, Any], dict[str, tuple[int, str]]]:
+    """Distributions of a fault by name, and the part and key that each is of."""
+    read_faults(fault)
+    specs: dict[str, Any] = {}
+    places: dict[str, tuple[int, str]] = {}
+    for place, part in enumerate(fault_parts(fault)):
+        for key, spec in (part.get("vary") or {}).items():
+            if key not in part or key == "vary":
+                raise ConfigError(f"fault.vary: '{key}' is no key of fault={part['kind']}")
+            name = f"parts.{place}.{key}" if fault["kind"] == COMPOUND else key
+            specs[name], places[name] = _for_gear(config, part["gear"], key, spec), (place, key)
+    return specs, places
+
+
+def draw_faults(
+    config: Mapping[str, Any], fault: Mapping[str, Any], points: NDArray[np.int64], rng: np.random.Generator
+) -> list[dict[str, Any]]:
+    """One complete fault a condition, its severity distribution drawn; one design for all parts of a compound fault."""
+    specs, places = fault_specs(config, fault)
+    parts = [{key: value for key, value in part.items() if key != "vary"} for part in fault_parts(fault)]
+    drawn = draw_values(config, specs, points, rng, "fault")
+    faults: list[dict[str, Any]] = []
+    for condition in range(len(points)):
+        own = [dict(plain) for plain in parts]
+        for name, values in drawn.items():
+            place, key = places[name]
+            own[place][key] = values[condition]
+        faults.append({"kind": fault["kind"], "parts": own} if fault["kind"] == COMPOUND else (own or [dict(fault)])[0])
+    return faults
+
+
+def _gear_sizes(config: Mapping[str, Any], gear: str) -> tuple[int, dict[str, float]]:
+    """Teeth of a gear, and the sizes in mm that a fault may be a share of."""
+    if config["system"]["kind"] == LINE:  # whose gears stand in a table
+        own = getattr(read_machine(config).pair, gear)
+        sizes = {"normal_module": own.normal_module, "face_width": own.face_width}
+        return own.n_teeth, {name: from_si("size_mm", value) for name, value in sizes.items()}
+    values = config["gear"][gear]
+    sizes = {"normal_module": config["gear"]["normal_module_mm"], "face_width": values["face_width_mm"]}
+    return values["n_teeth"], sizes
+
+
+def _root_chord(config: Mapping[str, Any], gear: str) -> float:
+    """Thickness of a gear's tooth in the middle of its root curve, where cracks begin, m."""
+    pair = read_machine(config).pair if config["system"]["kind"] == LINE else read_pair(config)
+    return 2.0 * root_curve_point(getattr(pair, gear), "arc_mid")[1]
+
+
+def _for_gear(config: Mapping[str, Any], gear: str, key: str, spec: Any) -> Any:
+    """A distribution for the faulted gear: ``distribution: tooth`` over its teeth, ``of`` as shares of a size of it."""
+    if not isinstance(spec, Mapping):
+        return spec
+    if spec.get("distribution") != "tooth" and "of" not in spec:
+        return spec
+    n_teeth, sizes = _gear_sizes(config, gear)
+    if spec.get("distribution") == "tooth":
+        return {**spec, "distribution": "integers", "low": 0, "high": n_teeth - 1}
+    unit = split_unit(key)[1]
+    if spec["of"] not in sizes or unit not in ("mm", "um"):
+        raise ConfigError(
+            f"fault.vary.{key}: of = {spec['of']!r}; a length may be drawn as a share of {', '.join(sizes)}"
+        )
+    size = from_si(key, to_si("size_mm", sizes[spec["of"]]))
+
+    def scaled(value: Any) -> Any:
+        return [scaled(one) for one in value] if isinstance(value, list) else value * size
+
+    try:
+        drawn = {name: scaled(value) if name in SCALED else value for name, value in spec.items() if name not in OWN}
+        if CEILING in spec:
+            ceiling = from_si(key, spec[CEILING] * _root_chord(config, gear))
+            drawn["high"] = min(drawn["high"], ceiling)
+        return drawn
+    except TypeError:
+        raise ConfigError(f"fault.vary.{key}: {', '.join(SCALED)} must be numbers, or lists of them") from None

@@ -1,0 +1,46 @@
+"""What a plan lacks that one may expect of it: records for every unit, splits by machine."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from typing import Any
+
+from gensig.dataset.plan import Plan
+from gensig.dataset.splitting.protocols import why_left_out
+from gensig.life.life_options import runs_to_failure
+
+BY_MACHINE = {"by_unit": "unit", "cross_specimen": "set of gears", "cross_gearbox": "gearbox"}
+
+
+def plan_notes(config: Mapping[str, Any], plan: Plan) -> list[str]:
+    """At most one line: fewer units than asked for, and which splits by machine are not possible."""
+    parts = [_units_left_out(config, plan), _splits_left_out(plan, int(config["seed"]))]
+    return ["; ".join(part for part in parts if part)] if any(parts) else []
+
+
+def _units_left_out(config: Mapping[str, Any], plan: Plan) -> str:
+    asked, used = config["plan"]["n_units"], n_different(plan, "unit_id")
+    if used >= asked or runs_to_failure(config):
+        return ""
+    conditions = _count(n_different(plan, "condition_id"), "condition")
+    classes = _count(len(config["plan"]["classes"]), "class", "es")
+    repeats = _count(config["plan"]["n_repeats"], "repeat")
+    records = _count(plan.n_records, "record")
+    return f"{records} are {conditions} of {classes} and {repeats}: {used} of {asked} units are used"
+
+
+def _splits_left_out(plan: Plan, seed: int) -> str:
+    """The reason of the first protocol of the list, or, where whole units can be kept apart, of those that cannot."""
+    reasons = why_left_out(plan, seed, tuple(BY_MACHINE))
+    if "by_unit" in reasons:
+        reasons = {"by_unit": reasons["by_unit"]}
+    return "; ".join(f"no split by {BY_MACHINE[name]} is possible ({reason})" for name, reason in reasons.items())
+
+
+def n_different(plan: Plan, column: str) -> int:
+    """Number of different values in a column."""
+    return len(set(plan.columns[column].tolist()))
+
+
+def _count(n: int, noun: str, ending: str = "s") -> str:
+    return f"{n:,} {noun}{ending * (n != 1)}"

@@ -1,0 +1,291 @@
+"""From a configuration to a data set on disk: the joint between physics and the data-set code."""
+
+from __future__ import annotations
+
+import dataclasses
+import functools
+import json
+from collections.abc import Callable, Mapping, Sequence
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Any
+
+from gensig.dataset.folder.beginning import create_folder
+from gensig.dataset.folder.failures import commonest, failure_reasons
+from gensig.dataset.folder.joining import joined_folder
+from gensig.dataset.folder.layout import PLAN, ShardEntry, read_manifest, shard_path
+from gensig.dataset.folder.manifest import (
+    finalize,
+    identity_hash,
+    record_failed_shard,
+    record_shard,
+)
+from gensig.dataset.folder.run_log import log
+from gensig.dataset.plan import Plan, PlanRows
+from gensig.dataset.schema import SAMPLE_TYPES
+from gensig.dataset.storage.compression import COMPRESSIONS, creation_options
+from gensig.dataset.storage.receipts import (
+    collect_receipts,
+    read_receipt,
+    receipt_path,
+    write_receipt,
+)
+from gensig.dataset.storage.shard import ShardWriter
+from gensig.dynamics._vector import n_lanes
+from gensig.dynamics.decimation import usable_band
+from gensig.errors import ConfigError, DatasetError
+from gensig.execution.base import Executor, ShardFailure
+from gensig.life.life_options import runs_to_failure
+from gensig.plan.make import check_switches, make_plan
+from gensig.record.inputs import read_seed
+from gensig.record.machines import read_machine
+from gensig.record.simulate import signal_shapes, simulate_records
+from gensig.systems.pair_machine import PairMachine
+from gensig.units import channel_unit, from_si
+from gensig.version import __version__
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class Progress:
+    """How far a run is when a shard is finished or given up.
+
+    Parameters
+    ----------
+    n_done, n_records : int    records that are there, of all that shall be
+    n_failed : int             records among `n_done` whose simulation failed
+    n_made, n_bytes : int      records and bytes that this run has made
+    reason : str               why this shard could not be made; empty when it was
+    """
+
+    n_done: int
+    n_records: int
+    n_failed: int
+    n_made: int
+    n_bytes: int
+    reason: str
+
+
+def begin_folder(config: dict[str, Any], overrides: Sequence[str], out: Path) -> Plan:
+    """Plan a data set and make its folder, ready for ``run_folder``; nothing is touched if anything is wrong."""
+    for key, allowed in (("compression", COMPRESSIONS), ("sample_type", SAMPLE_TYPES)):
+        if config["dataset"][key] not in allowed:
+            raise ConfigError(f"dataset.{key} = {config['dataset'][key]!r}; allowed: {', '.join(allowed)}")
+    creation_options(config["dataset"]["compression"])  # refuses one whose package is missing
+    check_switches(config)
+    plan = make_plan(config)
+    recorded = {**config, "out": None}
+    create_folder(
+        out,
+        config=recorded,
+        overrides=overrides,
+        plan=plan,
+        identity=identity_hash(recorded, __version__),
+        seed=read_seed(config),
+        generator_version=__version__,
+    )
+    log(out, f"gensig {__version__}: {plan.n_records} records in {plan.n_shards} shards are planned")
+    return plan
+
+
+def run_folder(
+    out: Path, *, executor: Executor, on_shard: Callable[[Progress], None], asked: Mapping[str, Any] | None = None
+) -> tuple[int, list[str]]:
+    """Make the shards that a folder still lacks, then close it; a task of an array job makes its share only.
+
+    Parameters
+    ----------
+    executor : where the shards are made; it decides no bit
+    on_shard : called for every shard that is finished or could not be made
+    asked : a configuration that must be the folder's in all that decides bits; None asks for nothing
+
+    Returns
+    -------
+    number of failed records, and one line for each shard that could not be made; the folder is complete only if
+    there is none
+    """
+    out = out.resolve()
+    joined_folder(out, asked=asked)
+    if executor.closes:
+        collect_receipts(out)
+    manifest = read_manifest(out)
+    rows = [entry.rows for entry in manifest.shards]
+    mine = executor.share(range(len(rows)))
+    entries = {index: manifest.shards[index] for index in mine}
+    if not executor.closes:
+        entries |= {index: entry for index in mine if (entry := read_receipt(out, index)) is not None}
+    missing = [index for index in mine if not _is_there(out, index, entries[index])]
+    n_records = sum(rows[index] for index in mine)
+    n_done = n_records - sum(rows[index] for index in missing)
+    n_failed = sum(entries[index].n_failed for index in mine if index not in missing)
+    problems: list[str] = []
+    n_made, n_bytes = 0, 0
+    logged = executor.closes and not manifest.is_complete  # the log of a closed folder is closed too
+    if logged:
+        log(out, f"gensig {__version__}, {executor}: {len(missing)} of {len(mine)} shards to make")
+    try:
+        for index, result in executor.run(functools.partial(write_shard, out), missing):
+            if isinstance(result, ShardFailure):
+                reason = f"shard {index}: {result.reason}"
+                problems.append(reason)
+                if executor.closes:
+                    record_failed_shard(out, index)
+                    log(out, f"{reason}; not made")
+            else:
+                reason = ""
+                n_done, n_failed = n_done + rows[index], n_failed + result.n_failed
+                n_made, n_bytes = n_made + rows[index], n_bytes + result.n_bytes
+                if executor.closes:
+                    record_shard(out, index, result.sha256, result.n_bytes, result.n_failed)
+                    receipt_path(out, index).unlink(missing_ok=True)
+                    log(out, f"shard {index}: {rows[index]} records, {result.n_failed} failed, {result.n_bytes} bytes")
+            on_shard(
+                Progress(
+                    n_done=n_done,
+                    n_records=n_records,
+                    n_failed=n_failed,
+                    n_made=n_made,
+                    n_bytes=n_bytes,
+                    reason=reason,
+                )
+            )
+    except BaseException as error:
+        if logged:
+            log(out, f"ended by {type(error).__name__}: {error}")
+        raise
+    if logged and not problems:
+        _close(out)
+    return n_failed, problems
+
+
+def _close(out: Path) -> None:
+    """Close the folder; the log is closed with it, and takes no line afterwards."""
+    if reasons := failure_reasons(out):
+        log(out, f"{len(reasons)} of {read_manifest(out).n_records} records failed: {commonest(reasons)}")
+    log(out, "every shard is done; closing")
+    finalize(out)
+
+
+def _is_there(out: Path, index: int, entry: ShardEntry) -> bool:
+    """True for a shard that is done and whose file has not been lost or cut since."""
+    path = shard_path(out, index)
+    return entry.state == "done" and path.is_file() and path.stat().st_size == entry.bytes
+
+
+def close_folder(out: Path) -> int:
+    """Close a folder whose shards were made by tasks of an array job; returns the number of failed records.
+
+    Raises
+    ------
+    DatasetError    when a shard is missing, which is named
+    """
+    joined_folder(out)
+    collect_receipts(out)
+    if not read_manifest(out).is_complete:
+        _close(out)
+    return read_manifest(out).n_failed
+
+
+MOST_BLOCK, BLOCK_BYTES = 64, 2**27  # records simulated and written at a time, and bytes of their samples
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class WrittenShard:
+    """Digest, size and number of failed records of a shard on disk."""
+
+    sha256: str
+    n_bytes: int
+    n_failed: int
+
+
+def write_shard(out: Path, shard_index: int) -> WrittenShard:
+    """Simulate and write one shard of a folder; its bits depend on nothing but the folder's plan and configuration.
+
+    Raises
+    ------
+    DatasetError    where the folder was begun by another version than that of this process
+    """
+    config, plan, sizes = _folder_inputs(out, (out / PLAN).stat().st_mtime_ns)
+    n_records, begin = sizes[shard_index], sum(sizes[:shard_index])
+    params = [name.removeprefix("params/") for name in plan.names if name.startswith("params/")]
+    writer = open_shard(shard_path(out, shard_index), config, n_records, params)
+    together = block_length(config)
+    with writer:
+        for first in range(0, n_records, together):
+            rows = plan.records(begin + first, min(together, n_records - first))
+            _check_places(out, rows, shard_index, first)
+            for row, record in enumerate(simulate_records(config, rows), start=first):
+                writer.write(row, record.signals, record.values)
+    written = WrittenShard(sha256=writer.sha256, n_bytes=writer.n_bytes, n_failed=writer.n_failed)
+    write_receipt(out, shard_index, rows=n_records, **dataclasses.asdict(written))
+    return written
+
+
+@functools.lru_cache(maxsize=1)
+def _folder_inputs(out: Path, _changed: int) -> tuple[dict[str, Any], PlanRows, list[int]]:
+    """Configuration, plan and records of each shard, read once by a process that makes many shards of one folder."""
+    manifest, config = joined_folder(out)
+    return config, PlanRows(out / PLAN), [entry.rows for entry in manifest.shards]
+
+
+def _check_places(out: Path, rows: Sequence[Mapping[str, Any]], shard_index: int, first: int) -> None:
+    if any((row["shard"], row["row"]) != (shard_index, first + k) for k, row in enumerate(rows)):
+        raise DatasetError(f"{out / PLAN} and the manifest disagree on shard {shard_index}; restore both from a copy")
+
+
+def block_length(config: Mapping[str, Any]) -> int:
+    """Records that are simulated at a time: enough to fill the lanes with them and their twins, few enough to hold."""
+    system = read_machine(config)
+    n_bytes = 8 * len(system.sensing.channels) * round(system.operating.duration * system.sensing.sampling_rate)
+    return max(n_lanes(system.solver.precision), min(MOST_BLOCK, BLOCK_BYTES // n_bytes))
+
+
+def open_shard(path: Path, config: Mapping[str, Any], n_records: int, params: Sequence[str]) -> ShardWriter:
+    """Writer for records of one configuration."""
+    system = read_machine(config)
+    return ShardWriter(
+        path,
+        n_records=n_records,
+        signals=signal_shapes(config, system),
+        params=params,
+        attributes=root_attributes(config, system),
+        compression=config["dataset"]["compression"],
+        sample_type=config["dataset"]["sample_type"],
+        lives=runs_to_failure(config),
+    )
+
+
+def _shaft_sensors(config: Mapping[str, Any], system: PairMachine) -> dict[str, Any]:
+    """What a reader of the stored shaft signals has to know."""
+    tacho, encoder = system.sensing.tacho, system.sensing.encoder
+    of_tacho = {"tacho_shaft": tacho.shaft, "tacho_pulses_per_turn": tacho.pulses_per_turn}
+    of_encoder = {"encoder_shaft": encoder.shaft, "encoder_lines_per_turn": encoder.lines_per_turn}
+    return (of_tacho if config["dataset"]["store_tacho"] else {}) | (
+        of_encoder if config["dataset"]["store_encoder"] else {}
+    )
+
+
+def root_attributes(config: Mapping[str, Any], system: PairMachine) -> dict[str, Any]:
+    """What is the same for every record of a data set."""
+    pair = system.pair
+    return {
+        "generator_version": __version__,
+        "sampling_rate_hz": system.sensing.sampling_rate,
+        "usable_band_hz": list(usable_band(system.sensing.sampling_rate)),
+        "channel_names": list(system.sensing.channel_names),
+        "source_names": list(system.sensing.channels),
+        "channel_units": [channel_unit(name) for name in system.sensing.channel_names],
+        **_shaft_sensors(config, system),
+        **({"torque_of": system.torque_of} if system.torque_of else {}),
+        "class_names": list(config["plan"]["classes"]),
+        "n_teeth_pinion": pair.pinion.n_teeth,
+        "n_teeth_wheel": pair.wheel.n_teeth,
+        "normal_module_mm": from_si("normal_module_mm", pair.pinion.normal_module),
+        "pressure_angle_deg": from_si("pressure_angle_deg", pair.pinion.pressure_angle),
+        "helix_angle_deg": from_si("helix_angle_deg", pair.pinion.helix_angle),
+        "face_width_pinion_mm": from_si("face_width_mm", pair.pinion.face_width),
+        "face_width_wheel_mm": from_si("face_width_mm", pair.wheel.face_width),
+        "center_distance_mm": from_si("center_distance_mm", pair.center_distance),
+        "transverse_contact_ratio": pair.transverse_contact_ratio,
+        "overlap_ratio": pair.overlap_ratio,
+        "config_json": json.dumps({**config, "out": None, "executor": None}, sort_keys=True),
+    }

@@ -1,0 +1,113 @@
+"""How large a data set will be and how long it will take, from a few records made now."""
+
+from __future__ import annotations
+
+import math
+import tempfile
+import time
+import warnings
+from collections import Counter
+from collections.abc import Callable, Mapping, Sequence
+from pathlib import Path
+from typing import Any
+
+from gensig.dataset.folder.failures import commonest
+from gensig.dataset.plan import Plan, plan_text
+from gensig.execution.base import read_n_workers
+from gensig.plan.make import describe_design, make_plan
+from gensig.plan.notes import n_different
+from gensig.production.folder import block_length, open_shard
+from gensig.record.simulate import Record, forget_twins, simulate_records
+
+# Bytes beside shards and plan: index, cards and configuration; more for each shard, record (splits) and class (figure).
+BESIDE, BESIDE_A_SHARD, BESIDE_A_RECORD, BESIDE_A_CLASS = 42_000, 3_000, 380, 40_000
+
+CLOSING = 2.0  # s for index, cards and figures, most of it the import of matplotlib
+
+
+class FailedRecordsWarning(UserWarning):
+    """Records that a plan was timed with failed, as others of the data set will."""
+
+
+def predict(
+    config: Mapping[str, Any], *, on_plan: Callable[[Plan, int], None] = lambda _plan, _n_timed: None
+) -> dict[str, str]:
+    """Facts of a data set that is not made yet, by name, as text.
+
+    A block of its first records is simulated and stored in a temporary folder. Time is that of a machine like this one
+    with as many workers; start-up is counted for the workers of this machine.
+
+    Parameters
+    ----------
+    on_plan : called with the plan and the number of records that will be made, before the first of them is
+    """
+    started = time.process_time()  # what a process spends before its first record
+    begin = time.monotonic()
+    table = make_plan(config)
+    planning = time.monotonic() - begin
+    first = table.rows(0)[: block_length(config)]
+    probe = [table.record(int(index)) for index in first]
+    on_plan(table, len(probe))
+    begin = time.monotonic()
+    simulate_records(config, probe[:1])  # compiles, or loads what was compiled
+    workers = min(_n_processes(config), table.n_shards)
+    # Workers import once more what this process has imported, and load what was compiled.
+    start_up = planning + started * (1 if workers == 1 else 2) + time.monotonic() - begin
+    forget_twins()
+    begin = time.monotonic()
+    records = simulate_records(config, probe)
+    _warn_of_failed(records)
+    n_bytes = _stored_bytes(config, table, records)
+    seconds = time.monotonic() - begin
+    rounds = math.ceil(table.n_shards / workers)
+    whole = seconds * max(table.shard_sizes()) / len(probe)
+    spread = table.n_records / max(table.shard_sizes()) / workers
+    total = start_up + CLOSING + whole * (rounds if rounds < 2 * spread else spread)
+    classes = Counter(str(name) for name in table.columns["label_name"])
+    return {
+        "records": f"{table.n_records}",
+        "classes": ", ".join(f"{name} {count}" for name, count in classes.items()),
+        "units": f"{n_different(table, 'unit_id')}",
+        "specimens": f"{n_different(table, 'specimen_id')} (sets of gears)",
+        "gearboxes": f"{n_different(table, 'gearbox_id')}",
+        "conditions": f"{n_different(table, 'condition_id')}",
+        "design": describe_design(config),
+        "repeats": f"{config['plan']['n_repeats']}",
+        "shards": f"{table.n_shards} of at most {max(table.shard_sizes())} records",
+        "bytes": f"{n_bytes:,} ({n_bytes / 1e6:.3g} MB)",
+        "time": f"about {max(1, round(total))} s on {workers} worker(s), from {seconds / len(probe):.3g} s a record "
+        "measured now",
+    }
+
+
+def _warn_of_failed(records: Sequence[Record]) -> None:
+    reasons = [str(one.values["status_reason"]) for one in records if one.values.get("status") == "failed"]
+    if reasons:
+        warnings.warn(
+            f"{len(reasons)} of {len(records)} records made to time the plan failed: {commonest(reasons)}",
+            FailedRecordsWarning,
+            stacklevel=3,
+        )
+
+
+def _n_processes(config: Mapping[str, Any]) -> int:
+    """Shards made at a time, also where the rest of ``executor`` is not known yet."""
+    return read_n_workers(config["executor"]["n_workers"]) * (config["executor"].get("shard_count") or 1)
+
+
+def _stored_bytes(config: Mapping[str, Any], table: Plan, records: list[Record]) -> int:
+    """Bytes of all files, from two shards of different length and what is usual beside them."""
+    params = [name.removeprefix("params/") for name in table.columns if name.startswith("params/")]
+    sizes = []
+    with tempfile.TemporaryDirectory() as folder:
+        for n in (1, len(records)):
+            with open_shard(Path(folder) / f"{n}.h5", config, n, params) as writer:
+                for row, record in enumerate(records[:n]):
+                    writer.write(row, record.signals, record.values)
+            sizes.append(writer.n_bytes)
+    one, many = sizes
+    per_record = (many - one) / (len(records) - 1) if len(records) > 1 else one
+    shards = table.n_shards * (one - per_record) + table.n_records * per_record
+    n_classes = len(config["plan"]["classes"])
+    beside = BESIDE + BESIDE_A_SHARD * table.n_shards + BESIDE_A_RECORD * table.n_records + BESIDE_A_CLASS * n_classes
+    return round(shards + len(plan_text(table)) + beside)

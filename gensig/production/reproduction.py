@@ -1,0 +1,197 @@
+"""Records of a finished data set made once more, from what it records of them alone."""
+
+from __future__ import annotations
+
+import hashlib
+from collections.abc import Mapping
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from gensig.dataset.folder.environment import environment
+from gensig.dataset.folder.failures import without_numbers
+from gensig.dataset.folder.joining import joined_folder
+from gensig.dataset.folder.layout import PLAN, Manifest, shard_path
+from gensig.dataset.plan import Plan, read_plan
+from gensig.dataset.schema import SCALES, stored_reason
+from gensig.dataset.storage.guard import open_shard, read_rows
+from gensig.dataset.storage.quantization import quantized, read_signal
+from gensig.errors import ConfigError, DatasetError, SimulationError
+from gensig.record.inputs import (
+    record_system,
+    row_clean,
+    row_instrument,
+    row_noisy,
+    row_run,
+    row_values,
+    shaken,
+)
+from gensig.record.simulate import Record, simulate_record, simulate_records
+from gensig.systems.lead_in import simulate_with_lead_in
+
+ACCEPTED = 1e-6  # of a record's RMS, where the processor or a library is another
+DECIDING = ("cpu_model", "python", "numpy", "scipy", "numba")  # facts of an environment that bits may depend on
+BLOCK = 16  # records simulated at a time
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class Reproduction:
+    """What came of making records again.
+
+    Parameters
+    ----------
+    n_records : int          records made again
+    n_equal : int            of them, those with the same bits
+    n_failed : int           of them, those that failed and failed again for the same reason: they hold no signal
+    largest : float          largest difference of a sample over its channel's RMS; inf where one failed and one did not
+    worst : str              the record that has it, '' when all are equal
+    n_refused : int          records that differ by more than is accepted
+    other : dict             deciding facts of the environment that differ: recorded and present value
+    """
+
+    n_records: int
+    n_equal: int
+    n_failed: int
+    largest: float
+    worst: str
+    n_refused: int
+    other: dict[str, tuple[str, str]]
+
+
+def reproduce(folder: Path, n_records: int) -> Reproduction:
+    """Simulate records spread over a data set again and compare their samples with those on disk.
+
+    In the environment that made the data set every bit must agree. On another processor, or with other versions of the
+    libraries, ``ACCEPTED`` of the record's RMS is, and one count more where samples are stored as counts.
+
+    Raises
+    ------
+    DatasetError    for a folder of another version of gensig, one that was changed, or one that is not finished
+    """
+    manifest, config, plan = _finished(folder)
+    here = environment()
+    recorded = {name: str(manifest.environment.get(name, "")) for name in DECIDING}
+    other = {name: (recorded[name], str(here[name])) for name in DECIDING if recorded[name] != str(here[name])}
+    chosen = np.unique(np.linspace(0, plan.n_records - 1, min(n_records, plan.n_records)).round().astype(int))
+    differences: dict[str, float] = {}
+    refused, n_failed = 0, 0
+    for start in range(0, len(chosen), BLOCK):
+        rows = [plan.record(int(index)) for index in chosen[start : start + BLOCK]]
+        for row, record in zip(rows, simulate_records(config, rows), strict=True):
+            difference, count = _difference(folder, row, record)
+            n_failed += difference == 0.0 and record.values.get("status") == "failed"
+            if difference > 0.0:
+                differences[str(row["record_id"])] = difference
+                refused += not other or difference > ACCEPTED + count
+    worst = max(differences, key=lambda name: differences[name], default="")
+    return Reproduction(
+        n_records=len(chosen),
+        n_equal=len(chosen) - len(differences) - n_failed,
+        n_failed=n_failed,
+        largest=differences.get(worst, 0.0),
+        worst=worst,
+        n_refused=refused,
+        other=other,
+    )
+
+
+def recorded_row(folder: Path, record: str) -> tuple[dict[str, Any], dict[str, Any]]:
+    """Configuration of a data set and the row of one record, by its number or its id."""
+    _, config, plan = _finished(folder)
+    ids = plan.columns["record_id"].tolist()
+    if record in ids:
+        return config, plan.record(ids.index(record))
+    if record.isdecimal() and int(record) < plan.n_records:
+        return config, plan.record(int(record))
+    raise ConfigError(f"--record {record}: {folder} has records 0 to {plan.n_records - 1}, ids {ids[0]} to {ids[-1]}")
+
+
+def simulate_twin(config: Mapping[str, Any], row: Mapping[str, Any]) -> Record:
+    """The record without its faults: same unit, condition, start and noise, severity zero.
+
+    The original less its twin is the residual of the fault, exact but for the rounding of stored samples.
+
+    Raises
+    ------
+    SimulationError    where the original or the twin does not stay finite
+    """
+    original = simulate_record(config, row)
+    sham = {**config, "plan": {**config["plan"], "sham": True}}
+    twin = simulate_record(sham, row)
+    for record in (original, twin):
+        if record.values.get("status") == "failed":
+            raise SimulationError(f"record {row['record_id']} failed: {record.values['status_reason']}")
+    signals = dict(twin.signals)
+    sound: dict[str, Any] = {"severity": 0.0, "faults_json": "[]", "fault_gear": "", "fault_tooth": -1}
+    if not np.array_equal(signals["noise_power"], original.signals["noise_power"]):
+        # noise follows the record, so that the twin alone would have another
+        system = record_system(config, row_values(row))
+        instrument = row_instrument(config, system, row)
+        run = row_run(sham, system, row)
+        healthy = shaken(config, row, run, simulate_with_lead_in([run])[0])
+        if isinstance(healthy, SimulationError):
+            raise healthy
+        signals["noise_power"] = original.signals["noise_power"]
+        clean = row_clean(config, row, instrument, healthy.acceleration)
+        noisy, recorded = row_noisy(config, row, instrument, clean, signals["noise_power"])
+        signals["acceleration"] = noisy.astype(np.float32)
+        sound |= recorded
+    return Record(signals=signals, values={**twin.values, **sound})
+
+
+def _finished(folder: Path) -> tuple[Manifest, dict[str, Any], Plan]:
+    manifest, config = joined_folder(folder)
+    if not manifest.is_complete:
+        raise DatasetError(f"{folder} is incomplete; run `gensig resume {folder}` first")
+    return manifest, config, read_plan(folder / PLAN)
+
+
+def _difference(folder: Path, row: Mapping[str, Any], record: Record) -> tuple[float, float]:
+    """Largest difference of a sample over the RMS of its channel, and what one count is on that scale."""
+    path, place = shard_path(folder, int(row["shard"])), int(row["row"])
+    largest, count = 0.0, 0.0
+    with open_shard(path, folder=folder) as file:
+        failed = str(read_rows(file["status"])[place]) == "failed"
+        if failed != (record.values.get("status") == "failed"):
+            return np.inf, 0.0
+        if failed:
+            reasons = [stored_reason(record.values["status_reason"]), str(read_rows(file["status_reason"])[place])]
+            return (0.0 if len(set(map(without_numbers, reasons))) == 1 else np.inf), 0.0
+        for name, scale_name in SCALES.items():
+            if name not in file:
+                continue
+            stored, made = read_signal(file, name, place), record.signals[name]
+            if file[name].dtype.kind == "i":
+                counts, scale = quantized(made)
+                made = np.multiply(counts, scale[:, None], dtype=np.float64).astype(np.float32)
+                count = float(np.max(np.asarray(file[scale_name][place]) / _rms(stored)))
+            if _sha256(stored) != _sha256(made):
+                wide = stored.astype(np.float64)
+                largest = max(largest, float(np.max(np.abs(wide - made) / _rms(wide)[:, None])))
+        for name in [name for name in record.signals if name in file and name not in SCALES]:
+            largest = max(largest, _other_difference(file[name][place], record.signals[name]))
+    return largest, count
+
+
+def _other_difference(stored: NDArray[Any], made: NDArray[Any]) -> float:
+    """Largest difference of anything else over the RMS of its values; infinite where whole numbers differ."""
+    made = made.astype(stored.dtype)
+    if stored.dtype.kind in "iu":
+        return 0.0 if np.array_equal(stored, made) else np.inf
+    if np.array_equal(stored, made, equal_nan=True):
+        return 0.0
+    wide = stored.astype(np.float64).reshape(1, -1)
+    return float(np.max(np.abs(wide - made.reshape(1, -1)) / _rms(wide)))
+
+
+def _rms(signal: NDArray[Any]) -> NDArray[np.float64]:
+    """RMS of each channel, (channel,); one of zeros counts as 1."""
+    level = np.sqrt(np.mean(np.square(signal, dtype=np.float64), axis=1))
+    return np.where(level > 0.0, level, 1.0)
+
+
+def _sha256(samples: NDArray[np.float32]) -> str:
+    return hashlib.sha256(np.ascontiguousarray(samples, dtype="<f4").tobytes()).hexdigest()

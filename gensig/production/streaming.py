@@ -1,0 +1,200 @@
+"""A data set that is never stored: its records, made when they are asked for, bit for bit those of ``generate``."""
+
+from __future__ import annotations
+
+import json
+import operator
+from collections.abc import Iterator, Mapping, Sequence
+from dataclasses import dataclass, replace
+from typing import Any
+
+import numpy as np
+from numpy.typing import ArrayLike, NDArray
+
+from gensig.dataset.plan import Plan
+from gensig.dataset.schema import DEFAULTS, stored_reason
+from gensig.dataset.splitting.protocols import make_splits, why_left_out
+from gensig.dataset.splitting.splits import SUBSETS
+from gensig.dynamics._vector import n_lanes
+from gensig.errors import ConfigError, DatasetError
+from gensig.plan.make import check_switches, make_plan
+from gensig.record.inputs import read_seed, whole_number
+from gensig.record.simulate import Record, simulate_records
+
+EPOCH_STREAM = 9100  # spawn key of the seeds of later epochs; the causes of a record and the splits have others
+
+
+@dataclass(frozen=True, slots=True, kw_only=True, eq=False, repr=False)
+class RecordStream:
+    """The records of one plan, or a part of them, simulated while one iterates; made by ``gensig.stream``.
+
+    Holds plain data only, so that it can be pickled, forked and spawned. A record has ``signals`` and ``values`` by
+    the names that a shard has, every column and array with the bits that ``gensig generate`` would store.
+
+    Attributes
+    ----------
+    config : dict               the composed configuration, with the root seed
+    epoch : int                 0 for the records of ``generate``, else a draw of as many others
+    plan : Plan                 all records of the epoch
+    numbers : (record,) int     records of this part, by their number in the plan
+
+    Epoch ``k`` of root seed ``s`` is the data set of ``seed``: ``s`` itself for epoch 0, else the 53 high bits of
+    ``SeedSequence(s, spawn_key=(9100, k))``. Everything is drawn anew, units included: ``unit-0000`` of two epochs
+    are different gears.
+    """
+
+    config: dict[str, Any]
+    epoch: int
+    plan: Plan
+    numbers: NDArray[np.int64]
+
+    @property
+    def seed(self) -> int:
+        """The seed with which ``gensig generate`` makes this epoch."""
+        return epoch_seed(read_seed(self.config), self.epoch)
+
+    @property
+    def class_names(self) -> list[str]:
+        """``class_names[label]`` is the class."""
+        return list(self.config["plan"]["classes"])
+
+    @property
+    def channels(self) -> list[str]:
+        """Names along the channel axis."""
+        sensing = self.config["sensing"]
+        return list(sensing["channels"] if sensing["sensors"] is None else sensing["sensors"])
+
+    channel_names = channels  # as a stored data set calls them
+
+    @property
+    def sampling_rate_hz(self) -> float:
+        """Samples a second."""
+        return float(self.config["sensing"]["sampling_rate_hz"])
+
+    sampling_rate = sampling_rate_hz
+
+    @property
+    def n_samples(self) -> int:
+        """Samples of one channel of one record."""
+        return round(self.config["operating"]["duration_s"] * self.sampling_rate_hz)
+
+    @property
+    def usable(self) -> NDArray[np.bool_]:
+        """(record,) True: which records fail is known only when they are made; see their ``status``."""
+        return np.ones(len(self), dtype=bool)
+
+    @property
+    def column_names(self) -> list[str]:
+        """Names that ``column`` takes."""
+        return sorted(self.plan.columns)
+
+    def column(self, name: str) -> NDArray[Any]:
+        """One value of the plan a record, (record,)."""
+        if name not in self.plan.columns:
+            raise DatasetError(f"the plan has no column {name!r}; it has {', '.join(self.column_names)}")
+        return self.plan.columns[name][self.numbers]
+
+    @property
+    def protocols(self) -> list[str]:
+        """Names that ``split`` takes."""
+        return sorted(make_splits(self.plan, self.seed))
+
+    def split(self, protocol: str) -> dict[str, list[tuple[int, float, float]]]:
+        """Subset -> list of (place in this part, start_fraction, stop_fraction), as the stored data set has it."""
+        tables = make_splits(self.plan, self.seed)
+        if protocol not in tables:
+            reason = why_left_out(self.plan, self.seed).get(protocol, f"the plan can have {', '.join(sorted(tables))}")
+            raise DatasetError(f"split {protocol!r} does not exist; {reason}")
+        table = tables[protocol]
+        places = {name: place for place, name in enumerate(self.column("record_id").tolist())}
+        rows: dict[str, list[tuple[int, float, float]]] = {subset: [] for subset in SUBSETS}
+        columns = (table.record_id, table.start_fraction, table.stop_fraction, table.subset)
+        for name, start, stop, subset in zip(*(column.tolist() for column in columns), strict=True):
+            if name in places:
+                rows[subset].append((places[name], float(start), float(stop)))
+        return rows
+
+    def take(self, places: ArrayLike) -> RecordStream:
+        """Some records of this part: (record,) places in it, or True for each that is meant."""
+        chosen = np.asarray(places)
+        return replace(self, numbers=self.numbers[chosen if chosen.dtype == bool else chosen.astype(np.int64)])
+
+    def shard(self, index: int, count: int) -> RecordStream:
+        """The part of worker ``index`` of ``count``; together they are the whole, and no record is in two of them.
+
+        Conditions are dealt in turn, each whole: its records share the simulation of their healthy twin.
+        """
+        whole_number("count", count, at_least=1)
+        if whole_number("index", index, at_least=0) >= count:
+            raise ConfigError(f"index = {index} must be below count = {count}")
+        condition = np.unique(self.column("condition_id"), return_inverse=True)[1]
+        return self.take(condition % count == index)
+
+    def at_epoch(self, epoch: int) -> RecordStream:
+        """The same part of another epoch; its plan is drawn now."""
+        if epoch == self.epoch:
+            return self
+        return replace(self, epoch=epoch, plan=make_plan(_at_epoch(self.config, epoch)))
+
+    def epochs(self, count: int | None = None) -> Iterator[RecordStream]:
+        """This epoch and those that follow, endless where ``count`` is None."""
+        epoch = self.epoch
+        while count is None or epoch < self.epoch + count:
+            yield self.at_epoch(epoch)
+            epoch += 1
+
+    def __len__(self) -> int:
+        return len(self.numbers)
+
+    def __iter__(self) -> Iterator[Record]:
+        together = n_lanes(self.config["solver"]["precision"])
+        for first in range(0, len(self), together):
+            yield from self._records(self.numbers[first : first + together])
+
+    def __getitem__(self, place: int) -> Record:
+        return self._records([self.numbers[operator.index(place)]])[0]
+
+    def __repr__(self) -> str:
+        share = f"{len(self)} of {self.plan.n_records} records"
+        return f"RecordStream({share}, epoch {self.epoch}, classes {self.class_names})"
+
+    def _records(self, numbers: Sequence[int] | NDArray[np.int64]) -> list[Record]:
+        rows = [self.plan.record(int(number)) for number in numbers]
+        return _simulate(_at_epoch(self.config, self.epoch), rows)
+
+
+def open_stream(config: Mapping[str, Any], *, epoch: int = 0) -> RecordStream:
+    """All records of a composed configuration; ``out``, ``executor`` and how samples are stored change nothing.
+
+    Raises
+    ------
+    GensigError    for whatever ``make_plan`` refuses
+    """
+    plain: dict[str, Any] = {**json.loads(json.dumps(dict(config))), "out": None}
+    check_switches(plain)
+    plan = make_plan(_at_epoch(plain, epoch))
+    return RecordStream(config=plain, epoch=epoch, plan=plan, numbers=np.arange(plan.n_records))
+
+
+def epoch_seed(seed: int, epoch: int) -> int:
+    """Seed of one epoch, a whole number that every JSON reader takes exactly; see ``RecordStream``."""
+    if whole_number("epoch", epoch, at_least=0) == 0:
+        return seed
+    sequence = np.random.SeedSequence(seed, spawn_key=(EPOCH_STREAM, epoch))
+    return int(sequence.generate_state(1, np.uint64)[0]) >> 11
+
+
+def _at_epoch(config: Mapping[str, Any], epoch: int) -> dict[str, Any]:
+    return {**config, "seed": epoch_seed(read_seed(config), epoch)}
+
+
+def _simulate(config: Mapping[str, Any], rows: Sequence[Mapping[str, Any]]) -> list[Record]:
+    """Records of some rows of a plan: the one place where this module simulates."""
+    return [_as_stored(record) for record in simulate_records(config, rows)]
+
+
+def _as_stored(record: Record) -> Record:
+    """The record with the values that a shard fills in, and its reason as long as a shard holds it."""
+    values = {**DEFAULTS, **record.values}
+    values["status_reason"] = stored_reason(values["status_reason"])
+    return replace(record, values=values)

@@ -1,0 +1,1 @@
+"""What both commands share: exit statuses, one line for a mistake, shell completion."""

@@ -1,0 +1,1 @@
+"""Words and pages: nearest names, HTML pages, tables that users give, options as files."""

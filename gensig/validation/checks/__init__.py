@@ -1,0 +1,1 @@
+"""Computed quantities of the validation rows, one module a subject."""

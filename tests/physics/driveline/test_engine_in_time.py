@@ -1,0 +1,132 @@
+"""An engine's line in time: sweeps against the linear line, and root stress under forces that are known."""
+
+from dataclasses import replace
+from functools import lru_cache
+
+import numpy as np
+import pytest
+from numpy.testing import assert_allclose
+
+from gensig.driveline.engine_dampers import (
+    dynamic_root_stress,
+    mesh_between,
+    read_mesh_strength,
+    tooth_load,
+)
+from gensig.driveline.engine_line import read_engine_line
+from gensig.driveline.in_time import RATE, TimeResponse
+from gensig.driveline.linear.forced import run_of_speeds
+from gensig.driveline.sweep import amplitude_spectra, sweep_course, sweep_response
+from gensig.driveline.time_root_stress import root_stress_in_time, typical_largest
+from gensig.errors import ConfigError
+from gensig.options.compose import compose
+
+ENGINE = ("system=engine_gear_train", "excitation=engine_v20")
+RPM = np.pi / 30.0
+LOW, HIGH, SECONDS, ORDER_5 = 770.0 * RPM, 880.0 * RPM, 2.5, 9
+FLYWHEEL = 14
+
+
+@lru_cache(maxsize=2)
+def engine(*words):
+    return read_engine_line(compose("generate", (*ENGINE, *words)))
+
+
+@pytest.fixture(scope="module")
+def passage():
+    """Up and down through the second mode, which order 5 meets at 825 r/min, teeth that do not part."""
+    line = engine("system.backlash_um=0", "system.loss_factor.gear_mesh=0")
+    return line, sweep_response(line, LOW, HIGH, SECONDS, 0.0, own={}, nodes=(FLYWHEEL,), n_orders=20)
+
+
+def test_a_sweep_of_a_line_without_play_is_the_linear_line(passage):
+    line, sweep = passage
+    torques = [line.on_line(line.torques(speed, 0.0)) for speed in sweep.up.speeds]
+    (steady,) = run_of_speeds(
+        line.linear()[0],
+        lambda speed: torques[int(np.abs(sweep.up.speeds - speed).argmin())],
+        sweep.up.speeds,
+        [FLYWHEEL - 1],
+        n_orders=20,
+    )
+    both = 0.5 * (sweep.up.angle + sweep.down.angle)[0, :, ORDER_5]
+    assert_allclose(both, steady.angle[:, ORDER_5], rtol=0.15)  # the bins are 18 r/min wide
+    assert sweep.energy_residual < 1e-3
+    assert_allclose(sweep.up.speeds, sweep.down.speeds)
+
+
+def test_a_resonance_is_met_late_either_way(passage):
+    _, sweep = passage
+    up, down = (
+        float(way.speeds @ way.angle[0, :, ORDER_5] / way.angle[0, :, ORDER_5].sum()) for way in (sweep.up, sweep.down)
+    )
+    assert up > down + 0.5 * RPM
+    at = sweep.difference[0]
+    assert at[0] < 0.0 < at[-1]  # below the resonance it is already more going down
+
+
+def test_the_course_goes_up_and_comes_back():
+    course = sweep_course(70.0, 180.0, 3.0, 500.0)
+    assert_allclose(
+        np.interp([-1.0, 0.0, 1.5, 3.0, 4.5, 6.0, 7.0], course.time, course.speed), [70, 70, 125, 180, 125, 70, 70]
+    )
+    assert np.all(course.torque == 500.0)
+
+
+def test_too_short_a_sweep_is_refused():
+    with pytest.raises(ConfigError, match=r"passes too few cycles at its low end; give 0\.81 s or more"):
+        sweep_response(engine(), 650 * RPM, 1750 * RPM, 0.2, 0.0, own={}, nodes=(14,), n_orders=10)
+    with pytest.raises(ConfigError, match="from a positive speed up to a higher one"):
+        sweep_response(engine(), 1750 * RPM, 650 * RPM, 5.0, 0.0, own={}, nodes=(14,), n_orders=10)
+
+
+def test_a_steady_line_has_its_amplitude_in_the_spectrum():
+    time = np.arange(round(0.5 * RATE)) / RATE
+    frequencies, spectra = amplitude_spectra(np.array([0.3 * np.sin(2 * np.pi * 40.0 * time) + 5.0 * time + 2.0]))
+    assert frequencies[spectra[0].argmax()] == 40.0
+    assert_allclose(spectra[0].max(), 0.3, rtol=0.01)
+
+
+def motion(speed, force, n_cycles):
+    """A run in which one mesh carries a force that repeats over the cycle, (point,) N."""
+    n_samples = int(n_cycles * 4.0 * np.pi / speed * RATE)
+    crank = speed / RATE * np.arange(n_samples)
+    nothing = np.zeros((1, n_samples))
+    angle = 4.0 * np.pi / len(force) * np.arange(len(force))
+    mesh_force = np.zeros((8, n_samples)) + np.interp(crank, angle, force, period=4.0 * np.pi)
+    return TimeResponse(
+        time=crank / speed, crank_angle=crank, speed=nothing, angle=nothing, mesh_force=mesh_force,
+        fluctuation=np.zeros(1), cycle_fluctuation=np.zeros(1), contact_loss=np.zeros(8), back_contact=np.zeros(8),
+        least_force=mesh_force.min(axis=1), greatest_force=mesh_force.max(axis=1), energy_residual=0.0,
+    )  # fmt: skip
+
+
+def test_root_stress_in_time_of_a_force_that_repeats_is_that_of_one_cycle():
+    config, line = compose("generate", ENGINE), engine()
+    mesh = mesh_between(line, (21, 45))
+    strength = read_mesh_strength(config, line, mesh)
+    load = tooth_load(line, mesh, line.response(1688 * RPM, 12680.0))
+    smooth = replace(load, force=1500.0 + 4000.0 * np.cos(4.0 * np.pi * np.arange(5760) / 5760))
+    once = dynamic_root_stress(strength, line, mesh, smooth)
+    found = root_stress_in_time(strength, line, mesh, motion(load.speed, smooth.force, 4.1))
+    assert_allclose(found.gears["wheel"].stress, once.gears["wheel"].stress, rtol=1e-4)
+    passes, one = found.passes["wheel"], once.passes["wheel"]
+    assert 3 * 54 <= len(passes) <= 4 * 54
+    assert_allclose(passes[54:108].max(), one.max(), rtol=2e-3)
+    assert_allclose(typical_largest(passes, 54), one.max(), rtol=2e-3)
+    shift = int(
+        np.flatnonzero(
+            [np.allclose(np.roll(one, -k, axis=0)[:50], passes[:50], atol=0.01 * one.max()) for k in range(54)]
+        )[0]
+    )
+    assert_allclose(np.roll(one, -shift, axis=0)[:54], passes[54:108], atol=0.01 * one.max())
+
+
+def test_a_run_too_short_for_its_teeth_is_refused():
+    config, line = compose("generate", ENGINE), engine()
+    mesh = mesh_between(line, (21, 45))
+    strength = read_mesh_strength(config, line, mesh)
+    with pytest.raises(ConfigError, match="two cycles of the crank at least"):
+        root_stress_in_time(strength, line, mesh, motion(1688 * RPM, np.full(64, 1000.0), 1.02))
+    with pytest.raises(ConfigError, match="nothing closes its driving flanks in time"):
+        root_stress_in_time(strength, line, mesh, motion(1688 * RPM, np.full(64, -1000.0), 3.0))

@@ -1,0 +1,257 @@
+"""Forced vibration by orders: reciprocity, power, exact solutions, integration in time, waterfalls."""
+
+from dataclasses import dataclass
+
+import numpy as np
+import pytest
+from engine_cases import RPM, SPEED, engine_line, option, ratio_of_teeth, ratios, response_of, torques_of
+from numpy.testing import assert_allclose
+
+from gensig.driveline.excitation.cycle import cycle_angles
+from gensig.driveline.linear.forced import (
+    Elements,
+    LinearLine,
+    closed_line,
+    cycle_orders,
+    disturbance_response,
+    over_cycle,
+    run_of_speeds,
+    steady_response,
+)
+from gensig.errors import SimulationError
+
+NODES = tuple(ratios())
+N = 2880
+
+
+def chain(loss_factor=0.0, damping=0.0, grounded=True):
+    """Three discs on two shafts, the first on a third to ground."""
+    directions = np.array([[1.0, 0, 0], [1, -1, 0], [0, 1, -1]])[0 if grounded else 1 :]
+    stiffness = np.array([3e4, 2e4, 1e4])[0 if grounded else 1 :]
+    springs = Elements(directions=directions, stiffness=stiffness, loss=loss_factor * stiffness)
+    line = LinearLine(
+        mass=np.diag([0.5, 0.3, 0.2]),
+        stiffness=springs.stiffness_matrix(),
+        loss=springs.loss_matrix(),
+        damping=damping * springs.stiffness_matrix(),
+    )
+    return line, springs
+
+
+def cycle_torque(seed=0, n_orders=12, n_dofs=3):
+    rng = np.random.default_rng(seed)
+    amplitudes = rng.standard_normal((n_dofs, n_orders)) + 1j * rng.standard_normal((n_dofs, n_orders))
+    return over_cycle(amplitudes, N), amplitudes
+
+
+def test_orders_of_a_torque_give_it_back():
+    torque, amplitudes = cycle_torque()
+    mean, found = cycle_orders(torque + 3.0, 12)
+    assert_allclose(mean, 3.0, rtol=1e-12)
+    assert_allclose(found, amplitudes, rtol=1e-9)
+    angle = cycle_angles(N)
+    by_hand = sum(np.real(c * np.exp(0.5j * k * angle)) for k, c in enumerate(amplitudes[0], start=1))
+    assert_allclose(torque[0], by_hand, atol=1e-9)
+
+
+@pytest.mark.parametrize("damper", ["as_printed", "half_ring"])
+def test_response_here_to_a_torque_there_is_that_there_to_one_here(damper):
+    line, _, _ = engine_line(damper)
+    frequencies = 2 * np.pi * np.array([14.0, 28.3, 162.0, 563.0])
+    receptance = np.linalg.inv(line.dynamic_stiffness(frequencies))
+    scale = np.abs(receptance).max(axis=(1, 2), keepdims=True)
+    assert np.max(np.abs(receptance - np.swapaxes(receptance, 1, 2)) / scale) < 1e-9
+    force = np.zeros((4, 67), dtype=complex)
+    force[:, 13] = 1.0
+    assert_allclose(line.response(force, frequencies), receptance[:, :, 13], rtol=1e-6, atol=1e-9 * scale.max())
+
+
+def test_one_disc_on_a_shaft_is_the_closed_form():
+    one = LinearLine(
+        mass=np.array([[2.0]]), stiffness=np.array([[800.0]]), loss=np.array([[40.0]]), damping=np.array([[3.0]])
+    )
+    w = np.array([5.0, 20.0, 70.0])
+    found = one.response(np.ones((3, 1), dtype=complex), w)[:, 0]
+    assert_allclose(found, 1.0 / (800 + 40j + 3j * w - 2 * w**2), rtol=1e-12)
+
+
+def test_mean_power_in_is_what_the_damping_takes():
+    line, _ = chain(loss_factor=0.05, damping=1e-4)
+    torque, amplitudes = cycle_torque()
+    speed = 60.0
+    found = steady_response(line, torque, speed, n_orders=12)
+    power_in = 0.5 * np.sum(np.real(np.conj(found.speed_deviation) * amplitudes))
+    w = speed * found.orders
+    lost = line.loss[..., None] * w + line.damping[..., None] * w**2
+    power_lost = 0.5 * np.real(np.einsum("io,ijo,jo->", np.conj(found.angle), lost, found.angle))
+    assert power_in > 0.0
+    assert_allclose(power_in, power_lost, rtol=1e-9)
+
+
+def test_the_whole_engine_takes_no_more_than_it_gets():
+    line, _, _ = engine_line()
+    torque = torques_of(option()).on(NODES)
+    _, amplitudes = cycle_orders(torque, 80)
+    found = steady_response(line, torque, SPEED, n_orders=80)
+    power_in = 0.5 * np.sum(np.real(np.conj(found.speed_deviation) * amplitudes))
+    w = SPEED * found.orders
+    power_lost = 0.5 * np.real(np.einsum("io,ij,jo,o->", np.conj(found.angle), line.loss, found.angle, w))
+    assert_allclose(power_in, power_lost, rtol=1e-6)
+
+
+def test_integration_in_time_settles_to_the_same():
+    from scipy.integrate import solve_ivp
+
+    line, _ = chain(damping=4e-4)
+    torque, amplitudes = cycle_torque()
+    speed = 100.0
+    found = steady_response(line, torque, speed, n_orders=12)
+    orders = found.orders
+    inverse = np.linalg.inv(line.mass)
+
+    def slope(t, state):
+        force = np.real(amplitudes @ np.exp(1j * orders * speed * t))
+        rest = force - line.stiffness @ state[:3] - line.damping @ state[3:]
+        return np.concatenate([state[3:], inverse @ rest])
+
+    cycle = 4 * np.pi / speed
+    times = 60 * cycle + np.arange(64) * cycle / 64
+    run = solve_ivp(slope, (0.0, times[-1]), np.zeros(6), t_eval=times, rtol=1e-9, atol=1e-12)
+    speeds = found.speed_over_cycle(64)
+    assert_allclose(run.y[3:], speeds, rtol=0, atol=1e-5 * np.ptp(speeds))
+
+
+def test_slow_torques_bend_the_line_statically_and_fast_ones_move_the_masses():
+    line, springs = chain()
+    torque, amplitudes = cycle_torque(n_orders=2)
+    slow = steady_response(line, torque, 1e-3, n_orders=2)
+    assert_allclose(slow.angle, np.linalg.solve(line.stiffness, amplitudes), rtol=1e-6)
+    fast = steady_response(line, torque, 1e6, n_orders=2)
+    assert_allclose(fast.angle, -np.linalg.solve(line.mass, amplitudes) / np.square(1e6 * fast.orders), rtol=1e-4)
+    mean, carried = slow.element_forces(springs)
+    assert_allclose(mean, 0.0, atol=1e-9)
+    assert_allclose(carried[2], -amplitudes[2], rtol=1e-4)  # the last shaft carries what acts on the last disc
+
+
+def test_mean_torques_are_carried_through_and_must_balance():
+    line, springs = chain(grounded=False)
+    torque, _ = cycle_torque()
+    torque[0] += 50.0
+    torque[2] -= 50.0
+    found = steady_response(line, torque, 60.0, n_orders=12)
+    mean, _ = found.element_forces(springs)
+    assert_allclose(mean, [50.0, 50.0], rtol=1e-9)
+    assert abs(np.sum(np.diag(line.mass) * found.twist)) < 1e-12
+    torque[2] += 1.0
+    with pytest.raises(SimulationError, match=r"the mean torques leave 0.5774 N m on a line that nothing holds"):
+        steady_response(line, torque, 60.0, n_orders=12)
+
+
+def test_a_free_line_turns_as_one_under_slow_torques():
+    line, elements, _ = engine_line()
+    ratio = np.array(list(ratio_of_teeth().values()))
+    assert_allclose(elements.directions @ ratio, 0.0, atol=1e-12)
+    force = np.zeros((1, 67), dtype=complex)
+    force[0, 7] = 1.0
+    moved = line.response(force, np.array([0.3]))[0]
+    assert_allclose(moved / moved[0], ratio, rtol=1e-3)
+
+
+def test_fluctuation_is_half_the_peak_to_peak():
+    found = response_of(option())
+    speeds = found.speed_over_cycle(28_800)
+    assert_allclose(found.fluctuation(), 0.5 * np.ptp(speeds, axis=1), rtol=2e-3)
+    assert_allclose(speeds.mean(axis=1), 0.0, atol=1e-9)
+
+
+def test_more_orders_than_usual_change_little():
+    line, _, _ = engine_line()
+    torque = torques_of(option()).on(NODES)
+    few, usual, many = (steady_response(line, torque, SPEED, n_orders=n).fluctuation() for n in (60, 200, 400))
+    assert_allclose(few[[2, 13]], many[[2, 13]], rtol=0.02)
+    assert_allclose(usual[[2, 13, 44, 64]], many[[2, 13, 44, 64]], rtol=0.03)
+
+
+def test_waterfall_lines_rise_with_the_speed_and_resonate_at_the_modes():
+    line, _, _ = engine_line()
+    speeds = np.arange(675.0, 1726.0, 150.0) * RPM
+
+    def torques(speed):
+        return torques_of(option(), speed, 0.0).on(NODES)
+
+    flywheel, pump_gear = run_of_speeds(line, torques, speeds, [13, 44], n_orders=60)
+    assert flywheel.angle.shape == (len(speeds), 60)
+    fifth = flywheel.angle[:, 9]  # order 5 meets the second mode, 68.7 Hz, at 825 r/min
+    assert abs(speeds[np.argmax(fifth)] / RPM - 825.0) <= 50.0
+    assert fifth.max() > 3.0 * fifth[0]
+    frequencies = np.arange(0.0, 400.0, 0.5)
+    spectra = pump_gear.spectra(frequencies)
+    assert spectra.shape == (len(speeds), len(frequencies))
+    for row, speed in zip(spectra, speeds, strict=True):
+        bins = np.rint(np.arange(1, 61) * 0.5 * speed / (2 * np.pi) / 0.5).astype(int)
+        assert set(np.flatnonzero(row)) <= set(bins)
+    at_once = response_of(option(), speed=speeds[3], torque=0.0)
+    assert_allclose(flywheel.fluctuation[3], at_once.fluctuation()[13], rtol=0.02)
+
+
+def test_a_disturbance_at_5_hz_moves_the_flywheel_more_than_its_own_turns():
+    line, _, _ = engine_line()
+    moved = disturbance_response(line, 16, 0.05 * 12680.0, 2 * np.pi * 5.0)
+    turning = response_of(option())
+    assert np.abs(moved[13]) > np.abs(turning.angle[13]).max()  # as the paper's figure 12 has it
+    doubled = disturbance_response(line, 16, 0.10 * 12680.0, 2 * np.pi * 5.0)
+    assert_allclose(doubled, 2.0 * moved, rtol=1e-12)
+
+
+@dataclass(frozen=True)
+class Apart:
+    """A line with one mesh apart, as a table reader gives it."""
+
+    mass: np.ndarray
+    damping: np.ndarray
+    stiffness: np.ndarray
+    loss_stiffness: np.ndarray
+    directions: np.ndarray
+    mesh_stiffness: np.ndarray
+    mesh_loss_factor: np.ndarray
+    mesh_damping: np.ndarray
+
+
+def test_meshes_given_apart_are_springs_of_the_line():
+    whole, springs = chain(loss_factor=0.05, damping=1e-4)
+    d, zero = springs.directions, np.zeros((3, 3))
+    mesh = np.outer(d[2], d[2])
+    apart = Apart(
+        mass=whole.mass,
+        damping=whole.damping - 1.0 * mesh,
+        stiffness=whole.stiffness - 1e4 * mesh,
+        loss_stiffness=whole.loss - 500.0 * mesh,
+        directions=d[2:],
+        mesh_stiffness=np.array([1e4]),
+        mesh_loss_factor=np.array([0.05]),
+        mesh_damping=np.array([1.0]),
+    )
+    line, meshes = closed_line(apart)
+    for name in ("mass", "damping", "stiffness", "loss"):
+        assert_allclose(getattr(line, name), getattr(whole, name), atol=1e-9, err_msg=name)
+    assert_allclose(meshes.loss, [500.0])
+    assert np.any(zero != line.loss)
+
+
+def test_what_is_no_line_is_refused():
+    line, _ = chain()
+    skew = line.stiffness.copy()
+    skew[0, 1] *= 2.0
+    with pytest.raises(ValueError, match="stiffness must be symmetric"):
+        LinearLine(mass=line.mass, stiffness=skew, loss=line.loss, damping=line.damping)
+    with pytest.raises(ValueError, match=r"loss \(2, 2\) must be a finite matrix \(3, 3\)"):
+        LinearLine(mass=line.mass, stiffness=line.stiffness, loss=np.zeros((2, 2)), damping=line.damping)
+    with pytest.raises(ValueError, match=r"n_orders = 40 must lie in 1\.\.31"):
+        cycle_orders(np.zeros((3, 64)), 40)
+    with pytest.raises(ValueError, match="24 points of a cycle cannot hold 12 orders"):
+        over_cycle(np.zeros((3, 12), dtype=complex), 24)
+    with pytest.raises(ValueError, match="must be positive"):
+        steady_response(line, np.zeros((3, 64)), 0.0, n_orders=4)
+    undamped = LinearLine(mass=np.eye(1), stiffness=np.eye(1), loss=np.zeros((1, 1)), damping=np.zeros((1, 1)))
+    with pytest.raises(SimulationError, match="excited at its natural frequency"):
+        undamped.response(np.ones((1, 1), dtype=complex), np.array([1.0]))

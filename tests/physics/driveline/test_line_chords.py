@@ -1,0 +1,191 @@
+"""Sliced teeth in a line's mesh: springs side by side are the chords, from one potential; the pair dynamics' motion."""
+
+import math
+from dataclasses import replace
+
+import numpy as np
+import pytest
+from chord_tables import Slices, as_chords, with_table
+from lane_tools import advance
+from line_tools import constant_torques, law_at, state_after
+from numpy.testing import assert_allclose
+
+from gensig.driveline.time import _layout as layout
+from gensig.driveline.time.chords import sliced_pair_mesh
+from gensig.driveline.time.course import constant_speed
+from gensig.driveline.time.geared_line import GearedLine
+from gensig.driveline.time.line_mesh import pair_mesh
+from gensig.errors import ConfigError
+from gensig.faults.broken import MissingTooth
+from gensig.mesh.load_distribution import loaded_pair_table
+from gensig.mesh.options import SliceOptions
+from gensig.mesh.sliced.sliced_statics import chord_equilibrium, chord_states
+from gensig.mesh.sliced.sliced_table import sliced_table
+from gensig.plan.request import read_request
+from gensig.systems.registry import read_sliced_pair
+
+HELIX = math.radians(20.0)
+DEPTH = np.array([0.0, 2.0, 5.0, 9.0, 14.0, 20.0]) * 1e-6
+DAMPING = 1e-3  # s/m
+STEPS, N_SAMPLES = 64, 205
+
+
+def placed(make, table, **more):
+    pair = table.pair
+    direction = np.array([pair.pinion.base_radius, -pair.wheel.base_radius])
+    return make("m", table, direction=direction, roll_dof=0, damping=DAMPING, **more)
+
+
+@pytest.fixture(scope="module")
+def helical():
+    """A helical pair with a missing tooth, as tabulated for records."""
+    pair = read_sliced_pair(read_request(["experiment=helical", "mesh.n_slices=16"]).config)
+    return pair.mesh_table((MissingTooth(gear="pinion", tooth=2),)), pair.mesh_force
+
+
+@pytest.fixture(scope="module")
+def mesh(helical):
+    table, _ = helical
+    rng = np.random.default_rng(4)
+    counts = table.pair.pinion.n_teeth, table.pair.wheel.n_teeth
+    return placed(sliced_pair_mesh, table, errors=tuple(rng.normal(0, 2e-6, n) for n in counts))
+
+
+class TestLaw:
+    @pytest.mark.parametrize("share", [0.02, 0.3, 1.0, 2.5])
+    def test_statics_agree_whatever_the_load(self, helical, mesh, share):
+        """Chords that are interpolated on their own meet at their depths but for the smoothing of their kinks."""
+        table, force = helical
+        rolls = np.linspace(0.05, 30.05, 61)
+        errors = dict(zip(("pinion_error", "wheel_error"), mesh.errors, strict=True))
+        found = chord_equilibrium(table, chord_states(table, rolls * table.pair.base_pitch, **errors), share * force)
+        forces = [law_at(mesh, turned, approach)[0] for turned, approach in zip(rolls, found.approach, strict=True)]
+        assert_allclose(forces, share * force, rtol=1e-3, atol=0)
+
+    @pytest.mark.parametrize("approach", [2e-5, 6e-5, -1.5e-4])
+    def test_force_and_torque_of_the_passing_teeth_are_slopes_of_one_potential(self, mesh, approach):
+        mesh = replace(mesh, backlash=1e-4)
+        for turned in (0.313, 2.711, 9.173):
+            found = law_at(mesh, turned, approach)
+            below, above = (law_at(mesh, turned + off, approach)[layout.STORED] for off in (-1e-7, 1e-7))
+            assert_allclose(found[layout.ALONG], -(above - below) / 2e-7, rtol=1e-3, atol=1e-6)
+            below, above = (law_at(mesh, turned, approach + off)[layout.STORED] for off in (-1e-10, 1e-10))
+            assert_allclose(found[layout.FORCE], (above - below) / 2e-10, rtol=1e-4, atol=0)
+
+    def test_all_springs_of_a_pair_are_damped_by_its_first_touch(self, mesh):
+        still, fast = law_at(mesh, 0.4, 3e-5), law_at(mesh, 0.4, 3e-5, rate=10.0)
+        assert_allclose(fast[layout.FORCE], (1.0 + 10.0 * DAMPING) * still[layout.FORCE], rtol=1e-12, atol=0)
+        assert law_at(mesh, 0.4, 3e-5, rate=-1e4)[layout.FORCE] == pytest.approx(0.0, abs=0.0)
+
+    def test_the_missing_tooth_is_missing_on_both_flanks_once_a_turn(self, helical, mesh):
+        n_teeth = helical[0].pair.pinion.n_teeth
+        sound = replace(mesh, rows=np.maximum(mesh.rows, 0), coast_rows=np.zeros_like(mesh.coast_rows))
+        for approach in (3e-5, -mesh.backlash - 3e-5):
+            ratio = np.array([
+                law_at(mesh, turned, approach)[0] / law_at(sound, turned, approach)[0]
+                for turned in np.arange(0.5, n_teeth + 0.5, 0.25)
+            ])  # fmt: skip
+            lost = ratio < 0.999
+            assert 0 < lost.sum() < 5 * 4
+            assert ratio.min() < 0.8
+
+    def test_slices_enter_from_the_other_end_on_the_back_flanks(self, helical):
+        """The middle of the face meets the mate half a pitch from where it does on the front, about the pitch point."""
+        table, _ = helical
+        mesh = placed(sliced_pair_mesh, table)
+        pair, pitch = table.pair, table.pair.base_pitch
+        middle = 0.5 * pair.face_width * math.tan(pair.base_helix_angle)
+        for position in (0.1, 0.35, 0.8):  # of the middle of the face, past the pitch point, pitches
+            front = (pair.pitch_point + middle) / pitch + position
+            back = (pair.pitch_point + middle) / pitch + 0.5 - position
+            one, other = law_at(mesh, front + 9.0, 3e-5)[0], law_at(mesh, back + 9.0, -mesh.backlash - 3e-5)[0]
+            assert_allclose(other, -one, rtol=1e-9, atol=0)
+
+    def test_springs_begin_at_0_and_grow(self, mesh):
+        with pytest.raises(ConfigError, match="must begin at 0 and grow"):
+            replace(mesh, depth=mesh.depth[::-1])
+        with pytest.raises(ConfigError, match="springs a row"):
+            replace(mesh, depth=mesh.depth[:-1])
+
+
+class TestZeroHelix:
+    @pytest.mark.parametrize("n_chords", [1, 3])
+    def test_a_spur_table_in_chords_is_the_spur_mesh(self, xiamen, n_chords):
+        table = xiamen.mesh_table((MissingTooth(gear="pinion", tooth=1),))
+        one, other = placed(pair_mesh, table), placed(sliced_pair_mesh, as_chords(table, n_chords))
+        for turned in (0.2, 1.7, 2.4, 23.9):
+            for approach in (1e-5, 4e-5, -one.backlash - 2e-5):
+                expected = law_at(one, turned, approach, 1e-2, 1e3)
+                assert_allclose(law_at(other, turned, approach, 1e-2, 1e3), expected, rtol=1e-9, atol=1e-12)
+
+    def test_spur_teeth_in_slices_move_as_the_spur_mesh(self, machine, dynamics_of):
+        """As their statics, to 1e-4 of the approach with linear contact: docs/theory/helical_mesh.md."""
+        spur = machine({"mesh.contact": "linear", "mesh.friction_coefficient": 0.0})
+        dynamics, slices = dynamics_of(spur), SliceOptions(
+            n_slices=8, slice_coupling="coupled", coupling_modules=1.0, slices_in_phase=False,
+            independent_faulty_slices=False,
+        )  # fmt: skip
+        force = spur.mesh_force
+        own = loaded_pair_table(spur.pair, spur.material, spur.mesh, force=force)
+        cut = sliced_table(spur.pair, spur.material, spur.mesh, slices, force=force)
+        told = {"direction": dynamics.approach_direction(), "roll_dof": 2, "damping": DAMPING}
+        (q, v, one), (q_1, v_1, other) = (
+            moved(line_of(dynamics, mesh), dynamics)
+            for mesh in (pair_mesh("m", own, **told), sliced_pair_mesh("m", cut, **told))
+        )
+        assert max(one.energy_residual, other.energy_residual) < 1e-4
+        assert_allclose(q_1 @ told["direction"], q @ told["direction"], rtol=0, atol=2e-8)
+        assert_allclose(v_1, v, rtol=0, atol=5e-3 * np.abs(v).max())
+
+
+def line_of(dynamics, mesh):
+    system = dynamics.system()
+    return GearedLine(
+        names=system.names, mass=np.diag(system.mass), damping=system.damping, stiffness=system.stiffness,
+        rotation=system.rotation, meshes=(mesh,),
+    )  # fmt: skip
+
+
+def moved(line, dynamics):
+    start = dynamics.static_start(0.0), np.zeros(len(line.names))
+    n_steps = STEPS * N_SAMPLES
+    return state_after(
+        line, start, n_steps / (51200 * STEPS), n_steps, torques=constant_torques(dynamics.system().force),
+        course=constant_speed(dynamics.operating.speed),
+    )  # fmt: skip
+
+
+class TestAgainstThePair:
+    """The helical pair with its axial motion and tilts, through both integrators."""
+
+    @pytest.fixture(scope="class", params=["sound", "missing tooth"])
+    @classmethod
+    def dynamics(cls, request, machine, dynamics_of):
+        spur = machine({"mesh.friction_coefficient": 0.0, "mesh.points_per_pitch": 2048})
+        table = Slices(spur, HELIX).table(DEPTH)
+        if request.param == "missing tooth":
+            kind = np.zeros_like(table.pinion_kind)
+            kind[2] = 1
+            doubled = {
+                name: np.concatenate(2 * [getattr(table, name)])
+                for name in ("compliance", "compliance_slope", "gap", "gap_slope")
+            }
+            present = np.array([True, False])
+            table = replace(table, pinion_kind=kind, pinion_present=present, **doubled)
+        rng = np.random.default_rng(1)
+        errors = {"pinion_error": rng.normal(0, 2e-6, 23), "wheel_error": rng.normal(0, 2e-6, 84)}
+        return with_table(dynamics_of(spur, (), **errors), table)
+
+    def test_the_same_motion(self, dynamics):
+        mesh = sliced_pair_mesh(
+            "pair", dynamics.table, direction=dynamics.approach_direction(), roll_dof=2,
+            damping=dynamics.mesh_damping / dynamics.mesh_force, start_phase=dynamics.start_phase,
+            errors=(dynamics.pinion_error, dynamics.wheel_error),
+        )  # fmt: skip
+        q_1, v_1, told = moved(line_of(dynamics, mesh), dynamics)
+        start = dynamics.static_start(0.0), np.zeros(len(dynamics.dofs))
+        q, v, _ = advance(dynamics, *start, 1 / (51200 * STEPS), 0, STEPS * N_SAMPLES)
+        direction = dynamics.approach_direction()
+        assert told.energy_residual < 1e-4
+        assert_allclose(v_1, v, rtol=0, atol=2e-3 * np.abs(v).max())
+        assert_allclose(q_1 @ direction, q @ direction, rtol=0, atol=5e-8)

@@ -1,0 +1,169 @@
+"""Newmark's average acceleration for a geared line without meshes against exact solutions."""
+
+import math
+from dataclasses import replace
+
+import numpy as np
+import pytest
+from line_tools import chain, constant_torques, order_of, state_after, steps
+from numpy.testing import assert_allclose
+from scipy.linalg import eigh, expm
+
+from gensig.driveline.time.course import LineCourse, ShaftTorque, constant_speed
+from gensig.driveline.time.geared_line import GearedLine
+from gensig.driveline.time.newmark import integrate_line
+from gensig.dynamics.decimation import decimator
+
+SPEED = 100.0  # rad/s
+
+
+class TestLinear:
+    """A free chain of six inertias, exact by the matrix exponential."""
+
+    DURATION = 0.05
+
+    @pytest.fixture(scope="class", params=["shafts", "modal"])
+    @classmethod
+    def line(cls, request):
+        """Damped by its shafts, or by a share of every mode, which is a full matrix."""
+        line = chain(6)
+        if request.param == "shafts":
+            return line
+        rates, shapes = eigh(line.stiffness, line.mass)
+        momentum = line.mass @ shapes
+        damping = (momentum * 0.02 * np.sqrt(np.abs(rates))) @ momentum.T
+        return replace(line, damping=0.5 * (damping + damping.T))
+
+    @pytest.fixture(scope="class")
+    @classmethod
+    def start(cls):
+        rng = np.random.default_rng(1)
+        return rng.normal(0, 1e-3, 6), rng.normal(0, 1.0, 6)
+
+    @pytest.fixture(scope="class")
+    @classmethod
+    def torques(cls):
+        return np.array([3.0, 0.0, -1.0, 0.0, 2.0, -3.0])
+
+    @pytest.fixture(scope="class")
+    @classmethod
+    def exact(cls, line, start, torques):
+        """q and v at the end; the constant torques are one more state."""
+        n, inverse = 6, np.linalg.inv(line.mass)
+        system = np.zeros((2 * n + 1, 2 * n + 1))
+        system[:n, n : 2 * n] = np.eye(n)
+        system[n : 2 * n, :n], system[n : 2 * n, n : 2 * n] = -inverse @ line.stiffness, -inverse @ line.damping
+        system[n : 2 * n, -1] = inverse @ torques
+        return (expm(system * cls.DURATION) @ np.concatenate([*start, [1.0]]))[: 2 * n]
+
+    @pytest.fixture(scope="class")
+    @classmethod
+    def error(cls, line, start, torques, exact):
+        def measured(n_steps):
+            q, v, _ = state_after(line, start, cls.DURATION, n_steps, torques=constant_torques(torques))
+            return np.linalg.norm(np.concatenate([q, v]) - exact) / np.linalg.norm(exact)
+
+        return measured
+
+    def test_it_is_the_exact_solution(self, error):
+        assert error(40000) < 2e-6
+
+    def test_order_two(self, error):
+        assert order_of([error(n) for n in (2000, 4000, 8000)]) == pytest.approx(2.0, abs=0.02)
+
+    def test_undamped_vibration_keeps_its_energy_whatever_the_step(self, start):
+        line = chain(6, loss=0.0)
+        for n_steps in (50, 5000):
+            q, v, told = state_after(line, start, self.DURATION, n_steps)
+            energy = [0.5 * (b @ line.mass @ b + a @ line.stiffness @ a) for a, b in (start, (q, v))]
+            assert_allclose(energy[1], energy[0], rtol=1e-11, atol=0)
+            assert told.energy_residual < 1e-11
+
+    def test_damping_takes_energy(self, line, start):
+        q, v, told = state_after(line, start, self.DURATION, 5000)
+        energy = [0.5 * (b @ line.mass @ b + a @ line.stiffness @ a) for a, b in (start, (q, v))]
+        assert energy[1] < 0.9 * energy[0]
+        assert told.energy_residual < 1e-11
+
+    def test_a_full_mass_matrix_is_taken(self, line, start):
+        """The same chain in other coordinates."""
+        turn = np.eye(6) + 0.3 * np.eye(6, k=1)
+        parts = {name: turn.T @ getattr(line, name) @ turn for name in ("mass", "damping", "stiffness")}
+        other = GearedLine(names=line.names, rotation=np.linalg.solve(turn, line.rotation), meshes=(), **parts)
+        moved = tuple(np.linalg.solve(turn, part) for part in start)
+        q, v, _ = state_after(line, start, self.DURATION, 3000)
+        q_1, v_1, _ = state_after(other, moved, self.DURATION, 3000)
+        assert_allclose(turn @ q_1, q, rtol=0, atol=1e-9 * np.abs(q).max())
+        assert_allclose(turn @ v_1, v, rtol=0, atol=1e-9 * np.abs(v).max())
+
+
+class TestTorquesAndCourse:
+    def test_a_torque_over_the_angle_excites_its_order(self):
+        """One inertia on a spring, a torque of order 2: the exact steady amplitude."""
+        inertia, spring, damper, amplitude = 0.1, 4e4, 4.0, 0.05  # so small that its own twist does not shift it
+        line = GearedLine(
+            names=("disc",), mass=np.array([[inertia]]), damping=np.array([[damper]]), stiffness=np.array([[spring]]),
+            rotation=np.ones(1), meshes=(),
+        )  # fmt: skip
+        table = amplitude * np.cos(np.arange(4096) / 4096 * 2 * np.pi)
+        motion = integrate_line(
+            line, constant_speed(SPEED), [ShaftTorque(dof=0, table=table, period=np.pi)],
+            steps(4000.0, 10), duration=2 * np.pi / SPEED * 10, lead_in=1.0,
+            channels=[("angle", 0), ("speed", 0), ("acceleration", 0)],
+        )  # fmt: skip
+        rate = 2 * SPEED
+        response = amplitude / (spring - inertia * rate**2 + 1j * damper * rate)
+        angle = motion.nominal_angle
+        for power, name in enumerate(("angle", "speed", "acceleration")):
+            expected = ((1j * rate) ** power * response * np.exp(2j * angle)).real
+            found = motion.signals[name, 0]
+            assert_allclose(found, expected, rtol=0, atol=5e-4 * np.abs(expected).max())
+
+    def test_the_twist_shifts_the_torque(self):
+        """A table over the angle sees the angle itself, not the nominal one: a restoring slope is a spring."""
+        slope, inertia = 200.0, 0.1
+        line = GearedLine(
+            names=("disc",), mass=np.array([[inertia]]), damping=np.zeros((1, 1)), stiffness=np.zeros((1, 1)),
+            rotation=np.ones(1), meshes=(),
+        )  # fmt: skip
+        nodes = np.arange(4000) / 4000 * 2 * np.pi
+        table = -slope * np.where(nodes < np.pi, nodes, nodes - 2 * np.pi)
+        start, quarter = np.array([1e-2]), 0.5 * np.pi * math.sqrt(inertia / slope)
+        q, v, _ = state_after(line, (start, np.zeros(1)), quarter, 4000, torques=[ShaftTorque(dof=0, table=table)])
+        assert_allclose(q / start, 0.0, rtol=0, atol=1e-5)
+        assert_allclose(v / start, -math.sqrt(slope / inertia), rtol=1e-5, atol=0)
+
+    def test_a_run_up_needs_the_torque_of_the_inertias_and_no_more(self):
+        line, course = chain(5), LineCourse(time=np.array([0.0, 0.2]), speed=np.array([50.0, 90.0]))
+        torques = np.diag(line.mass) * 200.0
+        q, v, _ = state_after(
+            line, (np.zeros(5), np.zeros(5)), 0.1, 2000, torques=constant_torques(torques), course=course
+        )
+        assert_allclose(q, 0.0, rtol=0, atol=1e-15)
+        assert_allclose(v, 0.0, rtol=0, atol=1e-12)
+
+    def test_without_that_torque_it_stays_behind_at_rest(self):
+        line, course = chain(5), LineCourse(time=np.array([0.0, 0.2]), speed=np.array([50.0, 90.0]))
+        q, v, _ = state_after(line, (np.zeros(5), np.zeros(5)), 0.1, 2000, course=course)
+        assert_allclose(v, -200.0 * 0.1, rtol=1e-9, atol=0)
+        assert_allclose(q, -0.5 * 200.0 * 0.1**2, rtol=1e-9, atol=0)
+
+    def test_a_factor_over_the_knots_is_a_torque_over_time(self):
+        line, course = chain(1), LineCourse(time=np.array([0.0, 0.1]), speed=np.array([50.0, 50.0]))
+        ramp = ShaftTorque(dof=0, table=np.ones(1), factor=np.array([0.0, 3.0]))
+        _, v, _ = state_after(line, (np.zeros(1), np.zeros(1)), 0.1, 500, torques=[ramp], course=course)
+        assert_allclose(v, 0.5 * 3.0 * 0.1 / line.mass[0, 0], rtol=1e-9, atol=0)
+
+    def test_signals_are_low_passed_states(self):
+        """What a run gives out at time 0 is the state that it passes there."""
+        line, start = chain(4), (np.array([1e-3, 0, 0, -1e-3]), np.zeros(4))
+        motion = integrate_line(
+            line, constant_speed(SPEED), [], steps(8000.0, 8), duration=0.02,
+            channels=[("angle", 0), ("speed", 3)], start=start,
+        )  # fmt: skip
+        margin = decimator(8).margin  # samples before time 0, and one, at which integration begins
+        for sample in (0, 30, 60):
+            n_steps = 8 * (sample + margin + 1)
+            q, v, _ = state_after(line, start, n_steps / 64000.0, n_steps)
+            assert_allclose(motion.signals["angle", 0][sample], q[0], rtol=0, atol=1e-5 * np.abs(start[0]).max())
+            assert_allclose(motion.signals["speed", 3][sample], v[3], rtol=0, atol=1e-4 * np.abs(v).max())

@@ -1,0 +1,236 @@
+"""Meshes of a geared line by Newmark's method: order, energy, backlash, against scipy and the pair's integrator."""
+
+import numpy as np
+import pytest
+from lane_tools import advance
+from line_tools import INERTIAS, RADII, STIFFNESS, constant_torques, order_of, state_after, steps, two_gears
+from numpy.testing import assert_allclose
+from scipy.integrate import solve_ivp
+from scipy.linalg import eigh
+
+from benchmarks._engine_line import engine_line, engine_torques
+from gensig.driveline.time.course import constant_speed
+from gensig.driveline.time.geared_line import GearedLine
+from gensig.driveline.time.line_mesh import pair_mesh
+from gensig.driveline.time.newmark import integrate_line, static_start
+from gensig.faults.broken import MissingTooth
+
+
+class TestRippledMesh:
+    """A mesh whose stiffness ripples smoothly under load; the teeth stay together."""
+
+    @pytest.fixture(scope="class")
+    @classmethod
+    def run(cls):
+        u = np.arange(512) / 512
+        stiffness = STIFFNESS * (1 + 0.2 * np.cos(2 * np.pi * u) + 0.05 * np.cos(4 * np.pi * u))[None]
+        line = two_gears(stiffness=stiffness, gap=3e-6 * np.sin(2 * np.pi * u)[None], damping=2e-4, backlash=1e-4)
+        torques = constant_torques([200.0, -400.0])
+        course = constant_speed(400.0)
+        start = static_start(line, course, torques), np.zeros(2)
+        return lambda n_steps: state_after(line, start, 0.02, n_steps, torques=torques, course=course)
+
+    def test_order_two(self, run):
+        exact = run(128000)
+        errors = [np.abs(run(n)[1] - exact[1]).max() for n in (1000, 2000, 4000, 8000)]
+        assert order_of(errors) == pytest.approx(2.0, abs=0.1)
+        assert exact[2].contact_loss[0] < 1e-12
+
+    def test_energy(self, run):
+        assert run(2000)[2].energy_residual < 1e-3
+        assert run(16000)[2].energy_residual < 1e-5
+
+    def test_the_ripple_is_felt(self, run):
+        told = run(4000)[2]
+        assert told.largest_force[0] > 1.1 * 200.0 / RADII[0]
+        assert told.least_force[0] < 0.9 * 200.0 / RADII[0]
+
+
+class TestBacklash:
+    """Two inertias that fly to and fro between their flanks, against DOP853."""
+
+    BACKLASH, DURATION = 1e-4, 0.02
+    START = np.array([0.0, 0.0]), np.array([4.0, -1.0])
+
+    @pytest.fixture(scope="class", params=[0.0, 0.02], ids=["elastic", "damped"])
+    @classmethod
+    def damping(cls, request):
+        return request.param
+
+    @pytest.fixture(scope="class")
+    @classmethod
+    def exact(cls, damping):
+        direction = np.array([RADII[0], -RADII[1]])
+
+        def slope(_, y):
+            approach, rate = direction @ y[:2], direction @ y[2:]
+            force = 0.0
+            if approach > 0:
+                force = max(0.0, STIFFNESS * approach * (1 + damping * rate))
+            elif approach < -cls.BACKLASH:
+                force = -max(0.0, STIFFNESS * (-approach - cls.BACKLASH) * (1 - damping * rate))
+            return np.concatenate([y[2:], -direction * force / INERTIAS])
+
+        solution = solve_ivp(
+            slope, (0, cls.DURATION), np.concatenate(cls.START), method="DOP853", rtol=1e-11, atol=1e-15,
+            max_step=5e-6,
+        )  # fmt: skip
+        return solution.y[:, -1]
+
+    @pytest.fixture(scope="class")
+    @classmethod
+    def run(cls, damping):
+        line = two_gears(damping=damping, backlash=cls.BACKLASH)
+        return lambda n_steps: state_after(line, cls.START, cls.DURATION, n_steps)
+
+    @pytest.fixture(scope="class")
+    @classmethod
+    def error(cls, run, exact):
+        def measured(n_steps):
+            q, v, _ = run(n_steps)
+            direction = np.array([RADII[0], -RADII[1]])
+            return max(
+                np.abs(direction @ (q - exact[:2])) / cls.BACKLASH,
+                np.abs(v - exact[2:]).max() / np.abs(cls.START[1]).max(),
+            )
+
+        return measured
+
+    def test_it_is_the_exact_solution(self, error):
+        assert error(80000) < 1e-3
+
+    def test_both_flanks_are_hit(self, run):
+        _, _, told = run(8000)
+        assert told.contact_loss[0] > 0.2
+        assert told.back_contact[0] > 0.05
+        assert told.largest_force[0] > 1e3
+        assert told.least_force[0] < -1e3
+
+    def test_error_falls_with_the_square_of_the_step(self, error):
+        """On average: what a landing costs depends on where in a step it falls."""
+        assert order_of([error(n) for n in (5000, 80000)], ratio=16.0) > 1.6
+
+    def test_energy(self, run):
+        assert run(8000)[2].energy_residual < 1e-3
+
+    def test_energy_residual_falls_with_the_step(self, run):
+        assert run(64000)[2].energy_residual < 0.1 * run(4000)[2].energy_residual
+
+
+class TestAgainstThePair:
+    """The default spur pair on its supports without friction, with tooth errors, through both integrators."""
+
+    STEPS, N_SAMPLES = 64, 410
+
+    @pytest.fixture(scope="class", params=["sound", "missing tooth"])
+    @classmethod
+    def dynamics(cls, request, machine, dynamics_of):
+        rng = np.random.default_rng(1)
+        faults = (MissingTooth(gear="pinion", tooth=2),) if request.param == "missing tooth" else ()
+        pair = machine({"mesh.friction_coefficient": 0.0, "mesh.points_per_pitch": 2048})
+        errors = {"pinion_error": rng.normal(0, 3e-6, 23), "wheel_error": rng.normal(0, 3e-6, 84)}
+        return dynamics_of(pair, faults, **errors)
+
+    @pytest.fixture(scope="class")
+    @classmethod
+    def line(cls, dynamics):
+        system = dynamics.system()
+        mesh = pair_mesh(
+            "pair", dynamics.table, direction=dynamics.approach_direction(), roll_dof=2,
+            damping=dynamics.mesh_damping / dynamics.mesh_force, start_phase=dynamics.start_phase,
+            errors=(dynamics.pinion_error, dynamics.wheel_error),
+        )  # fmt: skip
+        return GearedLine(
+            names=system.names, mass=np.diag(system.mass), damping=system.damping, stiffness=system.stiffness,
+            rotation=system.rotation, meshes=(mesh,),
+        )  # fmt: skip
+
+    def test_the_same_motion(self, dynamics, line):
+        start, n_steps = (dynamics.static_start(0.0), np.zeros(6)), self.STEPS * self.N_SAMPLES
+        step = 1 / (51200 * self.STEPS)
+        q, v, _ = advance(dynamics, *start, step, 0, n_steps)
+        q_1, v_1, told = state_after(
+            line, start, n_steps * step, n_steps, torques=constant_torques(dynamics.system().force),
+            course=constant_speed(dynamics.operating.speed),
+        )  # fmt: skip
+        direction = dynamics.approach_direction()
+        scale = np.abs(v).max()
+        assert_allclose(v_1, v, rtol=0, atol=2e-4 * scale)
+        assert_allclose(q_1 @ direction, q @ direction, rtol=0, atol=2e-8)
+        assert told.energy_residual < 1e-4
+
+    def test_the_same_rest(self, dynamics, line):
+        found = static_start(
+            line, constant_speed(dynamics.operating.speed), constant_torques(dynamics.system().force), time=0.0
+        )
+        expected = dynamics.static_start(0.0)
+        assert_allclose(found, expected, rtol=0, atol=1e-6 * np.abs(expected).max())
+
+
+class TestLowRank:
+    """Meshes as low-rank updates against their stiffness in the matrix, which is then factored with it."""
+
+    @pytest.fixture(scope="class")
+    @classmethod
+    def engine(cls):
+        return engine_line(linear=True)
+
+    @pytest.fixture(scope="class")
+    @classmethod
+    def welded(cls, engine):
+        stiffness = engine.stiffness + sum(
+            mesh.stiffness[0, 0] * np.outer(mesh.direction, mesh.direction) for mesh in engine.meshes
+        )
+        return GearedLine(
+            names=engine.names, mass=engine.mass, damping=engine.damping, stiffness=stiffness,
+            rotation=engine.rotation, meshes=(),
+        )  # fmt: skip
+
+    def test_the_printed_frequencies(self, welded):
+        n = 65  # rotations
+        found = np.sqrt(np.abs(eigh(welded.stiffness[:n, :n], welded.mass[:n, :n], eigvals_only=True))) / (2 * np.pi)
+        assert_allclose(found[1:5], [28.31, 68.72, 162.06, 215.97], rtol=0, atol=0.01)
+
+    def test_the_same_motion(self, engine, welded):
+        """A gear train without backlash is linear."""
+        rng = np.random.default_rng(2)
+        start = rng.normal(0, 1e-4, len(engine.names)), rng.normal(0, 0.1, len(engine.names))
+        n_steps, duration = 4000, 0.04
+        (q, v, told), (q_1, v_1, _) = (state_after(line, start, duration, n_steps) for line in (engine, welded))
+        assert_allclose(q, q_1, rtol=0, atol=1e-8 * np.abs(q_1).max())
+        assert_allclose(v, v_1, rtol=0, atol=1e-8 * np.abs(v_1).max())
+        assert told.energy_residual < 1e-6
+
+
+class TestEngine:
+    """The whole engine, 109 degrees of freedom, teeth that come apart."""
+
+    @pytest.fixture(scope="class")
+    @classmethod
+    def motion(cls):
+        def run(duration=0.15, oversampling=10):
+            return integrate_line(
+                engine_line(), constant_speed(1688 * np.pi / 30), engine_torques(),
+                steps(10240.0, oversampling), duration=duration,
+                channels=[("speed", 13), ("speed", 42), ("mesh_force", 5)],
+            )  # fmt: skip
+
+        return run
+
+    @pytest.fixture(scope="class")
+    @classmethod
+    def usual(cls, motion):
+        return motion()
+
+    def test_energy_with_contact_loss(self, usual):
+        assert usual.contact_loss.max() > 0.1
+        assert usual.back_contact.max() > 0.01
+        assert usual.energy_residual < 1e-3
+
+    def test_contact_takes_few_rounds(self, usual):
+        assert usual.newton_rounds < 3
+
+    def test_a_longer_run_begins_with_the_same_bits(self, motion, usual):
+        longer = motion(duration=0.2)
+        for channel, signal in usual.signals.items():
+            assert np.array_equal(longer.signals[channel][: len(signal)], signal)

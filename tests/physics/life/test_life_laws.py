@@ -1,0 +1,266 @@
+"""Laws of growth: thresholds, exponents, monotone courses, histories with standstills, censoring."""
+
+import math
+from dataclasses import replace
+
+import numpy as np
+import pytest
+from numpy.testing import assert_allclose, assert_array_equal
+
+from gensig.errors import ConfigError
+from gensig.faults.registry import read_faults
+from gensig.life.crack_growth import crack_growth
+from gensig.life.drift import Drift
+from gensig.life.growth import grow
+from gensig.life.life_options import read_life
+from gensig.life.load_history import DrawnBlocks, History, draw_history, given_history
+from gensig.life.pit_growth import contact_stress, pit_growth
+from gensig.life.snapshots import snapshot_times
+from gensig.plan.request import read_request
+from gensig.systems.registry import read_system
+
+HOUR = 3600.0
+SPEED = 60.0 * math.pi  # 1800 r/min: 108,000 turns an hour
+
+
+@pytest.fixture(scope="module")
+def config():
+    return read_request(["life=mixed", "fault=crack"]).config
+
+
+@pytest.fixture(scope="module")
+def machine(config):
+    return read_system(config)
+
+
+@pytest.fixture(scope="module")
+def options(config):
+    return read_life(config["life"])
+
+
+@pytest.fixture(scope="module")
+def crack(config):
+    return read_faults(config["fault"])[0]
+
+
+@pytest.fixture(scope="module")
+def law(machine, options, crack):
+    return crack_growth(machine.pair, machine.material, crack, options.laws["crack"])
+
+
+@pytest.fixture(scope="module")
+def pits(machine, options):
+    fault = read_request(["fault=distributed_pitting"]).config["fault"]
+    return pit_growth(machine.pair, machine.material, read_faults(fault)[0], options.laws["distributed_pitting"])
+
+
+def steady(torque, hours, speed=SPEED):
+    return given_history(((0.0, hours * HOUR, speed, torque),), math.inf)
+
+
+def life_turns(law, torque, start):
+    course = grow(law.sizes, law.turns(np.array([torque])), steady(torque, 1e6), start)
+    assert course.has_failed
+    return course.turns[-1]
+
+
+@pytest.mark.parametrize(("torque", "low", "high"), [(20.0, 1.5, 1.8), (100.0, 7.6, 9.0)])
+def test_the_stress_intensity_range_is_that_of_the_reference(law, torque, low, high):
+    """A crack of 1 mm on the 23/84 pair, increments of the reference's finite elements."""
+    assert low < law.told(1e-3, torque)["stress_intensity_range_mpa_sqrt_m"] < high
+
+
+def test_the_stress_intensity_range_is_irwins(law, machine, crack):
+    """Against a difference of the compliance itself, at the highest point of single contact."""
+    from gensig.geometry.tooth import healthy_tooth
+    from gensig.mesh.root_crack import crack_compliance
+
+    pair, strain = machine.pair, machine.material.in_plane("plane_strain")
+    place = np.array([pair.pinion_curvature(pair.base_pitch)])
+    low, high = (
+        crack_compliance(replace(crack, crack_depth=depth).apply(healthy_tooth(pair.pinion), 0), place, strain)[0]
+        for depth in (0.999e-3, 1.001e-3)
+    )
+    release = (100.0 / pair.pinion.base_radius) ** 2 / (2.0 * pair.face_width) * (high - low) / 2e-6
+    told = law.told(1e-3, 100.0)["stress_intensity_range_mpa_sqrt_m"]
+    assert_allclose(told, math.sqrt(release * strain.youngs_modulus) / 1e6, rtol=2e-3)
+
+
+def test_below_the_threshold_a_crack_does_not_grow(law):
+    course = grow(law.sizes, law.turns(np.array([20.0])), steady(20.0, 1e5), 1e-3)
+    assert not course.has_failed
+    assert not course.growing.any()
+    assert_array_equal(course.size, 1e-3)
+    assert grow(law.sizes, law.turns(np.array([100.0])), steady(100.0, 1e5), 1e-3).growing.all()
+
+
+@pytest.mark.parametrize("exponent", [2.25, 3.0])
+def test_the_life_falls_with_the_load_to_the_paris_exponent(law, exponent):
+    law = replace(law, options=replace(law.options, exponent=exponent, threshold=0.0))
+    torques = np.array([50.0, 100.0, 200.0])
+    lives = [life_turns(law, torque, 0.5e-3) for torque in torques]
+    slope = np.diff(np.log(lives)) / np.diff(np.log(torques))
+    assert_allclose(slope, -exponent, rtol=1e-9)
+
+
+def test_the_rate_goes_with_the_stress_intensity_to_the_paris_exponent(law):
+    depths = np.geomspace(0.5e-3, 2.5e-3, 9)
+    rates = np.log(law.rate(depths, 150.0))
+    ranges = np.log([law.told(depth, 150.0)["stress_intensity_range_mpa_sqrt_m"] for depth in depths])
+    assert_allclose(np.polyfit(ranges, rates, 1)[0], law.options.exponent, rtol=1e-9)
+
+
+def test_the_course_converges_with_the_cells(law):
+    """Half as many cells move the life by less than 0.1 %."""
+    fine = life_turns(law, 120.0, law.sizes[20])
+    coarse = grow(
+        law.sizes[::2], replace(law, sizes=law.sizes[::2], intensity=law.intensity[:, ::2]).turns(np.array([120.0])),
+        steady(120.0, 1e6), law.sizes[20],
+    )  # fmt: skip
+    assert_allclose(coarse.turns[-1], fine, rtol=1e-3)
+
+
+def test_a_crack_over_part_of_the_face_grows_both_ways_and_becomes_a_through_one(machine, crack, options):
+    whole = crack_growth(machine.pair, machine.material, crack, options.laws["crack"])
+    part = crack_growth(machine.pair, machine.material, crack, replace(options.laws["crack"], width_share=0.25))
+    assert (np.diff(part.width) >= 0.0).all()
+    assert part.width[0] == pytest.approx(5e-3)
+    assert part.width[-1] > 6e-3
+    # beside it the sound tooth carries: less drives it than the same depth all across
+    assert part.intensity[0, 0] < whole.intensity[0, 0]
+    assert 0.0 < part.fault(1e-3)["crack_width_mm"] <= 20.0
+    assert "crack_width_mm" not in whole.fault(1e-3)
+
+
+def test_a_nearly_through_crack_grows_as_a_through_one(machine, crack, options):
+    whole, nearly = (
+        crack_growth(machine.pair, machine.material, crack, replace(options.laws["crack"], width_share=share))
+        for share in (1.0, 0.999999)
+    )
+    assert_allclose(nearly.intensity[0, 20:-8], whole.intensity[0, 20:-8], rtol=0.02)
+
+
+def test_pits_come_after_the_first_life_and_go_with_the_load_to_the_exponent(pits, machine):
+    assert pits.n_pits(0.99) == 0.0
+    assert pits.share(1.0) == 0.0
+    assert_allclose(pits.n_pits(2.0), pits.options.pits_per_life, rtol=1e-12)
+    ratio = life_turns(pits, 100.0, 0.0) / life_turns(pits, 200.0, 0.0)
+    assert_allclose(math.log2(ratio), 0.5 * pits.options.exponent, rtol=1e-9)
+    assert_allclose(pits.share(pits.sizes[-1]), pits.options.end_share, rtol=1e-9)
+    # Hertz: the knee of the line is reached at the torque whose stress is the strength
+    torque = (pits.options.strength / contact_stress(machine.pair, machine.material, 1.0)) ** 2
+    assert_allclose(pits.rate(np.array([0.5]), torque), 1.0 / pits.options.cycles, rtol=1e-9)
+
+
+def test_damage_adds_up_by_miner_whatever_the_order(pits):
+    rows = ((0.0, 10.0, 100.0), (10.0, 15.0, 80.0), (15.0, 27.0, 110.0))
+    courses = []
+    for order in ((0, 1, 2), (2, 0, 1)):
+        clock, blocks = 0.0, []
+        for k in order:
+            length = (rows[k][1] - rows[k][0]) * HOUR
+            blocks.append((clock, clock + length, SPEED, rows[k][2]))
+            clock += length
+        history = given_history(tuple(blocks), math.inf)
+        courses.append(grow(pits.sizes, pits.turns(history.torque), history, 0.0))
+    assert_allclose(courses[0].size[-1], courses[1].size[-1], rtol=1e-12)
+    expected = sum((end - begin) * 108_000.0 * pits.rate(np.array([0.0]), torque)[0] for begin, end, torque in rows)
+    assert_allclose(courses[0].size[-1], expected, rtol=1e-12)
+
+
+def test_a_standstill_costs_clock_time_and_nothing_else(law):
+    first = (0.0, HOUR, SPEED, 90.0)
+    histories = [given_history((first, (a * HOUR, (a + 1.0) * HOUR, SPEED, 90.0)), math.inf) for a in (1.0, 9.0)]
+    near, far = (grow(law.sizes, law.turns(np.array([90.0])), history, 5e-4) for history in histories)
+    assert_array_equal(near.size[-1], far.size[-1])
+    assert_array_equal(near.turns[-1], far.turns[-1])
+    assert far.clock[-1] - near.clock[-1] == pytest.approx(8 * HOUR)
+    # no look falls into the gap
+    looks = [far.value("clock", far.at(t)) / HOUR for t in snapshot_times(far, "linear", 9)]
+    assert not any(1.0 < look < 9.0 for look in looks)
+    assert looks[-1] == pytest.approx(10.0)
+
+
+def test_what_has_not_failed_at_the_horizon_is_censored(law):
+    turns = law.turns(np.array([90.0]))
+    whole = grow(law.sizes, turns, steady(90.0, 1e6), 5e-4)
+    cut = grow(law.sizes, turns, steady(90.0, whole.clock[-1] / HOUR * 0.5), 5e-4)
+    assert whole.has_failed
+    assert not cut.has_failed
+    assert cut.clock[-1] == pytest.approx(0.5 * whole.clock[-1])
+    assert cut.size[-1] < law.sizes[-1]
+
+
+@pytest.mark.parametrize("spacing", ["linear", "logarithmic", "adaptive"])
+def test_looks_are_in_order_and_reach_from_new_to_the_end(law, spacing):
+    drawn = DrawnBlocks(shortest=600.0, longest=HOUR, gap_chance=0.3, gap_shortest=HOUR, gap_longest=2 * HOUR)
+    torque = np.array([60.0, 110.0, 90.0])
+    history = draw_history(drawn, np.full(3, SPEED), torque, 500 * HOUR, np.random.default_rng(3))
+    course = grow(law.sizes, law.turns(torque), history, 6e-4)
+    times = snapshot_times(course, spacing, 21)
+    sizes = np.array([course.value("size", course.at(t)) for t in times])
+    assert len(times) == 21
+    assert times[0] == 0.0
+    assert times[-1] == course.running[-1]
+    assert (np.diff(times) > 0.0).all()
+    assert (np.diff(sizes) >= 0.0).all()
+    assert sizes[0] == 6e-4
+    assert sizes[-1] == pytest.approx(law.sizes[-1])
+    if spacing == "adaptive":
+        assert_allclose(np.diff(sizes), (sizes[-1] - sizes[0]) / 20, rtol=1e-6)
+    if spacing == "logarithmic":
+        left = times[-1] - times[:-1]
+        assert_allclose(left[1:] / left[:-1], left[1] / left[0], rtol=1e-9)
+    if spacing == "linear":
+        assert_allclose(np.diff(times), times[-1] / 20, rtol=1e-9)
+
+
+def test_looks_every_so_often_do_not_tell_how_long_a_life_is(law):
+    course = grow(law.sizes, law.turns(np.array([100.0])), steady(100.0, 1e6), 5e-4)
+    times = snapshot_times(course, "linear", 1000, every=600.0)
+    assert_allclose(np.diff(times), 600.0)
+    assert times[-1] <= course.running[-1] < times[-1] + 600.0
+
+
+def test_a_drift_settles(law):
+    drift = Drift(change=0.5, time=100 * HOUR, scatter=0.0)
+    assert drift.factor(0.0, 1.0) == 1.0
+    assert_allclose(drift.factor(100 * HOUR, 1.0), 1.0 + 0.5 * (1.0 - math.exp(-1.0)))
+    assert_allclose(drift.factor(1e9 * HOUR, 2.0), 2.0)
+
+
+@pytest.mark.parametrize(
+    ("blocks", "said"),
+    [
+        ([[0, 2, 1800, 90], [1, 3, 1800, 90]], "overlap"),
+        ([[2, 1, 1800, 90]], "end after they begin"),
+        ([[-1, 1, 1800, 90]], "count from 0"),
+        ([[0, 1, 0, 90]], "a standstill is a gap"),
+        ([[600, 601, 1800, 90]], "none begins before"),
+        ([[0, 1, 1800]], r"life\.blocks\.0"),
+        ([[0, 1, 1800, "x"]], r"life\.blocks\.0\.torque_nm"),
+        ("x", r"life\.blocks = 'x'"),
+    ],
+)
+def test_a_history_that_cannot_be_is_refused(config, blocks, said):
+    def history():
+        options = read_life({**config["life"], "blocks": blocks})
+        return given_history(options.blocks, options.horizon)
+
+    with pytest.raises(ConfigError, match=said):
+        history()
+
+
+def test_a_drawn_history_keeps_to_its_limits():
+    drawn = DrawnBlocks(shortest=HOUR, longest=4 * HOUR, gap_chance=0.5, gap_shortest=HOUR, gap_longest=3 * HOUR)
+    history = draw_history(drawn, np.full(2, SPEED), np.full(2, 50.0), 1000 * HOUR, np.random.default_rng(0))
+    assert isinstance(history, History)
+    length, gap = (history.end - history.begin)[:-1], history.begin[1:] - history.end[:-1]
+    assert (length >= HOUR - 1e-6).all()
+    assert (length <= 4 * HOUR + 1e-6).all()
+    assert history.end[-1] <= 1000 * HOUR
+    real = gap > 1.0
+    assert 0.4 < real.mean() < 0.6
+    assert (gap[real] >= HOUR - 1e-6).all()
+    assert (gap[real] <= 3 * HOUR + 1e-6).all()
+    assert set(history.setpoint.tolist()) == {0, 1}

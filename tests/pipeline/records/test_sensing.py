@@ -1,0 +1,127 @@
+"""Data sets of housing sensors: the same promises as of bearings, and the stories their columns tell."""
+
+import numpy as np
+import pytest
+from small_sets import make
+
+from gensig.cli import main
+from gensig.dataset.reader import open_dataset
+from gensig.plan.make import make_plan
+from gensig.plan.request import read_request
+from gensig.production.streaming import open_stream
+from gensig.record.inputs import record_system, row_instrument, row_values
+from gensig.record.simulate import forget_twins, simulate_records
+
+SET = ("sensing=housing", "sensing.channels=[pinion_x,pinion_y,wheel_x,wheel_y]", "operating.duration_s=0.05")
+STORED = ("dataset.store_source=true", "dataset.store_clean=true", "dataset.store_detectability=true")
+SENSORS = ["housing_input", "housing_output", "housing_top"]
+
+
+def records(*overrides):
+    config = read_request(["plan.n_records=4", "plan.classes=[healthy,missing_tooth]", "operating.duration_s=0.05",
+                           *overrides]).config  # fmt: skip
+    plan = make_plan(config)
+    rows = [plan.record(place) for place in range(plan.n_records)]
+    forget_twins()
+    return config, rows, simulate_records(config, rows)
+
+
+@pytest.fixture(scope="module")
+def folder(tmp_path_factory):
+    return make(tmp_path_factory.mktemp("housing") / "data", *SET, *STORED)
+
+
+def test_generate_verify_reproduce(folder, capsys):
+    assert main(["verify", str(folder)]) == 0
+    assert main(["reproduce", str(folder), "--records", "3"]) == 0
+    assert "3 of 3 records have the same bits" in capsys.readouterr().out
+
+
+def test_channels_are_the_sensors(folder):
+    data = open_dataset(folder)
+    assert data.channel_names == SENSORS
+    assert data.attributes["source_names"] == ["pinion_x", "pinion_y", "wheel_x", "wheel_y"]
+    assert data.signals(0).shape == (3, 2560)
+    assert np.all(np.isnan(data.column("detectability")))
+    assert np.all(data.column("clipped_fraction") == 0.0)
+
+
+def test_a_stream_gives_the_same(folder):
+    config = read_request([*SET, *STORED, "plan.n_records=6", "plan.classes=[healthy,crack]",
+                           "dataset.records_per_shard=1"]).config  # fmt: skip
+    streamed = open_stream(config)
+    assert streamed.channel_names == SENSORS
+    record = streamed[2]
+    assert np.array_equal(record.signals["acceleration"], open_dataset(folder).signals(2))
+    assert record.signals["acceleration_source"].shape == (4, 2560)
+
+
+def test_reading_for_diagnosis(folder):
+    torch = pytest.importorskip("torch")
+    from diagnose.data.torch_sets import VibrationDataset
+
+    options = {"channels": ["housing_top"], "window_samples": 256, "stride_samples": 256}
+    window, label = VibrationDataset(open_dataset(folder), "random_window_leaky", "train", **options)[0]
+    assert tuple(torch.as_tensor(window).shape) == (1, 256)
+    assert int(label) in (0, 1)
+
+
+def test_the_floor_is_the_same_for_all_classes_and_at_the_ratio_asked_for():
+    sharp = ("sensing=housing", "sensing.sensor.adc_bits=null", "sensing.sensor.adc_range_m_per_s2=null",
+             "sensing.sensor.dc_offset_m_per_s2=0", "dataset.store_clean=true")  # fmt: skip
+    config, rows, found = records(*sharp)
+    for condition in {row["condition_id"] for row in rows}:
+        own = [(row, record) for row, record in zip(rows, found, strict=True) if row["condition_id"] == condition]
+        assert {row["label_name"] for row, _ in own} == {"healthy", "missing_tooth"}
+        floors, healthy = [], None
+        for row, record in own:
+            instrument = row_instrument(config, record_system(config, row_values(row)), row)
+            noise = record.signals["acceleration"].astype(float) - record.signals["acceleration_clean"]
+            floors.append(instrument.power(noise))
+            if row["label_name"] == "healthy":
+                healthy = record.signals["signal_power"]
+        np.testing.assert_allclose(floors[0], floors[1], rtol=1e-4, atol=0)
+        np.testing.assert_allclose(10 * np.log10(healthy / floors[0]), config["sensing"]["snr_db"], rtol=0, atol=0.1)
+
+
+def test_the_source_is_that_of_a_sensor_on_the_bearing():
+    """With perfect gears that do not bounce: their motion is the same from wherever it starts."""
+    perfect = (
+        "plan.classes=[healthy,crack]",
+        "sensing.gain_scatter=0",
+        "quality.iso1328_grade=null",
+        "dataset.store_shaft_angle=true",
+        "dataset.store_mesh_state=true",
+    )
+    _, _, housing = records("sensing=housing", *perfect, "dataset.store_source=true")
+    _, _, bearing = records(*perfect, "dataset.store_clean=true")
+    for one, other in zip(housing, bearing, strict=True):
+        ours, theirs = one.signals["acceleration_source"], other.signals["acceleration_clean"]
+        sound = one.values["label_name"] == "healthy"
+        # a crack that is in mesh where the machine starts moves its static equilibrium, to which the drive is anchored
+        assert np.all((ours - theirs).std(axis=1) < (2e-3 if sound else 0.05) * theirs.std(axis=1))
+        for name in ("mesh_pinion_tooth", "mesh_wheel_tooth", "fault_engaged"):
+            shown, expected = (np.sort(np.atleast_2d(record.signals[name]), axis=0) for record in (one, other))
+            assert np.mean(shown != expected) < 2e-3
+        assert one.signals["fault_engaged"].any() != sound
+        angles = [record.signals["shaft_angle"] for record in (one, other)]
+        np.testing.assert_allclose(*angles, rtol=0, atol=2e-4)
+        np.testing.assert_allclose(one.values["speed_rpm"], other.values["speed_rpm"], rtol=1e-6, atol=0)
+
+
+def test_a_converter_that_clips_marks_its_records():
+    _, _, found = records("sensing=housing", "sensing.sensor.adc_range_m_per_s2=10")
+    for record in found:
+        assert record.values["clipped"] == 1
+        assert 0.01 < record.values["clipped_fraction"] < 1.0
+        assert np.abs(record.signals["acceleration"]).max() <= 10.0
+
+
+def test_a_user_file_that_does_not_fit_stops_the_plan(tmp_path, capsys):
+    file = tmp_path / "response.csv"
+    file.write_text("frequency_hz,x\n" + "".join(f"{line},1\n" for line in range(20)))
+    words = ["plan", "sensing=measured", f"sensing.path.file={file}", "plan.n_records=1"]
+    assert main(words) != 0
+    told = capsys.readouterr().err.strip()
+    assert "no column pinion_x_to_housing_real" in told
+    assert "\n" not in told

@@ -1,0 +1,132 @@
+"""A folder whose process is killed while it is being begun is no data set, is known, and is begun anew."""
+
+import os
+import signal
+from collections.abc import Callable
+from pathlib import Path
+
+import pytest
+from dataset_samples import CONFIG, make_plan
+
+from gensig.dataset.folder.beginning import create_folder, refuse_used
+from gensig.dataset.folder.layout import BEGINNING, read_manifest
+from gensig.dataset.folder.manifest import identity_hash
+from gensig.dataset.folder.verify import verify
+from gensig.errors import DatasetError
+
+CHANGES = ("mkdir", "replace", "unlink", "fsync", "rename")
+
+
+def begin(out: Path) -> None:
+    identity = identity_hash(CONFIG, "0.1.0")
+    create_folder(
+        out, config=CONFIG, overrides=[], plan=make_plan(), identity=identity, seed=7, generator_version="0.1.0"
+    )
+
+
+def killed_before(number: int, work: Callable[[], None]) -> bool:
+    """Do the work in a process of its own that is killed before its change of this number; False if it has fewer."""
+    process = os.fork()
+    if process == 0:
+        left = [number]
+
+        def deadly(name: str) -> Callable:
+            real = getattr(os, name)
+
+            def change(*words: object, **options: object) -> object:
+                if left[0] == 0:
+                    os.kill(os.getpid(), signal.SIGKILL)
+                left[0] -= 1
+                return real(*words, **options)
+
+            return change
+
+        for name in CHANGES:
+            setattr(os, name, deadly(name))
+        try:
+            work()
+        finally:
+            os._exit(0)
+    _, status = os.waitpid(process, 0)
+    return os.WIFSIGNALED(status) and os.WTERMSIG(status) == signal.SIGKILL
+
+
+def files(folder: Path) -> dict[str, bytes]:
+    return {str(path.relative_to(folder)): path.read_bytes() for path in folder.rglob("*") if path.is_file()}
+
+
+@pytest.mark.parametrize("exists", [False, True])
+def test_killed_at_every_change_it_is_no_data_set_and_is_begun_anew(tmp_path: Path, exists: bool) -> None:
+    begin(tmp_path / "whole")
+    whole = files(tmp_path / "whole")
+    number, refused, finished = 0, 0, 0
+    while True:
+        out = tmp_path / f"{number}" / "deep" / "set"
+        if exists:
+            out.mkdir(parents=True)
+        if not killed_before(number, lambda out=out: begin(out)):
+            break
+        number += 1
+        if (out / "manifest.json").is_file():
+            finished += 1
+            assert not verify(out).complete
+            with pytest.raises(DatasetError, match="not empty"):
+                begin(out)
+        else:
+            refused += 1
+            with pytest.raises(DatasetError) as caught:
+                read_manifest(out)
+            assert "\n" not in str(caught.value)
+            assert ("again" in str(caught.value)) == (out / BEGINNING).is_file()
+            begin(out)
+        made = files(out)
+        made.pop(BEGINNING, None)  # stays where the kill came between manifest and its end
+        made = {name: content for name, content in made.items() if not name.endswith(".tmp")}
+        assert made.keys() == whole.keys()
+        assert all(made[name] == whole[name] for name in whole if name != "manifest.json")
+    assert refused > 20
+    assert finished >= 1
+    assert read_manifest(out).n_done == 0
+
+
+@pytest.mark.parametrize("name", ["mine.txt", "shards/mine.h5", "splits/mine.txt", "splits/deep/mine.csv"])
+def test_a_killed_beginning_that_holds_anything_else_is_not_touched(tmp_path: Path, name: str) -> None:
+    begin(tmp_path / "set")
+    (tmp_path / "set" / "manifest.json").unlink()
+    (tmp_path / "set" / BEGINNING).touch()
+    refuse_used(tmp_path / "set")
+    (tmp_path / "set" / name).parent.mkdir(exist_ok=True)
+    (tmp_path / "set" / name).write_text("keep")
+    before = files(tmp_path / "set")
+    with pytest.raises(DatasetError, match="not empty"):
+        begin(tmp_path / "set")
+    assert files(tmp_path / "set") == before
+
+
+def test_files_of_a_data_set_without_its_manifest_are_not_touched(tmp_path: Path) -> None:
+    begin(tmp_path / "set")
+    (tmp_path / "set" / "manifest.json").unlink()
+    with pytest.raises(DatasetError, match="not empty"):
+        begin(tmp_path / "set")
+
+
+def test_two_processes_do_not_begin_the_same_folder(tmp_path: Path) -> None:
+    """The second waits for the first, and then finds a data set."""
+    out = tmp_path / "set"
+    for _ in range(5):
+        children = []
+        for _child in range(2):
+            process = os.fork()
+            if process == 0:
+                try:
+                    begin(out)
+                except DatasetError as error:
+                    os._exit(7 if "not empty" in str(error) else 8)
+                finally:
+                    os._exit(0)
+            children.append(process)
+        statuses = sorted(os.waitstatus_to_exitcode(os.waitpid(child, 0)[1]) for child in children)
+        assert statuses == [0, 7]
+        for path in sorted(out.rglob("*"), reverse=True):
+            path.rmdir() if path.is_dir() else path.unlink()
+        out.rmdir()

@@ -1,0 +1,146 @@
+"""No byte of a closed data set changes unnoticed, and only what is meant for hand-written words may be accepted."""
+
+import hashlib
+import json
+import shutil
+import subprocess
+from pathlib import Path
+
+import pytest
+from dataset_samples import build, make_plan
+
+from gensig.dataset.folder.manifest import finalize
+from gensig.dataset.folder.verify import verify
+from gensig.dataset.plan import Plan
+from gensig.dataset.storage.checksums import accept_edits, read_checksums
+from gensig.errors import DatasetError
+
+FILES = (
+    "README.md", "SHA256SUMS", "config.yaml", "croissant.json", "index.h5", "manifest.json", "overrides.yaml",
+    "plan.csv", "run.log", "figures/0-healthy.png", "shards/shard-00000.h5", "splits/by_unit.csv",
+)  # fmt: skip
+
+
+@pytest.fixture(scope="module")
+def logged(tmp_path_factory: pytest.TempPathFactory) -> Path:
+    """A data set with everything that a run leaves in it."""
+    folder = build(tmp_path_factory.mktemp("logged") / "set", make_plan(), close=False)
+    (folder / "run.log").write_text("begun\n")
+    (folder / "figures").mkdir()
+    (folder / "figures" / "0-healthy.png").write_bytes(b"\x89PNG, for one")
+    finalize(folder)
+    assert verify(folder).problems == []
+    return folder
+
+
+@pytest.fixture
+def with_log(logged: Path, tmp_path: Path) -> Path:
+    """The same, to be damaged."""
+    return shutil.copytree(logged, tmp_path / "logged")
+
+
+def test_every_file_is_listed_as_sha256sum_does(with_log: Path) -> None:
+    found = {str(path.relative_to(with_log)) for path in with_log.rglob("*") if path.is_file()}
+    listed = read_checksums(with_log)
+    assert listed.keys() == found - {"SHA256SUMS"}
+    assert set(FILES) <= found
+    assert all(hashlib.sha256((with_log / name).read_bytes()).hexdigest() == listed[name] for name in listed)
+    command = shutil.which("sha256sum")
+    if command:
+        done = subprocess.run([command, "--check", "--strict", "SHA256SUMS"], cwd=with_log, capture_output=True)
+        assert done.returncode == 0
+
+
+@pytest.mark.parametrize("name", FILES)
+def test_a_flipped_byte_anywhere_is_found_and_its_file_named(with_log: Path, name: str) -> None:
+    path = with_log / name
+    content = path.read_bytes()
+    n = len(content)
+    for place, bit in ((0, 5), (n // 7, 0), (n // 3, 5), (n // 2, 0), (n - 1, 5)):
+        damaged = bytearray(content)
+        damaged[place] ^= 1 << bit
+        path.write_bytes(damaged)
+        result = verify(with_log)
+        assert not result.complete
+        assert any(Path(name).name in problem for problem in result.problems), (place, bit, result.problems)
+        assert not any("\n" in problem for problem in result.problems)
+    path.write_bytes(content)
+    assert verify(with_log).complete
+
+
+@pytest.mark.parametrize("name", FILES)
+@pytest.mark.parametrize("quick", [False, True])
+def test_a_missing_file_is_named(with_log: Path, name: str, quick: bool) -> None:
+    (with_log / name).unlink()
+    if name == "manifest.json":
+        with pytest.raises(DatasetError, match=r"no manifest\.json"):
+            verify(with_log, quick=quick)
+        return
+    result = verify(with_log, quick=quick)
+    assert any(f"{Path(name).name} is missing" in problem for problem in result.problems)
+
+
+def test_environment_cannot_be_rewritten(with_log: Path) -> None:
+    content = json.loads((with_log / "manifest.json").read_text())
+    content["environment"]["numpy"] = "9.9.9"
+    (with_log / "manifest.json").write_text(json.dumps(content, indent=1) + "\n")
+    for quick in (False, True):
+        assert any("manifest.json was altered" in line for line in verify(with_log, quick=quick).problems)
+
+
+def test_an_extra_figure_is_named(with_log: Path) -> None:
+    (with_log / "figures" / "7-foreign.png").write_bytes(b"x")
+    assert any("7-foreign.png" in line for line in verify(with_log).problems)
+
+
+def test_hand_written_words_are_accepted_when_asked(with_log: Path) -> None:
+    assert accept_edits(with_log) == []
+    with (with_log / "README.md").open("a") as card:
+        card.write("\nOur rig has a loose bolt.\n")
+    (line,) = verify(with_log).problems
+    assert "README.md was altered" in line
+    assert "gensig finalize" in line
+    before = (with_log / "manifest.json").read_bytes()
+    assert accept_edits(with_log) == ["README.md"]
+    assert verify(with_log).complete
+    assert (with_log / "manifest.json").read_bytes() == before
+
+
+@pytest.mark.parametrize("name", ["manifest.json", "run.log", "figures/0-healthy.png", "SHA256SUMS"])
+def test_nothing_else_is_accepted(with_log: Path, name: str) -> None:
+    content = bytearray((with_log / name).read_bytes())
+    content[-2] ^= 1
+    (with_log / name).write_bytes(content)
+    with pytest.raises(DatasetError, match=r"may be edited|damaged|no JSON"):
+        accept_edits(with_log)
+    assert not verify(with_log).complete
+
+
+def test_a_card_that_is_gone_is_not_accepted(with_log: Path) -> None:
+    (with_log / "README.md").unlink()
+    with pytest.raises(DatasetError, match=r"README\.md is missing"):
+        accept_edits(with_log)
+
+
+def test_checksums_that_are_gone_are_written_when_asked(with_log: Path) -> None:
+    before = (with_log / "SHA256SUMS").read_bytes()
+    (with_log / "SHA256SUMS").unlink()
+    assert any("SHA256SUMS is missing" in line for line in verify(with_log, quick=True).problems)
+    assert accept_edits(with_log) == ["SHA256SUMS"]
+    assert (with_log / "SHA256SUMS").read_bytes() == before
+
+
+def test_an_incomplete_set_has_nothing_to_accept(tmp_path: Path, plan: Plan) -> None:
+    with pytest.raises(DatasetError, match="incomplete"):
+        accept_edits(build(tmp_path / "a", plan, close=False))
+
+
+@pytest.mark.parametrize(
+    "line", ["0" * 64 + "  ../secret", "0" * 64 + "  shards/../../x.h5", "short  README.md", "0" * 64 + " README.md"]
+)
+def test_forged_lines_are_refused(with_log: Path, line: str) -> None:
+    with (with_log / "SHA256SUMS").open("a") as file:
+        file.write(line + "\n")
+    with pytest.raises(DatasetError, match="none of a data set"):
+        read_checksums(with_log)
+    assert not verify(with_log).complete

@@ -1,0 +1,310 @@
+"""Shards: the same bytes for the same input, whole or not there, and nothing unexpected inside."""
+
+import subprocess
+import sys
+import time
+from pathlib import Path
+
+import h5py
+import numpy as np
+import pytest
+from dataset_samples import ATTRIBUTES, SIGNALS, make_plan, row_of, write_shard
+
+from gensig.dataset.storage.atomic import sha256_file
+from gensig.dataset.storage.attributes import read_attributes
+from gensig.dataset.storage.guard import open_shard, read_rows
+from gensig.dataset.storage.shard import ShardWriter
+from gensig.errors import DatasetError
+
+
+@pytest.mark.parametrize("compression", ["none", "gzip", "lzf", "blosc2"])
+def test_what_goes_in_comes_out(tmp_path: Path, compression: str) -> None:
+    plan = make_plan()
+    path = tmp_path / "a.h5"
+    writer = write_shard(path, plan, compression=compression)
+    assert writer.sha256 == sha256_file(path)
+    assert writer.n_bytes == path.stat().st_size
+    with open_shard(path) as file:
+        assert read_attributes(file) == {"schema_version": 1, **ATTRIBUTES}
+        assert file["acceleration"].chunks == (1, 2, 200)
+        for row, index in enumerate(plan.rows(0).tolist()):
+            signals, values = row_of(plan, index)
+            for name, array in signals.items():
+                np.testing.assert_array_equal(file[name][row], array)
+            for name, value in values.items():
+                np.testing.assert_array_equal(read_rows(file[name])[row], value)
+        assert file["speed_rpm"].attrs["unit"] == b"r/min"
+        assert np.isnan(file["integration_error"][...]).all()
+
+
+def test_bytes_depend_neither_on_time_nor_name_nor_order(tmp_path: Path) -> None:
+    plan = make_plan()
+    first = write_shard(tmp_path / "a.h5", plan).sha256
+    time.sleep(1.1)  # HDF5 time stamps have a resolution of 1 s
+    assert write_shard(tmp_path / "b.h5", plan).sha256 == first
+    writer = ShardWriter(
+        tmp_path / "c.h5", n_records=10, signals=SIGNALS, params=["crack_depth_mm"], attributes=ATTRIBUTES
+    )
+    with writer:
+        for row in reversed(range(10)):
+            writer.write(row, *row_of(plan, row))
+    assert writer.sha256 == first
+    assert write_shard(tmp_path / "d.h5", make_plan(n_classes=2)).sha256 != first
+
+
+def test_exception_leaves_nothing(tmp_path: Path) -> None:
+    writer = ShardWriter(
+        tmp_path / "a.h5", n_records=1, signals=SIGNALS, params=["crack_depth_mm"], attributes=ATTRIBUTES
+    )
+
+    def crash() -> None:
+        with writer:
+            writer.write(0, *row_of(make_plan(), 0))
+            raise KeyboardInterrupt
+
+    with pytest.raises(KeyboardInterrupt):
+        crash()
+    assert list(tmp_path.iterdir()) == []
+
+
+def test_unwritten_row_is_refused_and_leaves_nothing(tmp_path: Path) -> None:
+    plan = make_plan()
+
+    def write_one() -> None:
+        with ShardWriter(
+            tmp_path / "a.h5", n_records=2, signals=SIGNALS, params=["crack_depth_mm"], attributes=ATTRIBUTES
+        ) as w:
+            w.write(0, *row_of(plan, 0))
+
+    with pytest.raises(DatasetError, match="1 of 2 rows were never written, the first is row 1"):
+        write_one()
+    assert list(tmp_path.iterdir()) == []
+
+
+def test_failed_record_keeps_its_parameters(tmp_path: Path) -> None:
+    writer = write_shard(tmp_path / "a.h5", make_plan(), failed=4)
+    assert writer.n_failed == 1
+    with open_shard(tmp_path / "a.h5") as file:
+        assert np.isnan(file["acceleration"][4]).all()
+        assert np.isfinite(file["acceleration"][5]).all()
+        assert file["params/crack_depth_mm"][4] == pytest.approx(0.4)
+        assert read_rows(file["status"]).tolist().count("failed") == 1
+
+
+@pytest.mark.parametrize(
+    ("change", "message"),
+    [
+        ({"label": 1.5}, "label: 1.5 is no value of type int16"),
+        ({"label_name": "Riß"}, "ASCII text of at most 64 bytes"),
+        ({"label": 2**15}, "label"),
+        ({"severity": 1.2}, "outside 0"),
+        ({"severity": float("nan")}, "outside 0"),
+        ({"label_name": "x" * 65}, "label_name"),
+        ({"label_name": 3}, "label_name"),
+        ({"status": "fine"}, "status"),
+        ({"speed_rmp": 3.0}, "did you mean speed_rpm"),
+        ({"params/unknown": 3.0}, "not declared"),
+    ],
+)
+def test_value_that_does_not_fit_is_refused(tmp_path: Path, change: dict, message: str) -> None:
+    signals, values = row_of(make_plan(), 0)
+    with (
+        ShardWriter(
+            tmp_path / "a.h5", n_records=1, signals=SIGNALS, params=["crack_depth_mm"], attributes=ATTRIBUTES
+        ) as writer,
+    ):
+        with pytest.raises(DatasetError, match=message):
+            writer.write(0, signals, values | change)
+        writer.write(0, signals, values)
+        with pytest.raises(DatasetError, match="written already"):
+            writer.write(0, signals, values)
+
+
+def test_missing_column_and_bad_signals_are_refused(tmp_path: Path) -> None:
+    signals, values = row_of(make_plan(), 0)
+    not_finite = signals["acceleration"].copy()
+    not_finite[0, 3] = np.inf
+    with ShardWriter(
+        tmp_path / "a.h5", n_records=1, signals=SIGNALS, params=["crack_depth_mm"], attributes=ATTRIBUTES
+    ) as writer:
+        for wrong in ({"acceleration": not_finite}, {"acceleration": not_finite[:1]}, {"noise_power": np.ones(3)}):
+            with pytest.raises(DatasetError, match=next(iter(wrong))):
+                writer.write(0, signals | wrong, values)
+        with pytest.raises(DatasetError, match="signal noise_power is missing"):
+            writer.write(0, {k: v for k, v in signals.items() if k != "noise_power"}, values)
+        with pytest.raises(DatasetError, match="column torque_nm is missing"):
+            writer.write(0, signals, {k: v for k, v in values.items() if k != "torque_nm"})
+        writer.write(0, signals, values)
+
+
+@pytest.mark.parametrize(
+    "change",
+    [
+        {"n_records": 0},
+        {"signals": {"acceleration": (2,)}},
+        {"signals": {"acceleration": (3, 200)}},
+        {"signals": {"acceleration": (2, 200), "sound": (2, 200)}},
+        {"params": ["../x"]},
+        {"params": ["a", "a"]},
+        {"compression": "zip"},
+        {"sample_type": "int8"},
+        {"signals": {"acceleration": (2, 200), "acceleration_scale": (2,)}},
+        {"attributes": {k: v for k, v in ATTRIBUTES.items() if k != "class_names"}},
+        {"attributes": ATTRIBUTES | {"schema_version": 2}},
+    ],
+)
+def test_declaration_that_could_not_be_read_back_is_refused(tmp_path: Path, change: dict) -> None:
+    given = {"n_records": 1, "signals": SIGNALS, "params": [], "attributes": ATTRIBUTES} | change
+    with pytest.raises(DatasetError):
+        ShardWriter(tmp_path / "a.h5", **given)
+
+
+@pytest.mark.parametrize("value", [{"a": 1}, None, ["a", 1, None], "a\0b", "x" * 70_000])
+def test_attribute_that_would_not_come_back_is_refused(tmp_path: Path, value: object) -> None:
+    writer = ShardWriter(
+        tmp_path / "a.h5", n_records=1, signals=SIGNALS, params=[], attributes=ATTRIBUTES | {"odd": value}
+    )
+    with pytest.raises(DatasetError, match="odd"):
+        writer.__enter__()
+    assert list(tmp_path.iterdir()) == []
+
+
+def _replace(name: str, **declaration) -> object:
+    def change(file: h5py.File) -> None:
+        del file[name]
+        file.create_dataset(name, **declaration)
+
+    return change
+
+
+def _soft(file: h5py.File) -> None:
+    file["more"] = h5py.SoftLink("/label")
+
+
+def _external(file: h5py.File) -> None:
+    file["params/more"] = h5py.ExternalLink("/etc/passwd", "/x")
+
+
+def _virtual(file: h5py.File) -> None:
+    layout = h5py.VirtualLayout((10,), "f8")
+    layout[:] = h5py.VirtualSource("/etc/other.h5", "x", (10,))
+    del file["torque_nm"]
+    file.create_virtual_dataset("torque_nm", layout)
+
+
+def _attribute(name: str, value: object) -> object:
+    def change(file: h5py.File) -> None:
+        file.attrs[name] = value
+
+    return change
+
+
+@pytest.mark.parametrize(
+    ("change", "message"),
+    [
+        (_soft, "'more' is a link"),
+        (_external, "'params/more' is a link"),
+        (_virtual, "in another file"),
+        (_replace("torque_nm", shape=(10,), dtype="f8", external="/tmp/gensig-none.bin"), "in another file"),
+        (_replace("torque_nm", data=np.zeros(9)), "has shape"),
+        (_replace("torque_nm", data=np.zeros((10, 1))), "axes"),
+        (_replace("label", data=np.zeros(10)), "has type"),
+        (_replace("acceleration", data=np.ones((10, 2, 200), "i4")), "wants float32 or int16"),
+        (_replace("acceleration", data=np.ones((10, 2, 200), "u2")), "wants float32 or int16"),
+        (_replace("acceleration", data=np.ones((10, 2, 200), "i2")), "no data set acceleration_scale"),
+        (_replace("acceleration", data=np.ones((10, 2, 200)), scaleoffset=2), "allowed are gzip, lzf and blosc2"),
+        (_replace("label_name", data=["x"] * 10, dtype=h5py.string_dtype()), "has type object"),
+        (_replace("label_name", data=np.zeros(10, dtype=[("a", "f8")])), "has type"),
+        (_replace("acceleration", shape=(10, 2, 10**12), dtype="f4", chunks=(1, 2, 100)), "bomb"),
+        (_replace("acceleration", shape=(10, 2, 10**9), dtype="f4", compression="gzip"), "bomb"),
+        (_attribute("schema_version", 2), "format version 2"),
+        (_attribute("sampling_rate_hz", float("nan")), "positive"),
+        (_attribute("channel_names", 3), "list of text"),
+        (lambda file: file.__delitem__("status"), "no data set status"),
+        (lambda file: file.attrs.__delitem__("class_names"), "no root attribute class_names"),
+    ],
+)
+def test_stranger_is_refused(tmp_path: Path, change, message: str) -> None:
+    path = tmp_path / "a.h5"
+    write_shard(path, make_plan())
+    open_shard(path).close()
+    with h5py.File(path, "r+") as file:
+        change(file)
+    with pytest.raises(DatasetError, match=message):
+        open_shard(path)
+
+
+def test_unknown_column_is_ignored(tmp_path: Path) -> None:
+    path = tmp_path / "a.h5"
+    write_shard(path, make_plan())
+    with h5py.File(path, "r+") as file:
+        file.create_dataset("from_the_future", data=np.zeros((10, 2)))
+    open_shard(path).close()
+
+
+def test_link_out_of_the_folder_is_refused(tmp_path: Path) -> None:
+    (tmp_path / "in").mkdir()
+    write_shard(tmp_path / "a.h5", make_plan())
+    (tmp_path / "in" / "a.h5").symlink_to(tmp_path / "a.h5")
+    open_shard(tmp_path / "in" / "a.h5").close()
+    with pytest.raises(DatasetError, match="leads out"):
+        open_shard(tmp_path / "in" / "a.h5", folder=tmp_path / "in")
+
+
+def test_no_hdf5_and_truncated_are_one_line(tmp_path: Path) -> None:
+    path = tmp_path / "a.h5"
+    write_shard(path, make_plan())
+    path.write_bytes(path.read_bytes()[:-1000])
+    (tmp_path / "b.h5").write_text("hello")
+    for name in ("a.h5", "b.h5", "missing.h5"):
+        with pytest.raises(DatasetError, match=name) as caught:
+            open_shard(tmp_path / name)
+        assert "\n" not in str(caught.value)
+
+
+FULL_DISK = """
+import resource, sys
+from pathlib import Path
+from dataset_samples import make_plan, write_shard
+from gensig.errors import DatasetError
+
+folder = Path(sys.argv[1])
+resource.setrlimit(resource.RLIMIT_FSIZE, (int(sys.argv[2]), int(sys.argv[2])))
+try:
+    write_shard(folder / "a.h5", make_plan())
+except DatasetError as error:
+    sys.exit(str(error))
+"""
+
+
+@pytest.mark.parametrize(("limit", "fits"), [(20_000, False), (10_000_000, True)])
+def test_full_disk_is_one_line_and_leaves_nothing(tmp_path: Path, limit: int, fits: bool) -> None:
+    command = [sys.executable, "-c", FULL_DISK, str(tmp_path), str(limit)]
+    run = subprocess.run(command, capture_output=True, text=True, cwd=Path(__file__).parent, check=False)
+    assert run.returncode == (0 if fits else 1)
+    assert [path.name for path in tmp_path.iterdir()] == (["a.h5"] if fits else [])
+    assert len(run.stderr.splitlines()) == (0 if fits else 1)
+    assert fits or "cannot write" in run.stderr
+
+
+def test_exception_while_renaming_leaves_nothing(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    def interrupt(*_: object) -> None:
+        assert len(list(tmp_path.iterdir())) == 1  # the temporary file is there
+        raise KeyboardInterrupt
+
+    monkeypatch.setattr("gensig.dataset.storage.atomic.os.replace", interrupt)
+    with pytest.raises(KeyboardInterrupt):
+        write_shard(tmp_path / "a.h5", make_plan())
+    assert list(tmp_path.iterdir()) == []
+
+
+def test_a_reason_becomes_ascii_and_is_cut(tmp_path: Path) -> None:
+    signals, values = row_of(make_plan(), 0, status="failed")
+    with ShardWriter(
+        tmp_path / "a.h5", n_records=1, signals=SIGNALS, params=["crack_depth_mm"], attributes=ATTRIBUTES
+    ) as writer:
+        writer.write(0, signals, values | {"status_reason": "gap of 3 µm " + "x" * 300})
+    with h5py.File(tmp_path / "a.h5") as file:
+        reason = file["status_reason"][0]
+    assert reason.startswith(b"gap of 3 \\xb5m xxx")
+    assert len(reason) == 256

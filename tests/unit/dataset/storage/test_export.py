@@ -1,0 +1,194 @@
+"""Other formats give back the same numbers, to the libraries that people read them with."""
+
+import csv
+import json
+import weakref
+from pathlib import Path
+
+import h5py
+import numpy as np
+import pandas
+import pytest
+from dataset_samples import ATTRIBUTES, CLASSES, build, make_plan
+from pyarrow import parquet
+from scipy.io import wavfile
+
+import gensig.dataset.exports.export as export_module
+import gensig.dataset.exports.export_tables as tables_module
+from gensig.cli import main
+from gensig.dataset.exports.export import FORMATS, export
+from gensig.dataset.folder.layout import shard_path
+from gensig.dataset.plan import Plan
+from gensig.dataset.reader import Dataset, open_dataset
+from gensig.dataset.storage.attributes import read_attributes
+from gensig.dataset.storage.guard import open_shard, read_rows
+from gensig.errors import DatasetError
+
+NAMES = {"hdf5": "all.h5", "parquet": "all.parquet", "npz": "all.npz", "wav": "all"}
+
+
+@pytest.fixture(scope="module", params=["float32", "int16"])
+def stored(request: pytest.FixtureRequest, tmp_path_factory: pytest.TempPathFactory) -> Path:
+    """A data set with a failed record and clean signals, in both ways to store samples."""
+    out = tmp_path_factory.mktemp("stored") / "set"
+    return build(out, make_plan(), failed=12, clean=True, sample_type=request.param)
+
+
+def _signals(folder: Path, name: str = "acceleration") -> np.ndarray:
+    with open_dataset(folder) as data:
+        return np.stack([data.signals(index, name=name) for index in range(data.n_records)])
+
+
+def _columns(folder: Path) -> dict[str, np.ndarray]:
+    with open_dataset(folder) as data:
+        return {name: data.column(name) for name in data.column_names if not name.endswith("_scale")}
+
+
+def test_hdf5_is_one_shard_in_physical_units(stored: Path, tmp_path: Path) -> None:
+    out = tmp_path / "all.h5"
+    made = export(stored, "hdf5", out)
+    assert made == {"records": 36, "files": 1, "bytes": out.stat().st_size}
+    with open_shard(out) as file:
+        assert read_attributes(file) == {"schema_version": 1, **ATTRIBUTES}
+        assert "acceleration_scale" not in file
+        for name in ("acceleration", "acceleration_clean"):
+            assert file[name].dtype == np.float32
+            np.testing.assert_array_equal(file[name][...], _signals(stored, name))
+        assert file["acceleration"].attrs["unit"] == b"m/s^2"
+        for name, values in _columns(stored).items():
+            np.testing.assert_array_equal(read_rows(file[name]), values)
+        with h5py.File(shard_path(stored, 0), locking=False) as shard:
+            columns = list(_columns(stored))
+            assert [file[name].dtype for name in columns] == [shard[name].dtype for name in columns]
+
+
+def test_npz_needs_no_pickle(stored: Path, tmp_path: Path) -> None:
+    out = tmp_path / "all.npz"
+    export(stored, "npz", out)
+    with np.load(out, allow_pickle=False) as arrays:
+        np.testing.assert_array_equal(arrays["acceleration"], _signals(stored))
+        np.testing.assert_array_equal(arrays["acceleration_clean"], _signals(stored, "acceleration_clean"))
+        for name, values in _columns(stored).items():
+            np.testing.assert_array_equal(arrays[name], values)
+        assert json.loads(str(arrays["attributes_json"])) == {"schema_version": 1, **ATTRIBUTES}
+
+
+@pytest.mark.parametrize("samples", [False, True])
+def test_parquet(stored: Path, tmp_path: Path, samples: bool, monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setattr(tables_module, "ROW_GROUP_BYTES", 3 * 2 * 2 * 200 * 4)
+    out = tmp_path / "all.parquet"
+    export(stored, "parquet", out, samples=samples)
+    frame = pandas.read_parquet(out)
+    for name, values in _columns(stored).items():
+        np.testing.assert_array_equal(np.stack(frame[name].to_numpy()) if values.ndim > 1 else frame[name], values)
+    assert ("acceleration" in frame) is samples
+    if samples:
+        found = np.array(frame["acceleration"].tolist()).tolist()
+        np.testing.assert_array_equal(np.stack([np.stack(row) for row in found]), _signals(stored))
+    file = parquet.ParquetFile(out)
+    assert file.schema_arrow.field("speed_rpm").metadata[b"unit"] == b"r/min"
+    assert json.loads(file.schema_arrow.metadata[b"gensig"])["class_names"] == CLASSES
+    assert file.num_row_groups == (4 * 4 - 2 if samples else 4)  # 3 rows a group, 10, 10, 10 and 6 a shard
+
+
+@pytest.mark.parametrize("one_channel", [False, True])
+def test_wav(stored: Path, tmp_path: Path, one_channel: bool) -> None:
+    out = tmp_path / "all"
+    made = export(stored, "wav", out, one_channel=one_channel)
+    signals = _signals(stored)
+    with (out / "labels.csv").open(encoding="utf-8", newline="") as stream:
+        rows = list(csv.DictReader(stream))
+    assert len(rows) == (72 if one_channel else 36)
+    assert made["files"] == len(rows) + 2
+    for number, row in enumerate(rows):
+        record, channel = divmod(number, 2) if one_channel else (number, slice(None))
+        rate, samples = wavfile.read(out / row["file"])
+        assert (rate, samples.dtype) == (1000, np.float32)
+        np.testing.assert_array_equal(samples.T, signals[record, channel])
+        assert row["record_id"] == f"r{record:06d}"
+        assert float(row["speed_rpm"]) == 1800.0 + record
+        if one_channel:
+            assert row["channel"] == ATTRIBUTES["channel_names"][channel]
+    assert json.loads((out / "attributes.json").read_text(encoding="utf-8"))["channel_units"] == ["m/s^2", "m/s^2"]
+
+
+@pytest.mark.parametrize("to", FORMATS)
+def test_nothing_is_overwritten_and_nothing_half_written(
+    folder: Path, tmp_path: Path, to: str, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    taken = tmp_path / "taken"
+    taken.write_text("mine")
+    with pytest.raises(DatasetError, match="exists and is left alone"):
+        export(folder, to, taken)
+    assert taken.read_text() == "mine"
+    out = tmp_path / NAMES[to]
+    shard_path(folder, 3).write_bytes(shard_path(folder, 3).read_bytes()[:-2000])
+    before = {path.name for path in tmp_path.iterdir()}
+    with pytest.raises(DatasetError) as caught:
+        export(folder, to, out, samples=to == "parquet")
+    assert "\n" not in str(caught.value)
+    assert {path.name for path in tmp_path.iterdir()} == before
+
+
+def test_a_full_disk_is_said_before_anything_is_written(
+    folder: Path, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    usage = type("Usage", (), {"free": 36 * 2 * 200 * 4 - 1})
+    monkeypatch.setattr(export_module.shutil, "disk_usage", lambda _path: usage)
+    with pytest.raises(DatasetError, match="57600 bytes and 57599 are free"):
+        export(folder, "hdf5", tmp_path / "all.h5")
+    assert not (tmp_path / "all.h5").exists()
+
+
+def test_mistakes_are_one_line(folder: Path, tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
+    for arguments, message in (
+        (["--to", "matlab", "--out", str(tmp_path / "x")], "allowed are hdf5, parquet, npz, wav"),
+        (["--to", "npz", "--out", str(tmp_path / "no" / "x")], "there is no folder"),
+        (["--to", "npz", "--out", str(folder / "x.npz")], "lies in the data set"),
+        (["--to", "npz", "--samples", "--out", str(tmp_path / "x")], "'samples' belongs to parquet"),
+        (["--to", "npz", "--one-channel", "--out", str(tmp_path / "x")], "'one_channel' to wav"),
+    ):
+        assert main(["export", str(folder), *arguments]) == 2
+        error = capsys.readouterr().err
+        assert message in error
+        assert error.count("\n") == 1
+    assert main(["export", str(folder), "--to", "npz", "--out", str(tmp_path / "x.npz")]) == 0
+    assert "36 records as npz, 1 file(s)" in capsys.readouterr().out
+
+
+def test_a_foreign_plan_names_no_file(folder: Path, tmp_path: Path) -> None:
+    """Ids become file names, so that a shard cannot choose where a wav file goes."""
+    with h5py.File(shard_path(folder, 0), "r+") as file:
+        file["record_id"][0] = b"../../evil"
+    with pytest.raises(DatasetError, match="different record ids"):
+        export(folder, "wav", tmp_path / "all")
+    assert not list(tmp_path.rglob("evil*"))
+
+
+def test_incomplete_sets_and_odd_rates_are_refused(tmp_path: Path, plan: Plan, monkeypatch: pytest.MonkeyPatch) -> None:
+    with pytest.raises(DatasetError, match="is incomplete"):
+        export(build(tmp_path / "a", plan, close=False), "npz", tmp_path / "x.npz")
+    monkeypatch.setitem(ATTRIBUTES, "sampling_rate_hz", 1000.5)
+    folder = build(tmp_path / "b", plan)
+    with pytest.raises(DatasetError, match="whole hertz"):
+        export(folder, "wav", tmp_path / "x")
+    assert not (tmp_path / "x").exists()
+
+
+@pytest.mark.parametrize("to", FORMATS)
+def test_few_records_are_in_memory_at_once(
+    folder: Path, tmp_path: Path, to: str, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.setattr(tables_module, "ROW_GROUP_BYTES", 3 * 2 * 200 * 4)
+    read, alive, most = Dataset.signals, set(), [0]
+
+    def watched(*arguments: object, **options: object) -> np.ndarray:
+        signal = read(*arguments, **options)
+        alive.add(id(signal))
+        weakref.finalize(signal, alive.discard, id(signal))
+        most[0] = max(most[0], len(alive))
+        return signal
+
+    monkeypatch.setattr(Dataset, "signals", watched)
+    export(folder, to, tmp_path / NAMES[to], samples=to == "parquet")
+    assert 1 <= most[0] <= 4

@@ -1,0 +1,1 @@
+"""Modules of this folder are importable from its subfolders."""

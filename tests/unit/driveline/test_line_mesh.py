@@ -1,0 +1,236 @@
+"""The law of one mesh of a line: tables over the roll, both flanks, single teeth, energy, phases between meshes."""
+
+import math
+from dataclasses import replace
+
+import numpy as np
+import pytest
+from line_tools import RADII, STIFFNESS, TEETH, law_at
+from numpy.testing import assert_allclose
+
+from gensig.driveline.time import _layout as layout
+from gensig.driveline.time.line_mesh import (
+    loaded_gap,
+    mesh_start,
+    pair_mesh,
+    phase_mesh,
+    tooth_angle,
+)
+from gensig.errors import ConfigError, GeometryError
+from gensig.faults.broken import MissingTooth
+from gensig.mesh.load_distribution import pair_states, static_mesh
+from gensig.plan.request import read_request
+from gensig.systems.registry import read_sliced_pair
+
+DIRECTION = np.array([RADII[0], -RADII[1]])
+BITE = 5e-6  # m
+BACKLASH = 1e-4
+
+
+def rippled(n_rows: int = 1, n_nodes: int = 32) -> np.ndarray:
+    u = np.arange(n_rows * n_nodes).reshape(n_rows, n_nodes) / n_nodes
+    return STIFFNESS * (1 + 0.2 * np.cos(2 * np.pi * u) + (0.1 * np.cos(2 * np.pi * u / n_rows) if n_rows > 1 else 0))
+
+
+def phases(**changes):
+    return phase_mesh(
+        "m", **{"direction": DIRECTION, "roll_dof": 0, "n_teeth": TEETH, "stiffness": rippled(), **changes}
+    )
+
+
+@pytest.fixture
+def table(xiamen):
+    return xiamen.mesh_table((MissingTooth(gear="pinion", tooth=2),))
+
+
+@pytest.fixture
+def pairs(table):
+    """Spur pairs that share a body, with tooth errors."""
+    rng = np.random.default_rng(4)
+    errors = rng.normal(0, 2e-6, 23), rng.normal(0, 2e-6, 84)
+    return pair_mesh("m", table, direction=DIRECTION, roll_dof=0, damping=1e-3, errors=errors)
+
+
+class TestPhaseTable:
+    def test_stiffness_repeats_with_every_tooth(self):
+        for turned in (0.0, 0.25, 0.5, 7.5, -3.25, 12345.25):
+            expected = BITE * STIFFNESS * (1 + 0.2 * math.cos(2 * math.pi * turned))
+            assert_allclose(law_at(phases(), turned, BITE)[layout.FORCE], expected, rtol=1e-9, atol=0)
+
+    def test_a_whole_turn_repeats_with_the_turn(self):
+        table = rippled(TEETH[0])
+        for turned in (0.0, 3.5, 19.75, 23.5):
+            tooth, node = int(turned) % TEETH[0], round(turned % 1 * 32)
+            expected = BITE * table[tooth, node]
+            assert_allclose(law_at(phases(stiffness=table), turned, BITE)[layout.FORCE], expected, rtol=1e-9, atol=0)
+
+    def test_no_jump_between_the_teeth_of_a_turn(self):
+        mesh = phases(stiffness=rippled(TEETH[0]))
+        for sign, approach in ((1, BITE), (-1, -BACKLASH - BITE)):
+            for pitch in (1, 7, 20):
+                before, after = (
+                    law_at(replace(mesh, backlash=BACKLASH), pitch + off, approach)[0] for off in (-1e-9, 1e-9)
+                )
+                assert_allclose(after, before, rtol=1e-6, atol=0)
+                assert sign * after > 0
+
+    def test_a_gap_stands_between(self):
+        mesh = phases(gap=np.full((1, 32), 2e-6))
+        assert law_at(mesh, 0.3, 1.9e-6)[layout.FORCE] == pytest.approx(0.0, abs=0.0)
+        assert_allclose(law_at(mesh, 0.5, BITE)[layout.FORCE], 0.8 * STIFFNESS * (BITE - 2e-6), rtol=1e-9, atol=0)
+
+    def test_nothing_within_the_backlash(self):
+        mesh = phases(backlash=BACKLASH)
+        for approach in (0.0, -0.5 * BACKLASH, -BACKLASH):
+            assert not law_at(mesh, 0.3, approach).any()
+
+    def test_the_back_flanks_push_back_as_hard_where_the_roll_is_mirrored_at_0(self):
+        table = rippled(TEETH[0])
+        mesh = phases(stiffness=table, backlash=BACKLASH)
+        for turned in (0.25, 5.5, 18.75):
+            front, back = law_at(mesh, turned, BITE)[0], law_at(mesh, turned, -BACKLASH - BITE)[0]
+            assert_allclose(back, -front, rtol=1e-9, atol=0)
+
+    def test_damping_grows_with_the_load_and_never_pulls(self):
+        mesh = phases(damping=2e-3, backlash=BACKLASH)
+        still, fast = law_at(mesh, 0.1, BITE), law_at(mesh, 0.1, BITE, rate=10.0)
+        assert_allclose(fast[layout.FORCE], 1.02 * still[layout.FORCE], rtol=1e-9, atol=0)
+        assert_allclose(fast[layout.LOST], 0.02 * still[layout.FORCE] * 10.0, rtol=1e-9, atol=0)
+        assert law_at(mesh, 0.1, BITE, rate=-1e4)[layout.FORCE] == pytest.approx(0.0, abs=0.0)
+        back = law_at(mesh, 0.1, -BACKLASH - BITE, rate=-10.0)
+        assert_allclose(back[layout.FORCE], 1.02 * law_at(mesh, 0.1, -BACKLASH - BITE)[0], rtol=1e-9, atol=0)
+
+
+class TestHelicalStatics:
+    """A helical pair's loaded contact over a pitch as one spring behind one gap."""
+
+    @pytest.fixture(scope="class")
+    @classmethod
+    def pair(cls):
+        words = ["system=helical_pair", "mesh.n_slices=12", "mesh.slice_coupling=independent", "mesh.contact=linear"]
+        return read_sliced_pair(read_request(words).config)
+
+    @pytest.fixture(scope="class")
+    @classmethod
+    def contact(cls, pair):
+        return pair.transmission_error(n_phases=16).contact
+
+    @pytest.fixture(scope="class")
+    @classmethod
+    def mesh(cls, pair, contact):
+        gap = loaded_gap(contact.approach, contact.stiffness, pair.mesh_force)
+        return phases(stiffness=contact.stiffness[None], gap=gap[None])
+
+    def test_it_is_where_statics_put_it(self, pair, contact, mesh):
+        for place, approach in enumerate(contact.approach):
+            assert_allclose(law_at(mesh, place / 16, approach)[layout.FORCE], pair.mesh_force, rtol=1e-9, atol=0)
+
+    def test_near_that_load_it_answers_as_statics_do(self, pair, contact, mesh):
+        other = replace(pair, torque=1.02 * pair.torque).transmission_error(n_phases=16).contact
+        for place, approach in enumerate(other.approach):
+            found = law_at(mesh, place / 16, approach)[layout.FORCE] - pair.mesh_force
+            assert_allclose(found, 0.02 * pair.mesh_force, rtol=0.02, atol=0)
+
+
+class TestPairs:
+    def test_statics_agree(self, pairs, table):
+        """Every pair with its own teeth, the missing one too, and the shared body."""
+        rolls = np.linspace(0.05, 30.05, 61)
+        errors = dict(zip(("pinion_error", "wheel_error"), pairs.errors, strict=True))
+        found = static_mesh(table, pair_states(table, rolls * table.pair.base_pitch, **errors), 500.0)
+        for turned, approach, load in zip(rolls, found.approach, found.load, strict=True):
+            law = law_at(pairs, turned, approach)
+            assert_allclose(law[layout.FORCE], load.sum(), rtol=2e-5, atol=0)
+
+    def test_the_missing_tooth_is_missing_on_both_flanks(self, pairs):
+        """The mesh is softest where the pairs of tooth 2 would be, once a turn."""
+        pairs = replace(pairs, errors=(pairs.errors[0], np.zeros(84)))
+        for approach in (BITE * 4, -pairs.backlash - BITE * 4):
+            force = np.array([abs(law_at(pairs, turned, approach)[0]) for turned in np.arange(0.5, 23.5, 0.25)])
+            turn_on = np.array([abs(law_at(pairs, turned, approach)[0]) for turned in np.arange(23.5, 46.5, 0.25)])
+            lost = force < 0.7 * np.median(force)
+            assert 0 < lost.sum() < 12
+            assert np.array_equal(lost, turn_on < 0.7 * np.median(force))
+
+    @pytest.mark.parametrize("approach", [2e-5, -1.5e-4])
+    def test_the_force_along_the_roll_is_the_slope_of_what_is_stored(self, pairs, approach):
+        for turned in (0.313, 2.711, 9.173):
+            step = 1e-7
+            below, above = (law_at(pairs, turned + off, approach)[layout.STORED] for off in (-step, step))
+            expected = -(above - below) / (2 * step)
+            found = law_at(pairs, turned, approach)[layout.ALONG]
+            assert_allclose(found, expected, rtol=1e-4, atol=1e-6)
+
+    @pytest.mark.parametrize("approach", [2e-5, -1.5e-4])
+    def test_the_force_is_the_slope_over_the_approach_too(self, pairs, approach):
+        for turned in (0.313, 2.711, 9.173):
+            step = 1e-10
+            below, above = (law_at(pairs, turned, approach + off) for off in (-step, step))
+            found = law_at(pairs, turned, approach)
+            slope = (above - below) / (2 * step)
+            assert_allclose(found[layout.FORCE], slope[layout.STORED], rtol=1e-4, atol=0)
+            assert_allclose(found[layout.TANGENT], slope[layout.FORCE], rtol=1e-4, atol=0)
+
+
+class TestPhasesBetweenMeshes:
+    def test_a_gear_turned_on_by_a_tooth_stands_as_before(self):
+        one, other = (
+            mesh_start(30, mate_angle=1.0, drives=True, tooth_angle=angle) for angle in (0.2, 0.2 + 2 * math.pi / 30)
+        )
+        assert_allclose(one[1], other[1], rtol=0, atol=1e-12)
+        assert other[0] == (one[0] + 1) % 30
+
+    def test_a_mate_a_tooth_further_on_meets_the_tooth_before(self):
+        one, other = (mesh_start(30, mate_angle=angle, drives=True) for angle in (1.0, 1.0 + 2 * math.pi / 30))
+        assert_allclose(one[1], other[1], rtol=0, atol=1e-12)
+        assert other[0] == (one[0] - 1) % 30
+
+    @pytest.mark.parametrize(("n_teeth", "apart"), [(40, 0.5), (41, 0.0)])
+    def test_an_idler_between_two_mates_in_a_line(self, n_teeth, apart):
+        """Its trailing flank is half a pitch behind its leading one; half a turn adds half a pitch if z is odd."""
+        driven = mesh_start(n_teeth, mate_angle=0.0, drives=False)[1]
+        drives = mesh_start(n_teeth, mate_angle=math.pi, drives=True)[1]
+        assert_allclose((drives - driven - apart + 0.5) % 1.0, 0.5, rtol=0, atol=1e-9)
+
+    @pytest.mark.parametrize("drives", [True, False])
+    def test_there_and_back(self, drives):
+        start = mesh_start(59, mate_angle=2.2, drives=drives, tooth_angle=0.71, pitch_point=0.4)
+        found = tooth_angle(59, mate_angle=2.2, drives=drives, start=start, pitch_point=0.4)
+        assert_allclose((found - 0.71 + math.pi) % (2 * math.pi), math.pi, rtol=0, atol=1e-12)
+
+    def test_no_teeth(self):
+        with pytest.raises(GeometryError, match="0 teeth"):
+            mesh_start(0, mate_angle=0.0, drives=True)
+
+
+@pytest.mark.parametrize(
+    ("changes", "told"),
+    [
+        ({"stiffness": np.full((3, 8), 1e8)}, r"must be \(1, node\) or \(20, node\)"),
+        ({"stiffness": np.full((1, 8), -1e8)}, "must not be negative"),
+        ({"stiffness": np.full((1, 8), np.nan)}, "stiffness is not finite"),
+        ({"gap": np.full((1, 8), np.inf), "stiffness": np.full((1, 8), 1e8)}, "gap is not finite"),
+        ({"backlash": -1e-4}, "backlash -0.0001 must not be negative"),
+        ({"damping": math.nan}, "damping nan"),
+        ({"start_teeth": (20, 0)}, r"start tooth 20 must lie in 0\.\.19"),
+    ],
+)
+def test_bad_tables(changes, told):
+    with pytest.raises(ConfigError, match=told) as error:
+        phases(**changes)
+    assert "mesh 'm'" in str(error.value)
+    assert "\n" not in str(error.value)
+
+
+@pytest.mark.parametrize(
+    ("changes", "told"),
+    [
+        ({"n_pairs": 3}, "whole number of cells"),
+        ({"rows": np.array([[7]])}, "must name rows"),
+        ({"errors": (np.zeros(3), np.zeros(40))}, "need as many kinds"),
+        ({"gap": np.zeros((1, 3))}, "must be alike"),
+    ],
+)
+def test_bad_meshes(changes, told):
+    with pytest.raises(ConfigError, match=told):
+        replace(phases(), **changes)

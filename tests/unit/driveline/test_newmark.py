@@ -1,0 +1,187 @@
+"""What a line, its course, its torques and its solver refuse, each in one line, and runs that cannot go on."""
+
+import math
+from dataclasses import replace
+
+import numpy as np
+import pytest
+from line_tools import chain, constant_torques, state_after, two_gears
+
+from gensig.driveline.time.course import LineCourse, ShaftTorque, constant_speed
+from gensig.driveline.time.newmark import LineSolver, _told_above, integrate_line, static_start
+from gensig.errors import ConfigError, GensigError, SimulationError
+
+SOLVER = LineSolver(sampling_rate=10240.0, oversampling=4, max_energy_residual=1e-3)
+
+
+def refused(error: type[GensigError], told: str):
+    return pytest.raises(error, match=f"(?s)^(?!.*\n).*{told}")
+
+
+def run(line, torques=(), course=None, **changes):
+    return integrate_line(
+        line, course or constant_speed(10.0), torques, changes.pop("solver", SOLVER),
+        **{"duration": 0.01, "channels": [("speed", 0)], **changes},
+    )  # fmt: skip
+
+
+class TestLine:
+    @pytest.mark.parametrize(
+        ("changes", "error", "told"),
+        [
+            ({"mass": np.eye(3)}, ConfigError, r"mass matrix \(3, 3\) must be \(2, 2\)"),
+            ({"mass": np.diag([1.0, 0.0])}, SimulationError, "inertia of 'second' must be positive"),
+            ({"stiffness": np.array([[1.0, 2.0], [0.0, 1.0]])}, SimulationError, "stiffness matrix is not symmetric"),
+            ({"damping": -np.eye(2)}, SimulationError, "damping matrix would feed energy in"),
+            ({"stiffness": np.full((2, 2), np.nan)}, ConfigError, "all finite"),
+            ({"rotation": np.ones(3)}, ConfigError, r"rotation \(3,\) must be \(2,\)"),
+            ({"rotation": np.array([1.0, 0.51])}, ConfigError, "mesh 'pair': nominal rotation closes it by -0.001"),
+            ({"rotation": np.zeros(2)}, ConfigError, "roll_dof 0 must be the rotation of its gear a"),
+        ],
+    )
+    def test_refused(self, changes, error, told):
+        with refused(error, told):
+            replace(two_gears(), **changes)
+
+    def test_a_mesh_of_another_line(self):
+        line = two_gears()
+        with refused(ConfigError, r"direction \(3,\) must be \(2,\)"):
+            replace(line, meshes=(replace(line.meshes[0], direction=np.ones(3)),))
+
+
+class TestCourse:
+    @pytest.mark.parametrize(
+        ("time", "speed", "told"),
+        [
+            ([0.0, 0.0], [1.0, 1.0], "times of its knots must increase"),
+            ([0.0, 1.0], [1.0], "must be alike"),
+            ([0.0, 1.0], [1.0, -1.0], "must not be negative"),
+            ([], [], "must be alike"),
+        ],
+    )
+    def test_refused(self, time, speed, told):
+        with refused(ConfigError, told):
+            LineCourse(time=np.array(time), speed=np.array(speed))
+
+    def test_angle_and_speed(self):
+        course = LineCourse(time=np.array([-1.0, 1.0]), speed=np.array([10.0, 30.0]))
+        angle, speed = course.nominal(np.array([-3.0, -1.0, 0.0, 0.5, 2.0]))
+        assert speed == pytest.approx([10.0, 10.0, 20.0, 25.0, 30.0])
+        assert angle == pytest.approx([-35.0, -15.0, 0.0, 11.25, 55.0])
+
+
+class TestTorques:
+    @pytest.mark.parametrize(
+        ("torque", "told"),
+        [
+            ({"dof": 5, "table": np.ones(1)}, r"degree of freedom 5 must lie in 0\.\.1"),
+            ({"dof": 0, "table": np.ones(1), "factor": np.ones(3)}, r"factor \(3,\) must be \(1,\)"),
+        ],
+    )
+    def test_refused_by_the_line(self, torque, told):
+        with refused(ConfigError, told):
+            run(two_gears(), [ShaftTorque(**torque)])
+
+    @pytest.mark.parametrize(
+        ("torque", "told"),
+        [
+            ({"table": np.array([math.inf])}, "finite numbers"),
+            ({"table": np.empty(0)}, "finite numbers"),
+            ({"table": np.ones(4), "period": 0.0}, "period 0 rad must be positive"),
+            ({"table": np.ones(4), "factor": np.array([math.nan])}, "factors must be finite"),
+        ],
+    )
+    def test_refused(self, torque, told):
+        with refused(ConfigError, told):
+            ShaftTorque(dof=0, **torque)
+
+    def test_an_angle_that_does_not_turn(self):
+        line = replace(chain(2), rotation=np.array([1.0, 0.0]))
+        with refused(ConfigError, "torque on 'disc_1': a table over its angle needs a degree of freedom that turns"):
+            run(line, [ShaftTorque(dof=1, table=np.ones(4))])
+
+    def test_the_sense_is_that_of_rotation(self):
+        """A line whose discs turn backwards moves as the mirror image of one that turns forwards."""
+        table = np.cos(np.arange(64) / 64 * 2 * np.pi) + 0.3 * np.sin(np.arange(64) / 32 * 2 * np.pi)
+        torques, start = [ShaftTorque(dof=0, table=table)], (np.zeros(3), np.zeros(3))
+        line, course = chain(3), constant_speed(300.0)
+        mirrored = replace(line, rotation=-line.rotation)
+        (q, *_), (q_1, *_) = (
+            state_after(one, start, 0.02, 800, torques=torques, course=course) for one in (line, mirrored)
+        )
+        np.testing.assert_allclose(q_1, -q, rtol=1e-9, atol=0)
+
+
+class TestRun:
+    @pytest.mark.parametrize(
+        ("changes", "told"),
+        [
+            ({"channels": []}, "no channel to give out"),
+            ({"channels": [("speed", 2)]}, r"no channel \('speed', 2\); allowed: .* of 0\.\.1"),
+            ({"channels": [("mesh_force", 1)]}, r"of 0\.\.0"),
+            ({"channels": [("power", 0)]}, "no channel"),
+            ({"duration": 0.0}, "hold no sample"),
+            ({"lead_in": -1.0}, "or no start"),
+            ({"start": (np.zeros(3), np.zeros(3))}, r"start must be finite deviations and rates, \(2,\)"),
+        ],
+    )
+    def test_refused(self, changes, told):
+        with refused(ConfigError, told):
+            run(two_gears(), **changes)
+
+    @pytest.mark.parametrize(
+        "changes", [{"sampling_rate": 0.0}, {"oversampling": 1}, {"oversampling": 1000}, {"max_energy_residual": 0.0}]
+    )
+    def test_solver(self, changes):
+        with refused(ConfigError, "line solver"):
+            replace(SOLVER, **changes)
+
+    def test_a_step_longer_than_a_tooth(self):
+        with refused(SimulationError, "mesh 'pair' rolls .* pitches in a step"):
+            run(two_gears(), course=constant_speed(5e4))
+
+    def test_energies_that_do_not_balance(self):
+        """Elastic impacts in steps that are a third of what the contact lasts."""
+        start = np.zeros(2), np.array([4.0, -1.0])
+        with refused(SimulationError, "the energy balance misses .* more than 0.001; raise the oversampling above 2"):
+            run(two_gears(backlash=1e-4), start=start, solver=replace(SOLVER, oversampling=2))
+
+    def test_divergence(self):
+        """A free line under torques that nothing balances runs away; it is told as one, with a name."""
+        with refused(SimulationError, "left all bounds"):
+            run(two_gears(), constant_torques([1e9, 0.0]), start=(np.zeros(2), np.zeros(2)))
+
+    def test_infinite_motion_does_not_hang(self):
+        with refused(SimulationError, "line: "):
+            run(two_gears(), start=(np.zeros(2), np.array([1e300, 0.0])))
+
+    def test_rest_of_a_free_line_is_in_its_own_acceleration(self):
+        """What is not balanced accelerates the whole line; the mesh carries what the second inertia needs."""
+        line = two_gears()
+        q = static_start(line, constant_speed(10.0), constant_torques([10.0, 0.0]))
+        reduced = 0.01 + 0.05 * 0.5**2
+        force = 10.0 / reduced * 0.5 * 0.05 / 0.1
+        approach = line.meshes[0].direction @ q
+        assert approach == pytest.approx(force / 3e8, rel=1e-6)
+
+    def test_rest_on_a_drive_as_soft_as_a_tenth_of_a_hertz(self):
+        """The drive's spring carries what is not balanced."""
+        spring = (0.01 + 0.05 * 0.5**2) * (2 * math.pi * 0.1) ** 2
+        line = two_gears(drive=(spring, 0.0))
+        q = static_start(line, constant_speed(10.0), constant_torques([1e-3, 0.0]))
+        assert q[0] == pytest.approx(1e-3 / spring, rel=1e-6)
+
+    def test_rest_of_an_unloaded_line_is_where_it_is(self):
+        assert np.abs(static_start(two_gears(backlash=1e-4), constant_speed(10.0), [])).max() < 1e-15
+
+    def test_what_drives_backwards_rests_on_the_back_flanks(self):
+        line = two_gears(backlash=1e-4)
+        q = static_start(line, constant_speed(10.0), constant_torques([-10.0, 20.0]))
+        assert line.meshes[0].direction @ q == pytest.approx(-1e-4 - 10.0 / 0.05 / 3e8, rel=1e-6)
+
+
+@pytest.mark.parametrize(
+    ("missed", "told"), [(0.0123456, "0.0123"), (1.0004e-3, "0.0010004"), (float("nan"), "nan"), (1e-3, "0.001")]
+)
+def test_a_residual_just_above_what_is_allowed_reads_above_it(missed, told):
+    assert _told_above(missed, 1e-3) == told

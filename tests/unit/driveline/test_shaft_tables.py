@@ -1,0 +1,225 @@
+"""Tables of a drive line: what they give, and one line with row and column for what cannot be."""
+
+import csv
+import io
+
+import pytest
+from numpy.testing import assert_allclose
+
+from gensig.driveline.drive_line import read_drive_line
+from gensig.driveline.shaft_tables import read_shafting, shipped_tables
+from gensig.errors import ConfigError
+from gensig.plan.request import read_request
+
+SHAFTING = """# a motor, two gears and a fan
+node,name,inertia_kg_m2,speed_ratio,stiffness_knm_per_rad,edge_from,edge_to,edge_kind,teeth_from,teeth_to,loss_factor
+1,motor,0.1,1,10,1,2,coupling,,,0.2
+2,pinion,1e-3,1,1500,2,3,gear_mesh,20,40,
+3,wheel,,0.5,20,3,4,shaft,,,
+4,fan,0.2,0.5,,,,,,,
+"""
+GEARS = """node,name,n_teeth,normal_module_mm,pressure_angle_deg,helix_angle_deg,face_width_mm
+2,pinion,20,2,20,0,20
+3,wheel,40,2,20,0,20
+"""
+
+
+@pytest.fixture(scope="module")
+def config():
+    return read_request(["system=shaft_line"]).config
+
+
+@pytest.fixture
+def line_of(config, tmp_path):
+    """The line of two tables, each written as given or with lines of it replaced."""
+
+    def make(shafting=SHAFTING, gears=GEARS, **keys):
+        (tmp_path / "line.csv").write_text(shafting, encoding="utf-8")
+        (tmp_path / "gears.csv").write_text(gears, encoding="utf-8")
+        files = {"shafting_csv": str(tmp_path / "line.csv"), "gears_csv": str(tmp_path / "gears.csv")}
+        return read_drive_line({**config, "system": {**config["system"], **files, **keys}})
+
+    return make
+
+
+def test_a_line_is_read_with_its_units(line_of):
+    read = line_of()
+    line = read.line
+    assert [node.name for node in line.nodes] == ["motor", "pinion", "wheel", "fan"]
+    assert [shaft.stiffness for shaft in line.shafts] == [1e4, 2e4]
+    assert [shaft.loss_factor for shaft in line.shafts] == [0.2, 0.03]
+    radii = [gear.base_radius for gear in line.gears]
+    assert_allclose(line.meshes[0].stiffness, 1.5e6 / (radii[0] * radii[1]), rtol=1e-12)
+    assert line.meshes[0].loss_factor == 0.08
+    assert line.meshes[0].backlash == pytest.approx(80e-6)
+    assert read.mesh_orders == (20.0,)
+    assert read.numbers == (1, 2, 3, 4)
+    assert read.campbell_orders == (1.0, 2.0, 20.0, 40.0)
+
+
+def test_what_is_empty_is_derived(line_of):
+    """An inertia from the gear as a solid disc, a mesh stiffness from ISO 6336-1."""
+    read = line_of(SHAFTING.replace("1500,2,3", ",2,3"))
+    density = read_request([]).config["material"]["density_kg_per_m3"]
+    radius, bore = 0.04, 0.02
+    mass = density * 3.141592653589793 * (radius**2 - bore**2) * 0.02
+    assert_allclose(read.line.nodes[2].inertia, 0.5 * mass * (radius**2 + bore**2), rtol=1e-9)
+    assert_allclose(read.line.gears[1].mass, mass, rtol=1e-9)
+    per_width = read.line.meshes[0].stiffness / 0.02
+    assert 14e9 < per_width < 22e9  # ISO's c_gamma of such steel gears is about 20 N/(mm um)
+
+
+def test_header_units_are_read_as_they_are_written(line_of):
+    milli = SHAFTING.replace("stiffness_knm_per_rad", "stiffness_nm_per_rad")
+    one, other = line_of().line, line_of(milli).line
+    assert_allclose(one.shafts[0].stiffness, 1e3 * other.shafts[0].stiffness, rtol=1e-12)
+
+
+def test_rows_may_hold_only_a_joint_and_columns_stand_in_any_order(line_of):
+    rows = list(csv.DictReader(SHAFTING.splitlines()[1:]))
+    stream = io.StringIO()
+    writer = csv.DictWriter(stream, list(reversed(rows[0])))
+    writer.writeheader()
+    for row in rows:
+        joint = ("stiffness_knm_per_rad", "edge_from", "edge_to", "edge_kind", "teeth_from", "teeth_to", "loss_factor")
+        writer.writerow({key: "" if key in joint else value for key, value in row.items()})
+    for row in rows[:3]:
+        writer.writerow({key: "" if key in ("node", "name", "inertia_kg_m2", "speed_ratio") else value
+                         for key, value in row.items()})  # fmt: skip
+    assert line_of(stream.getvalue()).line.speed_ratio.tolist() == line_of().line.speed_ratio.tolist()
+
+
+def test_the_ring_of_a_viscous_damper_counts_half(line_of):
+    assert line_of(viscous_damper_node=1).line.nodes[0].inertia == pytest.approx(0.05)
+    with pytest.raises(ConfigError, match=r"viscous_damper_node = 9: .* has no such node"):
+        line_of(viscous_damper_node=9)
+
+
+def test_a_bare_name_is_a_shipped_table():
+    assert len(read_shafting("key", "engine_shafting")) == len(read_shafting("key", "engine_shafting.csv")) == 67
+    assert {"engine_gears.csv", "engine_shafting.csv", "two_stage_gears.csv"} <= set(shipped_tables())
+
+
+def test_shafts_alone_need_no_gears(line_of):
+    plain = "node,inertia_kg_m2,stiffness_nm_per_rad,edge_from,edge_to,edge_kind\n1,1,5,1,2,shaft\n2,1,,,,\n"
+    assert line_of(plain, gears_csv=None).line.n_loops == 0
+
+
+@pytest.mark.parametrize(
+    ("old", "new", "message"),
+    [
+        ("4,fan,0.2", "4,fan,-0.2", r"row 6 \(node 4\), column inertia_kg_m2: -0.2 must be positive"),
+        ("4,fan,0.2", "4,fan,0", r"row 6 \(node 4\), column inertia_kg_m2: 0 must be positive"),
+        ("4,fan,0.2", "4,fan,heavy", r"row 6 \(node 4\), column inertia_kg_m2: 'heavy' is no number"),
+        ("4,fan,0.2", "4,fan,inf", "'inf' is no number"),
+        ("4,fan,0.2", "4,fan,", "column inertia_kg_m2: it is empty and node 4 has no gear"),
+        ("4,fan", "3,fan", "row 6 .*, column node: node 3 is there already, in row 5"),
+        ("4,fan", "4.5,fan", "column node: 4.5 must be a whole number"),
+        ("4,fan", ",fan", "row 6, column node: it is empty, but the row has an inertia"),
+        ("3,4,shaft", "3,7,shaft", r"row 5 \(node 3\), column edge_to: there is no node 7"),
+        ("3,4,shaft", "3,3,shaft", "column edge_to: node 3 is joined to itself"),
+        ("3,4,shaft", "3,,shaft", "column edge_to: it is empty"),
+        ("3,4,shaft", "3,4,rope", "column edge_kind: 'rope'; allowed: shaft, coupling, rigid, gear_mesh"),
+        ("20,3,4,shaft", "20,,,", "column stiffness_knm_per_rad: a stiffness without edge_from"),
+        ("20,3,4,shaft", ",3,4,shaft", "column stiffness_knm_per_rad: it is empty; give a value"),
+        ("20,3,4,shaft", "-20,3,4,shaft", "column stiffness_knm_per_rad: -20 must be positive"),
+        ("20,3,4,shaft,,", "20,3,4,shaft,20,", "column teeth_from: that is of a gear_mesh, and edge_kind is shaft"),
+        (",,,0.2\n", ",,,-0.2\n", "column loss_factor: -0.2 must not be negative"),
+        ("20,3,4,shaft", ",,,", r"row 6 \(node 4\), column edge_from: nothing joins node 4 to node 1"),
+        ("fan,0.2,0.5", "fan,0.2,2", r"row 6 \(node 4\), column speed_ratio: 2 contradicts the tooth counts.* 0\.5 of"),
+        ("wheel,,0.5", "wheel,,0.51", r"row 5 \(node 3\), column speed_ratio: 0.51 contradicts"),
+        ("gear_mesh,20,40", "gear_mesh,20,41", r"row 4 \(node 2\), column teeth_to: 41, but on .* wheel with 40"),
+        ("gear_mesh,20,40", "gear_mesh,19,40", "column teeth_from: 19, but on node 2 .* pinion with 20"),
+        ("2,3,gear_mesh", "1,3,gear_mesh", "column edge_from: .* has no gear on node 1"),
+        ("inertia_kg_m2", "inertia", "row 2, column inertia: its unit is missing; write inertia_kg_m2"),
+        ("inertia_kg_m2", "inertia_kgm2", "row 2, column inertia_kgm2: no unit known here; write inertia_kg_m2"),
+        ("inertia_kg_m2", "inertia_kg", "column inertia_kg: mass, not moment of inertia; write inertia_kg_m2"),
+        ("stiffness_knm_per_rad", "stiffness", "column stiffness: its unit is missing; write stiffness_nm_per_rad or"),
+        ("stiffness_knm_per_rad", "stiffness_n_per_m", "stiffness, not torsional stiffness"),
+        ("speed_ratio", "speed_ration", "column speed_ration: unknown; did you mean speed_ratio"),
+        ("edge_kind", "name_of_edge", "there is no column edge_kind"),
+        ("teeth_from,teeth_to", "teeth_to,teeth_to", "column teeth_to: there are two of it"),
+        ("4,fan,0.2,0.5,,,,,,,", "4,fan,0.2", "row 6: 3 cells under 11 column names"),
+        ("4,fan,0.2", '4,"fan,0.2', "row 6: a double quote is open or out of place"),
+        ("4,fan,0.2", "4,fan,1e300", "row 6 .*column inertia_kg_m2: 1e300 is beyond any machine"),
+    ],
+)  # fmt: skip
+def test_a_mistake_in_the_line_names_row_and_column(line_of, old, new, message):
+    assert old in SHAFTING
+    with pytest.raises(ConfigError, match=message) as error:
+        line_of(SHAFTING.replace(old, new))
+    assert "\n" not in str(error.value)
+    assert "line.csv" in str(error.value)
+
+
+@pytest.mark.parametrize(
+    ("old", "new", "message"),
+    [
+        ("3,wheel,40", "3,wheel,41", r"line.csv, row 4 .*column teeth_to: 40, but on node 3 .* wheel with 41"),
+        ("3,wheel,40", "9,wheel,40", r"gears.csv, row 3 .*column node: .* has no node 9"),
+        ("3,wheel,40,2", "3,wheel,40,3", "pinion and wheel: .*normal_module differs"),
+        ("3,wheel,40,2,20", "3,wheel,40,2,60", r"gears.csv, row 3 .*pressure_angle_deg = 60"),
+        ("2,pinion,20", "2,pinion,3", r"gears.csv, row 2 .*undercut"),
+        ("20,2,20,0,20", "20,2,20,0,-20", r"row 2 .*column face_width_mm: -20 must be positive"),
+        ("20,2,20,0,20", "20,2,20,95,20", "helix angle below 90 degrees"),
+        ("20,2,20,0,20", "20,0,20,0,20", "module must be positive"),
+        ("20,2,20,0,20", "20,2,20,0,", "column face_width_mm: it is empty"),
+        ("normal_module_mm", "normal_module", "column normal_module: its unit is missing; write normal_module_mm or"),
+        ("3,wheel", "4,spare,40,2,20,0,20\n3,wheel", r"row 3 .*spare meshes with nothing"),
+        ("3,wheel", "3,twin,40,2,20,0,20\n3,wheel", "column teeth_to: node 3 has 2 such gears"),
+    ],
+)
+def test_a_mistake_in_the_gears_names_row_and_column(line_of, old, new, message):
+    assert old in GEARS
+    with pytest.raises(ConfigError, match=message) as error:
+        line_of(gears=GEARS.replace(old, new, 1))
+    assert "\n" not in str(error.value)
+
+
+@pytest.mark.parametrize(
+    ("text", "message"),
+    [
+        ("", "is empty"),
+        ("# only a note\n", "is empty"),
+        ("node,name\n", "there is no column inertia_kg_m2"),
+        (SHAFTING.splitlines()[1], "a header and no rows"),
+    ],
+)
+def test_a_table_without_content_is_refused(line_of, text, message):
+    with pytest.raises(ConfigError, match=message):
+        line_of(text)
+
+
+def test_gears_that_lock_are_named(line_of):
+    ring = SHAFTING + ",,,,900,3,2,gear_mesh,39,19,\n"
+    gears = GEARS + "3,second,39,2,20,0,20\n2,other,19,2,20,0,20\n"
+    with pytest.raises(ConfigError, match=r"row 7, column edge_to: this joint closes a loop that locks"):
+        line_of(ring, gears)
+
+
+@pytest.mark.parametrize(
+    ("keys", "message"),
+    [
+        ({"shafting_csv": None}, "system.shafting_csv is required: give a path, or one of engine_gears.csv"),
+        ({"shafting_csv": "not_there.csv"}, "not_there.csv cannot be read: No such file"),
+        ({"gears_csv": None}, "node 3 has no gear to derive it from"),
+        ({"backlash_um": -1}, "system.backlash_um = -1 must not be negative"),
+        ({"lateral": 1}, "system.lateral = 1 is not true or false"),
+        ({"loss_factor": {"shaft": 3, "coupling": 0, "gear_mesh": 0}}, "system.loss_factor.shaft = 3 must lie in 0..2"),
+        ({"loss_factor": {"shaft": 0}}, "system.loss_factor: missing coupling, gear_mesh"),
+        ({"campbell": {"low_speed_rpm": 9, "high_speed_rpm": 3, "orders": [1]}}, "low_speed_rpm must lie between"),
+        ({"campbell": {"low_speed_rpm": 0, "high_speed_rpm": 3, "orders": [0]}}, "all positive"),
+        ({"campbell": {"low_speed_rpm": 0, "high_speed_rpm": 3, "orders": []}}, "all positive"),
+        ({"support": None}, "system.support = None must be a group of keys"),
+        ({"latral": True}, "system: unknown key 'latral'; did you mean 'lateral'"),
+    ],
+)
+def test_a_mistake_in_the_keys_is_one_line(line_of, keys, message):
+    with pytest.raises(ConfigError, match=message):
+        line_of(**keys)
+
+
+@pytest.mark.parametrize(("key", "value"), [("force_n", 0), ("damping_ratio", 1.5), ("bearing", 3), ("shaft", {})])
+def test_a_mistake_in_the_supports_is_one_line(line_of, config, key, value):
+    with pytest.raises(ConfigError, match=f"system.support.{key}"):
+        line_of(support={**config["system"]["support"], key: value})

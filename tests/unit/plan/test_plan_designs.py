@@ -1,0 +1,392 @@
+"""Grids, repeats and counts of a plan: nested by unit, condition, fault and repeat, and balanced at every level."""
+
+import copy
+import itertools
+import re
+from collections import Counter, defaultdict
+from importlib.resources import files
+
+import numpy as np
+import pytest
+import yaml
+from numpy.testing import assert_allclose, assert_array_equal
+from scipy.stats import qmc
+
+from gensig.dataset.plan import plan_text
+from gensig.dataset.schema import COLUMNS
+from gensig.dataset.splitting.protocols import make_splits
+from gensig.errors import ConfigError
+from gensig.plan.make import MOST_IN_GRID, describe_design, make_plan
+from gensig.plan.request import read_request
+from gensig.record.inputs import FIXED_KEYS, Stream, stream
+from gensig.record.simulate import simulate_records
+from gensig.units import split_unit
+
+CLASSES = ("healthy", "crack", "pitting", "missing_tooth")
+SPEED = {"distribution": "choice", "values": [1200, 1800, 2400]}
+TORQUE = {"distribution": "uniform", "low": 10, "high": 40, "levels": 4}
+DEPTH = {"distribution": "uniform", "low": 1.0, "high": 3.0, "levels": 3}
+LENGTH = {"distribution": "choice", "values": [0.5, 1.0]}
+WITHOUT = {"distribution": "uniform", "low": 1000, "high": 2000}
+MANY = {**WITHOUT, "levels": 100_000}
+GRID = {"design": "grid", "n_records": None, "n_units": 5, "n_gearboxes": 2}
+VARY = {"operating.speed_rpm": SPEED, "operating.torque_nm": TORQUE}
+
+
+@pytest.fixture(scope="module")
+def quickstart():
+    return read_request(["experiment=quickstart"]).config
+
+
+@pytest.fixture(scope="module")
+def configured(quickstart):
+    """The quickstart with keys of its plan and of the ``vary`` of its faults replaced."""
+
+    def make(faults=None, **plan):
+        config = copy.deepcopy(quickstart)
+        config["plan"].update(plan)
+        for name, vary in (faults or {}).items():
+            config["classes"][name]["vary"].update(vary)
+        return config
+
+    return make
+
+
+@pytest.fixture(scope="module")
+def planned(configured):
+    return lambda *args, **kwargs: make_plan(configured(*args, **kwargs))
+
+
+def rows(plan, *names):
+    """(record,) tuples of some columns."""
+    return list(zip(*(plan.columns[name].tolist() for name in names), strict=True))
+
+
+SET_POINT = ("params/operating.speed_rpm", "params/operating.torque_nm")
+
+
+class TestGrid:
+    @pytest.fixture(scope="class")
+    @classmethod
+    def plan(cls, planned):
+        return planned(**GRID, vary=VARY)
+
+    @pytest.fixture(scope="class")
+    @classmethod
+    def crossed(cls, planned):
+        """Three depths of cracks, two lengths of pits: six faults at every set-point."""
+        faults = {"crack": {"crack_depth_mm": DEPTH}, "pitting": {"pit_length_mm": LENGTH}}
+        return planned(faults, **{**GRID, "n_units": 3}, vary={"operating.speed_rpm": SPEED})
+
+    def test_every_unit_runs_every_combination_with_every_class_once(self, plan):
+        found = Counter(rows(plan, "unit_id", *SET_POINT, "label_name"))
+        units = [f"unit-{number:04d}" for number in range(5)]
+        expected = set(itertools.product(units, (1200.0, 1800.0, 2400.0), (10.0, 20.0, 30.0, 40.0), CLASSES))
+        assert set(found) == expected
+        assert set(found.values()) == {1}
+
+    def test_levels_of_the_key_are_those_of_the_machine(self, plan):
+        assert_allclose(plan.columns["speed_set_rpm"], plan.columns[SET_POINT[0]], rtol=1e-12, atol=0)
+        assert_array_equal(plan.columns["torque_nm"], plan.columns[SET_POINT[1]])
+
+    def test_what_has_no_levels_is_drawn(self, plan):
+        cracks = plan.columns["label_name"] == "crack"
+        depths = plan.columns["params/fault.crack_depth_mm"][cracks]
+        assert len(set(depths.tolist())) == cracks.sum() == 60
+        assert len(set(plan.columns["fault_tooth"][cracks].tolist())) > 15
+
+    def test_null_levels_leave_a_key_of_the_conditions_to_chance(self, planned):
+        noise = {"distribution": "uniform", "low": 10, "high": 30, "levels": None}
+        plan = planned(**GRID, vary={"operating.speed_rpm": SPEED, "sensing.snr_db": noise})
+        found = dict(rows(plan, "condition_id", "snr_db"))
+        assert len(found) == len(set(found.values())) == 15
+        assert min(found.values()) < 12
+        assert max(found.values()) > 28
+
+    def test_faults_with_levels_are_crossed_with_all_else(self, crossed):
+        found = Counter(rows(crossed, "unit_id", "params/operating.speed_rpm", "params/fault.crack_depth_mm"))
+        depths = {key: n for key, n in found.items() if key[2] == key[2]}
+        assert {key[2] for key in depths} == {1.0, 2.0, 3.0}
+        assert len(depths) == 3 * 3 * 3
+        assert set(depths.values()) == {2}
+        lengths = Counter(rows(crossed, "unit_id", "params/operating.speed_rpm", "params/fault.pit_length_mm"))
+        assert {n for key, n in lengths.items() if key[2] == key[2]} == {3}
+
+    def test_all_classes_have_as_many_records(self, plan, crossed):
+        assert set(Counter(plan.columns["label_name"].tolist()).values()) == {5 * 12}
+        assert set(Counter(crossed.columns["label_name"].tolist()).values()) == {3 * 3 * 6}
+
+    def test_a_condition_holds_every_class_once(self, crossed):
+        assert set(Counter(rows(crossed, "condition_id", "label")).values()) == {1}
+        assert len(set(crossed.columns["condition_id"].tolist())) == 3 * 3 * 6
+
+    def test_a_tooth_may_have_levels(self, planned):
+        tooth = {"distribution": "tooth", "levels": 3}
+        plan = planned({"crack": {"tooth": tooth}}, **GRID, vary={})
+        found = Counter(plan.columns["fault_tooth"][plan.columns["label_name"] == "crack"].tolist())
+        assert found == {0: 5, 11: 5, 22: 5}
+
+    def test_the_same_configuration_gives_the_same_plan(self, configured):
+        one, two = (make_plan(configured(**GRID, vary=VARY)) for _ in range(2))
+        other = make_plan({**configured(**GRID, vary=VARY), "seed": 1})
+        assert plan_text(one) == plan_text(two)
+        assert plan_text(one) != plan_text(other)
+        assert_array_equal(one.columns["speed_set_rpm"][::4], other.columns["speed_set_rpm"][::4])
+
+    def test_the_right_number_of_records_may_be_typed(self, planned, plan):
+        assert plan_text(planned(**{**GRID, "n_records": 240}, vary=VARY)) == plan_text(plan)
+
+    def test_levels_change_no_other_design(self, planned):
+        plain = {key: value for key, value in TORQUE.items() if key != "levels"}
+        one, two = (planned(n_records=24, vary={"operating.torque_nm": spec}) for spec in (TORQUE, plain))
+        assert plan_text(one) == plan_text(two)
+
+    def test_it_can_be_told_in_words(self, configured):
+        config = configured({"crack": {"crack_depth_mm": DEPTH}}, **GRID, vary=VARY)
+        assert describe_design(config) == (
+            "grid of operating.speed_rpm 3 x operating.torque_nm 4 x crack.crack_depth_mm 3; drawn: crack.tooth, "
+            "pitting.tooth, pitting.pit_length_mm, pitting.pit_width_mm, missing_tooth.tooth"
+        )
+        assert describe_design(configured(**GRID, vary={})).startswith("grid of no key; drawn: ")
+        assert describe_design(configured(design="sobol")) == "sobol"
+
+    @pytest.mark.parametrize(
+        ("plan", "text"),
+        [
+            (
+                {"n_records": 400},
+                "plan.n_records = 400, but the plan has 60 records (5 units x 3 conditions x 4 classes); "
+                "plan.n_records=null takes them",
+            ),
+            ({"n_records": 3}, "plan.n_records = 3 must be a whole number of at least 4"),
+            ({"vary": {"operating.speed_rpm": WITHOUT}}, "plan.vary.operating.speed_rpm: a grid needs its levels"),
+            (
+                {"vary": {"operating.speed_rpm": {**SPEED, "levels": 3}}},
+                "plan.vary.operating.speed_rpm: the levels of a choice are its values",
+            ),
+            ({"vary": {"operating.sped_rpm": SPEED}}, "plan.vary: 'operating.sped_rpm' is no key"),
+            ({"vary": {"operating.speed_rpm": MANY}}, f"the grid has 2,000,000 records (5 units x 100,000 conditions x "
+             f"4 classes), more than {MOST_IN_GRID:,}; take fewer levels, units or repeats"),
+            ({"conditions_per_unit": 2}, "plan.conditions_per_unit = 2: a grid's levels say how many"),
+            ({"n_repeats": 0}, "plan.n_repeats = 0"),
+        ],
+    )  # fmt: skip
+    def test_mistakes_are_one_line(self, planned, plan, text):
+        with pytest.raises(ConfigError, match=re.escape(text)) as caught:
+            planned(**{**GRID, "vary": {"operating.speed_rpm": SPEED}, **plan})
+        assert "\n" not in str(caught.value)
+
+    def test_mistakes_in_a_fault_are_named(self, planned):
+        with pytest.raises(ConfigError, match=re.escape("fault.vary.crack_depth_mm: levels = 1")):
+            planned({"crack": {"crack_depth_mm": {**DEPTH, "levels": 1}}}, **GRID, vary={})
+
+    def test_too_large_a_grid_over_faults(self, planned):
+        seeds = {"distribution": "uniform", "low": 1, "high": 3, "levels": 10**6}
+        with pytest.raises(ConfigError, match=r"20,000,000 records \(5 units x 1,000,000 faults x 4 classes\)"):
+            planned({"crack": {"crack_depth_mm": seeds}}, **GRID, vary={})
+
+
+class TestRepeats:
+    N = 3
+
+    @pytest.fixture(scope="class")
+    @classmethod
+    def plan(cls, planned):
+        return planned(n_records=20 * 4 * cls.N, n_units=5, n_repeats=cls.N)
+
+    @pytest.fixture(scope="class")
+    @classmethod
+    def families(cls, plan):
+        """Repeats of one unit, condition and class, in order."""
+        found = defaultdict(list)
+        for index in range(plan.n_records):
+            record = plan.record(index)
+            found[record["condition_id"], record["label_name"]].append(record)
+        return found
+
+    def test_each_class_has_all_repeats_at_every_condition(self, families):
+        assert len(families) == 20 * 4
+        for records in families.values():
+            assert [record["repeat"] for record in records] == list(range(self.N))
+
+    def test_they_share_all_but_their_start(self, families):
+        own = {"record_id", "shard", "row", "repeat", "start_tooth_pinion", "start_tooth_wheel", "start_phase"}
+        for one, *others in families.values():
+            for other in others:
+                assert {key for key in one if str(one[key]) != str(other[key])} <= own
+        phases = [record["start_phase"] for records in families.values() for record in records]
+        assert len(set(phases)) == len(phases)
+
+    def test_repeats_come_one_after_another_in_random_order(self, plan):
+        labels = plan.columns["label"].reshape(-1, 4)
+        assert (np.sort(labels, axis=1) == np.arange(4)).all()
+        assert len({tuple(order) for order in labels.tolist()}) > 15
+        assert_array_equal(plan.columns["repeat"], np.tile(np.repeat(np.arange(self.N), 4), 20))
+
+    @pytest.mark.parametrize("n_records", [4, 11, 13, 50])
+    @pytest.mark.parametrize("design", ["latin_hypercube", "sobol"])
+    def test_classes_are_balanced_to_one(self, planned, design, n_records):
+        counts = Counter(planned(n_records=n_records, n_repeats=2, design=design).columns["label_name"].tolist())
+        assert set(counts) == set(CLASSES)
+        assert max(counts.values()) - min(counts.values()) <= 1
+
+    def test_a_grid_repeats_too(self, planned):
+        plan = planned(**GRID, vary={"operating.speed_rpm": SPEED}, n_repeats=2)
+        found = Counter(rows(plan, "unit_id", "speed_set_rpm", "label_name", "repeat"))
+        assert len(found) == plan.n_records == 5 * 3 * 4 * 2
+        assert set(found.values()) == {1}
+
+    def test_no_clean_split_tears_them_apart(self, planned):
+        plan = planned(n_records=20 * 4 * 2, n_units=20, n_gearboxes=2, n_repeats=2)
+        tables = make_splits(plan, 0)
+        assert {"by_unit", "cross_specimen"} <= set(tables)
+        side = {}
+        for protocol in ("by_unit", "cross_specimen"):
+            table = tables[protocol]
+            subset = dict(zip(table.record_id.tolist(), table.subset.tolist(), strict=True))
+            side = defaultdict(set)
+            for name, *family in rows(plan, "record_id", "condition_id", "label_name"):
+                side[tuple(family)].add(subset[name])
+            assert {len(subsets) for subsets in side.values()} == {1}
+            assert {subset for subsets in side.values() for subset in subsets} == {"train", "validation", "test"}
+
+    def test_they_are_told_apart_by_start_and_noise_alone(self, quickstart):
+        config = copy.deepcopy(quickstart)
+        config["plan"].update(n_records=4, n_repeats=2, classes=["healthy", "crack"])
+        config["classes"] = {name: config["classes"][name] for name in config["plan"]["classes"]}
+        config["operating"]["duration_s"] = 0.02
+        config["dataset"]["store_clean"] = True
+        plan = make_plan(config)
+        records = simulate_records(config, [plan.record(index) for index in range(4)])
+        one, two = (r.signals for r, name in zip(records, plan.columns["label_name"], strict=True) if name == "crack")
+        assert_array_equal(one["noise_power"], two["noise_power"])
+        noise = [(signals["acceleration"] - signals["acceleration_clean"]).ravel() for signals in (one, two)]
+        assert abs(np.corrcoef(*noise)[0, 1]) < 0.1
+        clean = [signals["acceleration_clean"][0] for signals in (one, two)]
+        assert np.std(clean[0] - clean[1]) > 0.1 * np.std(clean[0])
+        assert_allclose(np.std(clean[0]), np.std(clean[1]), rtol=0.5, atol=0)
+
+
+class TestStartOfTheSound:
+    """The first sound record of a condition starts as the healthy twin that sets the noise level, so that it is it."""
+
+    START = ("start_tooth_pinion", "start_tooth_wheel", "start_phase")
+
+    @staticmethod
+    def drawn(cause, index):
+        rng = stream(0, cause, index)
+        return int(rng.integers(23)), int(rng.integers(84)), float(rng.random())
+
+    @pytest.mark.parametrize("changes", [{}, {"sham": True}, {"n_repeats": 3}])
+    def test_streams(self, planned, changes):
+        plan = planned(n_records=48, **changes)
+        for index in range(plan.n_records):
+            record = plan.record(index)
+            group = int(record["condition_id"].rpartition("-")[2])
+            is_twin = record["label_name"] == "healthy" and record.get("repeat", 0) == 0
+            expected = self.drawn(Stream.TWIN, group) if is_twin else self.drawn(Stream.START, index)
+            assert tuple(record[name] for name in self.START) == expected
+
+    def test_of_two_sound_classes_one_is_the_twin(self, configured):
+        config = configured(n_records=24, classes=["healthy", "again", "crack"])
+        config["classes"] = {**config["classes"], "again": config["classes"]["healthy"]}
+        plan = make_plan(config)
+        starts = [row[2:] for row in rows(plan, "label_name", "condition_id", *self.START) if row[0] != "crack"]
+        assert len(set(starts)) == len(starts) == 16
+
+    def test_without_a_sound_class_nothing_changes(self, configured):
+        config = configured(n_records=12, classes=["crack", "pitting"])
+        config["classes"] = {name: config["classes"][name] for name in ("crack", "pitting")}
+        plan = make_plan(config)
+        for index, start in enumerate(rows(plan, *self.START)):
+            assert start == self.drawn(Stream.START, index)
+
+
+class TestConditionsPerUnit:
+    def test_counts_multiply(self, planned):
+        plan = planned(n_records=None, n_units=5, conditions_per_unit=3, n_repeats=2)
+        assert plan.n_records == 5 * 3 * 4 * 2
+        per_unit = defaultdict(set)
+        for unit, condition in rows(plan, "unit_id", "condition_id"):
+            per_unit[unit].add(condition)
+        assert [len(conditions) for conditions in per_unit.values()] == [3] * 5
+
+    def test_the_same_number_of_records_is_the_same_plan(self, planned):
+        one, two = planned(n_records=80, n_units=5, conditions_per_unit=4), planned(n_records=80, n_units=5)
+        assert plan_text(one) == plan_text(two)
+
+
+class TestSobol:
+    """A Sobol sequence has its number in its digits; units and faults are numbered as well."""
+
+    @pytest.fixture(scope="class")
+    @classmethod
+    def plan(cls, planned):
+        return planned(n_records=4 * 256, n_units=4, design="sobol")
+
+    @staticmethod
+    def n_cells(one, other):
+        ranks = [16 * np.argsort(np.argsort(values)) // len(values) for values in (one, other)]
+        return len(set(zip(*ranks, strict=True)))
+
+    def test_speed_does_not_tell_the_size_of_the_fault(self, plan):
+        cracks = plan.columns["label_name"] == "crack"
+        depth, torque = (plan.columns[f"params/{key}"] for key in ("fault.crack_depth_mm", "operating.torque_nm"))
+        assert self.n_cells(depth[cracks], torque[cracks]) > 130  # of 256 cells about 163 by chance
+        raw = [qmc.Sobol(3, rng=np.random.default_rng(seed)).random_base2(8)[:, 1] for seed in (1, 2)]
+        assert self.n_cells(*raw) == 16
+
+    def test_the_unit_does_not_tell_the_speed(self, plan):
+        speed, unit = plan.columns["speed_set_rpm"], plan.columns["unit_id"]
+        for name in set(unit.tolist()):
+            assert 0.3 < np.mean(speed[unit == name] < 1800.0) < 0.7
+
+    def test_the_conditions_are_still_those_of_the_sequence(self, plan):
+        speed = np.unique(plan.columns["speed_set_rpm"])
+        assert_array_equal(np.floor((speed - 1200.0) / 1200.0 * 256), np.arange(256))
+
+
+NUMBERS = {  # keys of the configuration that are pure numbers; every other that can be drawn ends in its unit
+    "poisson_ratio", "damping_ratio", "friction_coefficient", "friction_transition", "points_per_pitch",
+    "oversampling", "max_error", "iso1328_grade", "used_share_low", "used_share_high", "tooth_share",
+    "undulation_share", "undulation_waves", "backlash_scatter", "support_stiffness_scatter",
+    "support_damping_scatter", "drive_damping_ratio", "gain_scatter", "tooth", "pitted_share", "diameter_scatter",
+    "depth_ratio", "region_low", "region_high", "pit_seed", "profile_waves", "sensitivity_tolerance",
+    "transverse_sensitivity", "resonance_damping_ratio", "max_clipped_fraction", "dropped_fraction",
+    "dropped_run_samples", "course_seed", "drift_scatter",
+}  # fmt: skip
+
+
+def numbers_in(tree, path=""):
+    """Dotted keys of a configuration that hold a number."""
+    for key, value in tree.items():
+        if isinstance(value, dict):
+            yield from numbers_in(value, f"{path}{key}.")
+        elif isinstance(value, int | float) and not isinstance(value, bool):
+            yield f"{path}{key}"
+
+
+def has_unit(key):
+    leaf = key.rpartition(".")[2]
+    return split_unit(leaf)[1] is not None or leaf.endswith(("_kg_per_m3", "_m_per_s2"))
+
+
+def test_whatever_can_be_drawn_carries_its_unit():
+    keys = [
+        key for key in numbers_in(read_request([]).config) if not key.startswith((*FIXED_KEYS, "classes.", "fault."))
+    ]
+    assert len(keys) > 15
+    assert {key.rpartition(".")[2] for key in keys if not has_unit(key)} <= NUMBERS
+    options = [file for file in (files("gensig.configs") / "fault").iterdir() if file.name.endswith(".yaml")]
+    assert len(options) > 10
+    for file in options:
+        fault = {key: value for key, value in yaml.safe_load(file.read_text()).items() if key != "vary"}
+        assert {key for key in numbers_in(fault) if not has_unit(key)} <= NUMBERS
+
+
+def test_every_number_of_a_plan_is_drawn_under_a_name_with_its_unit(planned):
+    plan = planned(n_records=24, n_repeats=2)
+    own = {"shard", "row", "repeat"}
+    for name, values in plan.columns.items():
+        if values.dtype.kind in "if" and name not in COLUMNS and name not in own:
+            assert has_unit(name) or name.rpartition(".")[2] in NUMBERS, name

@@ -1,0 +1,44 @@
+"""What a plan leaves out of what was asked, or undoes of an option, is told in a line."""
+
+import pytest
+
+from gensig.plan.make import make_plan
+from gensig.plan.notes import plan_notes
+from gensig.plan.request import read_request
+
+FOUR = "plan.classes=[healthy,crack,pitting,missing_tooth]"
+THREE = "plan.classes=[healthy,crack,missing_tooth]"
+SPEEDS = "plan.vary={operating.speed_rpm:{distribution:uniform,low:1200,high:2400}}"
+
+
+def said(*words: str) -> list[str]:
+    config = read_request([*words, "operating.duration_s=0.02"]).config
+    return plan_notes(config, make_plan(config))
+
+
+def test_units_without_a_record_are_told() -> None:
+    (line,) = said(THREE, "plan.n_units=4", "plan.n_gearboxes=2", "plan.n_records=12", "plan.n_repeats=2")
+    assert line == (
+        "12 records are 2 conditions of 3 classes and 2 repeats: 2 of 4 units are used; no split by unit is possible "
+        "(2 unit_id in the plan, and at least 3 are needed)"
+    )
+
+
+def test_a_split_by_machine_that_cannot_be_made_is_told() -> None:
+    (line,) = said(FOUR, "plan.n_records=80", "plan.n_units=8", "plan.n_gearboxes=2")
+    assert line == "no split by gearbox is possible (2 gearbox_id in the plan, and at least 3 are needed)"
+
+
+@pytest.mark.parametrize("words", [("experiment=quickstart",), ("experiment=run_to_failure",)])
+def test_a_plan_with_all_of_it_has_no_note(words: tuple[str, ...]) -> None:
+    assert said(*words) == []
+
+
+def test_what_overrides_undo_is_told() -> None:
+    words = ["experiment=quickstart", "fault=crack", "operating.torque_nm=20", "fault.crack_depth_mm=1"]
+    assert read_request(words).notes == (
+        "fault=crack replaces plan.classes [healthy, crack, pitting, missing_tooth]",
+        "pinned, no longer varied: fault.crack_depth_mm = 1, operating.torque_nm = 20",
+    )
+    assert read_request(["experiment=quickstart", "operating.duration_s=1"]).notes == ()
+    assert read_request(["experiment=quickstart", SPEEDS]).notes == ()

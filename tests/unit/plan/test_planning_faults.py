@@ -1,0 +1,176 @@
+"""Plans of faults on one tooth, on all of them, and of several at once: what is recorded, and what is refused."""
+
+import copy
+import json
+import re
+
+import numpy as np
+import pytest
+from numpy.testing import assert_allclose, assert_array_equal
+
+from gensig.errors import GensigError
+from gensig.faults.registry import read_faults
+from gensig.plan.make import make_plan
+from gensig.plan.request import read_request
+from gensig.record.inputs import row_faults
+from gensig.record.simulate import simulate_record
+from gensig.systems.pair_machine import severity
+from gensig.systems.registry import read_system
+
+MIXED = ("healthy", "crack", "compound", "wear", "runout", "distributed_pitting")
+
+
+def typed(value):
+    """A mapping as it is typed on the command line."""
+    if isinstance(value, dict):
+        return "{" + ", ".join(f"{key}: {typed(item)}" for key, item in value.items()) + "}"
+    return str(value)
+
+
+class TestManyKindsOfFaults:
+    """Columns of a plan whose faults are on one tooth, on all of them, or several at once."""
+
+    @pytest.fixture(scope="class")
+    @classmethod
+    def config(cls):
+        parts = "[{kind: crack, gear: wheel, crack_depth_mm: 1.0}, {kind: pitting, tooth: 2}]"
+        return read_request([f"plan.classes=[{','.join(MIXED)}]", f"fault.parts={parts}", "plan.n_records=60"]).config
+
+    @pytest.fixture(scope="class")
+    @classmethod
+    def mixed(cls, config):
+        return make_plan(config)
+
+    @staticmethod
+    def of(plan, name):
+        """Records of one class."""
+        return [record for k in range(plan.n_records) if (record := plan.record(k))["label_name"] == name]
+
+    def test_columns(self, mixed):
+        params = {key for key in mixed.columns if key.startswith("params/")}
+        assert {
+            "params/fault.crack_depth_mm",
+            "params/fault.wear_depth_um",
+            "params/fault.eccentricity_um",
+            "params/fault.pitted_share",
+            "params/fault.parts.0.crack_depth_mm",
+            "params/fault.parts.0.crack_angle_deg",
+            "params/fault.parts.1.pit_length_mm",
+        } <= params
+        assert not {key for key in params if key.endswith((".tooth", ".kind", ".parts", ".wear_profile"))}
+        for name, prefix in (("compound", "params/fault.parts."), ("wear", "params/fault.wear_")):
+            own = mixed.columns["label_name"] == name
+            for key in (key for key in params if key.startswith(prefix)):
+                assert np.isfinite(mixed.columns[key][own]).all()
+                assert np.isnan(mixed.columns[key][~own]).all()
+
+    def test_parts_are_recorded_whole(self, mixed):
+        drawn = []
+        for record in self.of(mixed, "compound"):
+            crack, pit = json.loads(record["faults_json"])
+            assert (crack["kind"], crack["gear"], pit["kind"], pit["gear"]) == ("crack", "wheel", "pitting", "pinion")
+            assert "vary" not in crack | pit
+            assert_allclose(crack["crack_depth_mm"], 1.0, rtol=1e-12, atol=0)
+            assert pit["tooth"] == 2
+            for place, part in enumerate((crack, pit)):
+                for key, value in part.items():
+                    if isinstance(value, float):
+                        assert_allclose(record[f"params/fault.parts.{place}.{key}"], value, rtol=1e-12, atol=0)
+            assert (record["fault_gear"], record["fault_tooth"]) == ("wheel", crack["tooth"])
+            drawn.append((crack["tooth"], pit["pit_length_mm"], pit["pit_width_mm"]))
+        teeth, *sizes = zip(*drawn, strict=True)
+        assert len(set(teeth)) > 5
+        assert max(teeth) > 22  # over the wheel's teeth, not the pinion's
+        assert all(len(set(values)) == len(values) for values in sizes)
+
+    def test_row_faults_are_those_of_the_plan(self, mixed):
+        for name in MIXED:
+            n_faults = {len(row_faults(record)) for record in self.of(mixed, name)}
+            assert n_faults == {{"healthy": 0, "compound": 2}.get(name, 1)}
+
+    def test_a_fault_on_all_teeth_has_no_number(self, mixed):
+        for name in ("wear", "distributed_pitting"):
+            assert {record["fault_tooth"] for record in self.of(mixed, name)} == {-1}
+            assert {record["fault_gear"] for record in self.of(mixed, name)} == {"pinion"}
+            assert {json.loads(record["faults_json"])[0]["tooth"] for record in self.of(mixed, name)} == {"all"}
+        assert len({record["fault_tooth"] for record in self.of(mixed, "runout")}) > 5
+        assert all(record["fault_tooth"] >= 0 for record in self.of(mixed, "runout"))
+
+    def test_whole_numbers_are_drawn_whole(self, mixed):
+        seeds = [json.loads(record["faults_json"])[0]["pit_seed"] for record in self.of(mixed, "distributed_pitting")]
+        assert all(isinstance(seed, int) for seed in seeds)
+        assert len(set(seeds)) == len(seeds)
+
+    def test_severity_is_the_largest_of_the_parts(self, mixed, xiamen):
+        for record in self.of(mixed, "compound"):
+            parts = [severity([fault], xiamen.pair) for fault in row_faults(record)]
+            assert_allclose(record["severity"], max(parts), rtol=1e-12, atol=0)
+        assert all(0 < record["severity"] <= 1 for name in MIXED[1:] for record in self.of(mixed, name))
+
+    def test_a_sham_keeps_the_faults_on_paper(self, config, mixed):
+        sham = make_plan({**config, "plan": {**config["plan"], "sham": True}})
+        assert_allclose(sham.columns["severity"], 0.0, rtol=0, atol=0)
+        for key in ("label", "faults_json", "fault_tooth", "params/fault.parts.1.pit_length_mm"):
+            assert_array_equal(sham.columns[key], mixed.columns[key])
+
+    @pytest.fixture(scope="class")
+    @classmethod
+    def hot(cls, config):
+        """Names of the classes that ``fault_multihot`` has for a row of the plan."""
+        short = copy.deepcopy(config)
+        short["operating"]["duration_s"], short["sensing"]["snr_db"] = 0.01, None
+
+        def of_row(row, **classes):
+            record = simulate_record({**short, "classes": {**short["classes"], **classes}}, row)
+            assert record.values.get("status", "ok") == "ok"
+            return {MIXED[k] for k in np.flatnonzero(record.signals["fault_multihot"])}
+
+        return of_row
+
+    @pytest.mark.parametrize(
+        ("name", "expected"),
+        [("compound", {"compound", "crack"}), ("crack", {"crack"}), ("wear", {"wear"}), ("healthy", {"healthy"})],
+    )
+    def test_every_class_of_a_compound_is_hot(self, mixed, hot, name, expected):
+        """The classes that are present: the compound one and those of its parts; a single fault brings one."""
+        assert hot(self.of(mixed, name)[0]) == expected
+
+    def test_two_cracks_are_a_crack(self, mixed, hot):
+        row = self.of(mixed, "compound")[0]
+        crack = json.loads(row["faults_json"])[0]
+        both = json.dumps([crack, {**crack, "gear": "pinion", "tooth": 3}])
+        assert hot({**row, "faults_json": both}) == {"compound", "crack"}
+
+    def test_another_class_of_the_same_kind_is_not(self, config, mixed, hot):
+        """Two options of one kind, say small and large cracks: a single fault is of its own class alone."""
+        assert hot(self.of(mixed, "crack")[0], wear=config["classes"]["crack"]) == {"crack"}
+
+    @pytest.mark.parametrize(
+        ("fault", "text"),
+        [
+            ({"kind": "crack", "gear": "wheel", "tooth": 84}, "fault.tooth = 84 is not on the wheel"),
+            ({"kind": "crack", "crack_depth_mm": 5}, "reaches through the root chord"),
+            ({"kind": "wear", "wear_depth_um": 200}, "above 1"),
+            ({"kind": "crack", "vary": {"crack_dept_mm": {}}}, "fault.vary: 'crack_dept_mm' is no key of fault=crack"),
+            ({"kind": "crack", "crack_dept_mm": 1}, "fault.parts.0: unknown key 'crack_dept_mm'"),
+        ],
+    )
+    def test_parts_are_checked_before_anything_runs(self, fault, text):
+        with pytest.raises(GensigError, match=re.escape(text)):
+            make_plan(read_request(["fault=compound", f"fault.parts=[{typed(fault)}]"]).config)
+
+
+@pytest.mark.parametrize(
+    "words",
+    [
+        ("fault=broken", "mesh.law=paper"),
+        ("fault=crack", "fault.crack_angle_deg=80"),
+        ("fault=crack", "fault.crack_depth_mm=3.6"),
+    ],
+)
+def test_what_the_mesh_refuses_is_refused_before_anything_runs(words):
+    config = read_request([*words, "plan.n_records=2"]).config
+    with pytest.raises(GensigError):
+        read_system(config).mesh_table(read_faults(config["fault"]))
+    with pytest.raises(GensigError):
+        make_plan(config)

@@ -1,0 +1,61 @@
+"""What `gensig plan` foretells is what `gensig generate` makes."""
+
+import functools
+from pathlib import Path
+
+import pytest
+
+import gensig
+from gensig.errors import SimulationError
+from gensig.plan.request import read_request
+from gensig.production.prediction import FailedRecordsWarning, predict
+from gensig.record import simulate as records
+
+CLASSES = "plan.classes=[healthy,crack,pitting,missing_tooth]"
+SPEEDS = "plan.vary={operating.speed_rpm: {distribution: choice, values: [1200, 1800, 2400]}}"
+SETS = {
+    "a few records": ("plan.n_records=4", CLASSES, "operating.duration_s=0.25"),
+    "many shards": ("plan.n_records=20", CLASSES, "dataset.records_per_shard=2", "operating.duration_s=0.05"),
+    "counts, compressed": (
+        "plan.n_records=12", CLASSES, "operating.duration_s=0.25", "dataset.sample_type=int16",
+        "dataset.compression=gzip",
+    ),
+    "all signals": (
+        "plan.n_records=4", CLASSES, "operating.duration_s=0.25", "dataset.store_clean=true",
+        "dataset.store_shaft_angle=true",
+    ),
+    "a grid": (
+        "plan.design=grid", "plan.n_records=null", "plan.n_units=2", SPEEDS, CLASSES, "operating.duration_s=0.05",
+    ),
+}  # fmt: skip
+
+
+@functools.cache
+def foretold(name: str) -> dict[str, str]:
+    return predict(read_request([*SETS[name], "executor.n_workers=1"]).config)
+
+
+@pytest.mark.parametrize("name", SETS)
+def test_bytes_are_within_a_factor_of_one_and_a_half(name: str, tmp_path: Path) -> None:
+    expected = int(foretold(name)["bytes"].split()[0].replace(",", ""))
+    gensig.generate(*SETS[name], "executor.n_workers=1", out=tmp_path / "data").close()
+    made = sum(path.stat().st_size for path in (tmp_path / "data").rglob("*") if path.is_file())
+    assert made > 700_000
+    assert 1 / 1.5 < expected / made < 1.5
+
+
+def test_what_a_grid_holds_is_told() -> None:
+    told = foretold("a grid")
+    assert told["records"] == "24"
+    assert told["classes"].count(" 6") == 4
+    assert (told["units"], told["conditions"], told["repeats"]) == ("2", "6", "1")
+    assert (told["specimens"], told["gearboxes"]) == ("2 (sets of gears)", "1")
+    assert told["design"].startswith("grid of operating.speed_rpm 3; drawn: crack.tooth, crack.crack_depth_mm")
+
+
+def test_records_that_fail_while_they_are_timed_are_told(monkeypatch: pytest.MonkeyPatch) -> None:
+    whole = records.simulate_with_lead_in
+    monkeypatch.setattr(records, "simulate_with_lead_in", lambda runs: [*whole(runs)[:-1], SimulationError("it grew")])
+    config = read_request(["operating.duration_s=0.02", "plan.n_records=2", "executor.n_workers=1"]).config
+    with pytest.warns(FailedRecordsWarning, match="^1 of 2 records made to time the plan failed: it grew$"):
+        predict(config)
