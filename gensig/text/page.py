@@ -136,7 +136,7 @@ def _render(*, scripts: Sequence[str], **content: Any) -> str:
     from markupsafe import Markup
 
     environment = Environment(
-        loader=PackageLoader("gensig"), autoescape=True, undefined=StrictUndefined, trim_blocks=True
+        loader=PackageLoader("gensig.text"), autoescape=True, undefined=StrictUndefined, trim_blocks=True
     )
     hashes = [base64.b64encode(hashlib.sha256(text.encode()).digest()).decode("ascii") for text in scripts]
     policy = "script-src " + " ".join(f"'sha256-{text}'" for text in hashes) + "; " if scripts else ""
