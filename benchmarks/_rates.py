@@ -19,7 +19,7 @@ from gensig.dynamics.lanes import pack
 from gensig.dynamics.pair import PairDynamics
 from gensig.plan.make import make_plan
 from gensig.plan.request import read_request
-from gensig.record.inputs import record_system, row_run, row_values
+from gensig.record.inputs import InputReader
 
 Array = NDArray[np.float64]
 Work = tuple[Callable[[], Any], float]  # what to time, and the seconds that it simulates
@@ -44,7 +44,8 @@ def quickstart(n_records: int, *words: str) -> tuple[dict[str, Any], list[dict[s
 def machines(*words: str, n: int = n_lanes("float32")) -> list[PairDynamics]:
     """The machines of as many quickstart records."""
     config, rows = quickstart(n, *words)
-    return [row_run(config, record_system(config, row_values(row)), row).dynamics() for row in rows]
+    reader = InputReader(config)
+    return [reader.inputs(row).run.dynamics() for row in rows]
 
 
 def rates(works: dict[str, Work], runs: int) -> dict[str, float]:

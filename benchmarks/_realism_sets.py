@@ -19,6 +19,7 @@ from gensig.dataset.reader import Dataset
 from gensig.errors import ConfigError
 from gensig.faults.crack import Crack
 from gensig.faults.registry import read_faults
+from gensig.options.configuration import Configuration
 from gensig.plan.request import read_request
 from gensig.systems.registry import SIDES, read_system
 
@@ -106,7 +107,7 @@ def recording_words(base: Sequence[str], size: Size, control: str) -> list[str]:
     ]
 
 
-def middle_grade(config: Mapping[str, Any]) -> float:
+def middle_grade(config: Configuration) -> float:
     """The middle of the error grades that an experiment draws, or the one that it has."""
     spec = config["plan"]["vary"].get(GRADE)
     if isinstance(spec, Mapping) and "low" in spec:
@@ -147,7 +148,7 @@ def kept(folder: Path, words: Sequence[str]) -> Dataset:
     return gensig.generate(*words, out=folder)
 
 
-def _steady_length(config: Mapping[str, Any], duration: float) -> list[str]:
+def _steady_length(config: Configuration, duration: float) -> list[str]:
     """A length in seconds, whatever the base says about turns."""
     words = [f"operating.duration_s={duration:.6g}"]
     return [*words, "operating.turns=null"] if config["operating"].get("turns") is not None else words

@@ -17,6 +17,7 @@ from gensig.dynamics import _kernels, integrator
 from gensig.dynamics.decimation import Decimator, decimator
 from gensig.production import folder as generation
 from gensig.record import simulate as records
+from gensig.record.inputs import InputReader
 from gensig.systems import lead_in, pair_machine, spur_pair
 
 PLAN, TABLES, EQUATIONS = "machine and plan row", "mesh tables", "equations and packing"
@@ -27,9 +28,7 @@ CLOSING = "closing the folder"  # index, card and pictures: once a data set, wha
 STAGES = (PLAN, TABLES, EQUATIONS, *INTEGRATION, LOW_PASS, NOISE, WRITING, OTHER)
 CLOCKED: tuple[tuple[Any, str, str], ...] = (
     (generation, "_folder_inputs", PLAN),
-    (records, "record_system", PLAN),
-    (records, "row_run", PLAN),
-    (records, "twin_start", PLAN),
+    (InputReader, "inputs", PLAN),
     (spur_pair, "_mesh_table", TABLES),
     (pair_machine.Run, "dynamics", EQUATIONS),
     (pair_machine, "settling_oversampling", EQUATIONS),
@@ -39,7 +38,7 @@ CLOCKED: tuple[tuple[Any, str, str], ...] = (
     (integrator._Run, "advance", SETTLING),
     (integrator._Run, "record", RECORDING),
     (pair_machine, "_checks", CHECKING),
-    (records, "_finish", NOISE),
+    (records, "_record", NOISE),
     (generation, "open_shard", WRITING),
     (ShardWriter, "__enter__", WRITING),
     (ShardWriter, "write", WRITING),

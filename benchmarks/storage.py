@@ -26,6 +26,7 @@ from gensig.dataset.folder.manifest import finalize, record_shard
 from gensig.dataset.reader import open_dataset
 from gensig.dataset.schema import SAMPLE_TYPES
 from gensig.dataset.storage.compression import COMPRESSIONS
+from gensig.options.configuration import Configuration
 from gensig.plan.make import make_plan
 from gensig.plan.request import read_request
 from gensig.production.folder import begin_folder, open_shard
@@ -40,7 +41,7 @@ def least(work: Callable[[], Any], runs: int) -> float:
     return min(timeit.repeat(work, number=1, repeat=runs, timer=time.process_time))
 
 
-def simulated(config: dict[str, Any]) -> list[Record]:
+def simulated(config: Configuration) -> list[Record]:
     """As many records as the plan has: simulated ones, repeated with another noise each time."""
     plan = make_plan(config)
     rows = [plan.record(place) for place in range(plan.n_records)]
@@ -57,7 +58,7 @@ def simulated(config: dict[str, Any]) -> list[Record]:
     return records
 
 
-def shard(config: dict[str, Any], records: list[Record], out: Path, runs: int) -> dict[str, float]:
+def shard(config: Configuration, records: list[Record], out: Path, runs: int) -> dict[str, float]:
     """Figures of one way to store."""
     begin_folder(config, [], out)
     params = [name.removeprefix("params/") for name in records[0].values if name.startswith("params/")]
@@ -126,11 +127,9 @@ def main() -> None:
         found["h5py alone, contiguous float32"] = plain(records, Path(name) / "plain.h5", arguments.runs)
         for sample_type in SAMPLE_TYPES:
             for compression in COMPRESSIONS:
-                stored = {**config["dataset"], "compression": compression, "sample_type": sample_type}
+                stored = config.with_keys("dataset", compression=compression, sample_type=sample_type)
                 out = Path(name) / f"{sample_type}-{compression}"
-                found[f"{sample_type}, {compression}"] = shard(
-                    {**config, "dataset": stored}, records, out, arguments.runs
-                )
+                found[f"{sample_type}, {compression}"] = shard(stored, records, out, arguments.runs)
     header = ("stored as", "write MB/s", "ratio", "read 1 record ms", "error dB")
     print("{:<32}{:>12}{:>8}{:>18}{:>10}".format(*header))
     for way, (write, ratio, read, error) in ((way, values.values()) for way, values in found.items()):

@@ -8,6 +8,7 @@ from dataclasses import dataclass
 from typing import Any
 
 from gensig.errors import ConfigError
+from gensig.options.configuration import Configuration
 
 BASELINES = ("indicators", "indicators_without_level", "rms_threshold", "nearest_spectrum", "minirocket", "reference")
 DEVICES = ("auto", "cpu", "cuda")
@@ -118,7 +119,7 @@ class TrainSettings:
             raise ConfigError(f"device must be one of {', '.join(DEVICES)}, not {self.device!r}")
 
 
-def settings_from(config: Mapping[str, Any]) -> TrainSettings:
+def settings_from(config: Configuration) -> TrainSettings:
     """Settings of a composed configuration.
 
     Raises
@@ -128,7 +129,7 @@ def settings_from(config: Mapping[str, Any]) -> TrainSettings:
     known = {field.name for field in dataclasses.fields(TrainSettings)}
     if unknown := sorted(set(config) - known):
         raise ConfigError(f"diagnose train knows no key '{unknown[0]}'")
-    values = dict(config)
+    values = config.plain()
     for name in ("protocols", "classes", "channels", "test_channels", "seeds"):
         values[name] = _as_tuple(name, values[name])
     if values["seeds"] is None:

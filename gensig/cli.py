@@ -52,7 +52,7 @@ def _run(words: list[str]) -> int:
     if verb.instead is not None:
         from gensig.commands.request import say_unread
 
-        say_unread(arguments, verb.instead)
+        say_unread(arguments, verb.reads, verb.instead)
     return status
 
 

@@ -1,6 +1,5 @@
 """Shared fixtures: the paper's rig as a configuration and as a machine."""
 
-import copy
 import functools
 import pickle
 from collections.abc import Callable, Iterator, Mapping, Sequence
@@ -15,6 +14,7 @@ from hydra.core.plugins import Plugins
 import gensig.options.compose
 from gensig.dynamics.pair import PairDynamics
 from gensig.geometry.gear import Gear
+from gensig.options.configuration import Configuration
 from gensig.plan.request import read_request
 from gensig.systems.registry import read_system
 from gensig.systems.spur_pair import SpurPair
@@ -68,17 +68,17 @@ def compositions() -> Iterator[Any]:
 
 
 @pytest.fixture(scope="session")
-def composed_config() -> dict[str, Any]:
-    """The default configuration, composed once; copy before changing."""
+def composed_config() -> Configuration:
+    """The default configuration, composed once."""
     return read_request([]).config
 
 
 @pytest.fixture(scope="session")
-def config_with(composed_config) -> Callable[..., dict[str, Any]]:
-    """A plain configuration with dotted keys replaced, without composing again."""
+def config_with(composed_config) -> Callable[..., Configuration]:
+    """The default configuration with dotted keys replaced, without composing again."""
 
-    def make(changes: Mapping[str, Any] | None = None) -> dict[str, Any]:
-        config = copy.deepcopy(composed_config)
+    def make(changes: Mapping[str, Any] | None = None) -> Configuration:
+        config = composed_config.plain()
         for key, value in (changes or {}).items():
             *parents, leaf = key.split(".")
             node = config
@@ -86,7 +86,7 @@ def config_with(composed_config) -> Callable[..., dict[str, Any]]:
                 node = node[name]
             assert leaf in node, f"no key {key}"
             node[leaf] = value
-        return config
+        return Configuration(config)
 
     return make
 

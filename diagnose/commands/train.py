@@ -6,10 +6,11 @@ import sys
 from argparse import ArgumentParser
 from collections.abc import Sequence
 from pathlib import Path
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING
 
 from diagnose.commands.parser import Parser, refuse_existing, verb_parser
 from gensig.errors import ConfigError
+from gensig.options.configuration import Configuration
 
 if TYPE_CHECKING:
     from diagnose.settings import TrainSettings
@@ -64,7 +65,7 @@ def run(words: Sequence[str]) -> int:
     return 0
 
 
-def _expand(overrides: Sequence[str], config_dir: str | None) -> list[dict[str, Any]]:
+def _expand(overrides: Sequence[str], config_dir: str | None) -> list[Configuration]:
     """Configurations of a multirun, each with its own ``out``; all composed before the first one runs."""
     from gensig.options.compose import compose, job_folders, sweep
 
@@ -75,10 +76,11 @@ def _expand(overrides: Sequence[str], config_dir: str | None) -> list[dict[str, 
         raise ConfigError("out must be one folder; with -m each run gets a folder below it")
     parent = Path(parents.pop())
     refuse_existing(parent)
-    return [{**config, "out": str(parent / name)} for config, name in zip(configs, job_folders(jobs), strict=True)]
+    folders = [str(parent / name) for name in job_folders(jobs)]
+    return [config.with_entries(out=out) for config, out in zip(configs, folders, strict=True)]
 
 
-def _train_one(config: dict[str, Any]) -> None:
+def _train_one(config: Configuration) -> None:
     from diagnose.settings import settings_from
 
     settings = settings_from(config)

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Mapping
 from typing import Any, Protocol
 
 import numpy as np
@@ -14,7 +15,7 @@ class Pairs(Protocol):
     """Machines with and without a fault over a map; every member as `gensig.production.fault_pairs.FaultPairs` says."""
 
     @property
-    def config(self) -> dict[str, Any]:
+    def config(self) -> Mapping[str, Any]:
         """The composed configuration."""
 
     @property

@@ -13,9 +13,10 @@ from gensig.commands import arguments
 class Verb:
     """One verb: what it does, an example, its own arguments, and ``module:function`` that runs it.
 
-    ``one`` says what exit status 1 means, where the verb has it. ``instead`` maps keys that it does not read to the
-    flag that does their work, or to nothing; it stands where the verb looks at one machine, and what else was typed
-    and not read is named as well.
+    ``one`` is the meaning of exit status 1, where the verb has it. Verbs that look at one machine have
+    ``instead``: keys that they do not read, each with the flag that does its work or an empty text.
+    ``reads`` are the sections of the configuration that such a verb reads, by the kind of machine (the
+    empty kind stands for all others). None reads all of them. A typed key outside is named on stderr.
     """
 
     summary: str
@@ -24,7 +25,15 @@ class Verb:
     arguments: Callable[[argparse.ArgumentParser], None]
     one: str | None = None
     instead: Mapping[str, str] | None = None
+    reads: Mapping[str, tuple[str, ...]] | None = None
 
+
+# Sections of the configuration that make a machine: at rest, with its flanks in slices, and running.
+GEARS = ("system", "gear", "material", "modification", "heat", "mesh", "operating", "fault")
+RUNNING = (*GEARS, "sensing", "quality", "solver", "excitation")
+TABLES = ("system", "material")
+SPUR, HELICAL, OTHERS = "spur_pair", "helical_pair", ""
+LINE_RUNNING = tuple(section for section in RUNNING if section != "gear")
 
 VERBS: dict[str, Verb] = {
     "options": Verb(
@@ -107,6 +116,7 @@ VERBS: dict[str, Verb] = {
         "gensig.commands.gears.flanks:transmission_error",
         arguments.stiffness,
         instead={"out": "--json or --plot"},
+        reads={OTHERS: GEARS},
     ),
     "modify-flank": Verb(
         "reliefs and crowning that are best for your torques and misalignments",
@@ -116,6 +126,7 @@ VERBS: dict[str, Verb] = {
         "gensig.commands.gears.modify:modify_flank",
         arguments.modify_flank,
         instead={"out": "--out, --json or --plot"},
+        reads={OTHERS: (*GEARS, "seed")},
     ),
     "root-stress": Verb(
         "bending stress at the tooth's root over the mesh, and safety factors",
@@ -124,6 +135,7 @@ VERBS: dict[str, Verb] = {
         "gensig.commands.gears.strength:root_stress",
         arguments.root_stress,
         instead={"out": "--json or --plot"},
+        reads={SPUR: (*RUNNING, "strength"), OTHERS: (*GEARS, "quality", "strength")},
     ),
     "wear-life": Verb(
         "how long flanks last until they are worn, and what their wear looks like",
@@ -132,6 +144,7 @@ VERBS: dict[str, Verb] = {
         "gensig.commands.gears.wear:wear_life_verb",
         arguments.wear_life,
         instead={"out": "--out, --json or --plot"},
+        reads={OTHERS: (*RUNNING, "wear", "plan", "dataset", "seed")},
     ),
     "simulate": Verb(
         "one record: signal, spectrum, figure",
@@ -149,6 +162,7 @@ VERBS: dict[str, Verb] = {
         "gensig.commands.gears.physics:stiffness",
         arguments.stiffness,
         instead={"out": "--json or --plot"},
+        reads={SPUR: RUNNING, HELICAL: GEARS, OTHERS: LINE_RUNNING},
     ),
     "modes": Verb(
         "natural frequencies, damping, shapes of a pair or of a drive line from tables",
@@ -157,6 +171,7 @@ VERBS: dict[str, Verb] = {
         "gensig.commands.lines.modes:modes",
         arguments.modes,
         instead={"out": "--json or --plot"},
+        reads={SPUR: RUNNING, HELICAL: RUNNING, OTHERS: (*TABLES, "fault")},
     ),
     "forced-response": Verb(
         "steady vibration of a drive line under its engine: speed fluctuation, spectra, waterfalls, tooth forces",
@@ -164,6 +179,7 @@ VERBS: dict[str, Verb] = {
         "gensig.commands.lines.forced_response:forced_response",
         arguments.forced_response,
         instead={"operating.speed_rpm": "--speed", "operating.torque_nm": "--torque", "out": "--json or --plot"},
+        reads={OTHERS: (*TABLES, "excitation", "seed", "mesh", "strength", "quality", "modification")},
     ),
     "tune-damper": Verb(
         "torsional dampers that make the worst tooth force of an engine's mesh least; root stress before and after",
@@ -172,6 +188,7 @@ VERBS: dict[str, Verb] = {
         "gensig.commands.lines.tune_damper:tune_damper",
         arguments.tune_damper,
         instead={"operating.speed_rpm": "--run", "operating.torque_nm": "--torque"},
+        reads={OTHERS: (*TABLES, "excitation", "seed", "mesh", "strength", "quality", "modification")},
     ),
     "twin": Verb(
         "a configuration like a measured healthy machine",

@@ -2,9 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping
 from dataclasses import dataclass
-from typing import Any
 
 import numpy as np
 
@@ -28,8 +26,9 @@ from gensig.driveline.table_rows import (
 from gensig.dynamics.pair import Rotor
 from gensig.errors import ConfigError
 from gensig.geometry.contact import GearPair
+from gensig.options.configuration import Configuration
 from gensig.systems.pair_machine import PairMachine, Run
-from gensig.systems.registry import read_material, section
+from gensig.systems.registry import read_material
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -77,14 +76,14 @@ class DriveLine:
         return tuple(sorted({factor * order for order in (1.0, *self.mesh_orders) for factor in (1.0, 2.0)}))
 
 
-def read_drive_line(config: Mapping[str, Any]) -> DriveLine:
+def read_drive_line(config: Configuration) -> DriveLine:
     """Build the drive line of a configuration from its tables.
 
     Raises
     ------
     ConfigError    with file, row and column, for tables that make no machine
     """
-    options = read_options(section(config, "system"))
+    options = read_options(config.section("system"))
     if options.shafting_csv is None:
         raise ConfigError(
             f"system.shafting_csv is required: give a path, or one of {', '.join(shipped_tables())}; "

@@ -3,9 +3,8 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Iterable, Mapping, Sequence
+from collections.abc import Iterable, Sequence
 from dataclasses import dataclass, replace
-from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
@@ -20,8 +19,9 @@ from gensig.driveline.mesh_phase import start_rolls
 from gensig.errors import ConfigError
 from gensig.life.root.strength import Strength
 from gensig.mesh.options import read_mesh_options, read_slice_options
+from gensig.options.configuration import Configuration
 from gensig.sensing.manufacturing import Quality
-from gensig.systems.registry import read_material, read_modification, section
+from gensig.systems.registry import read_material, read_modification
 from gensig.systems.root_strength import GearStress, RootHistory, RootStrength
 from gensig.systems.sliced_pair import SlicedPair
 from gensig.units import read
@@ -123,9 +123,9 @@ def seen_by_dampers(
     )
 
 
-def read_mesh_strength(config: Mapping[str, Any], line: EngineLine, mesh: int) -> RootStrength:
+def read_mesh_strength(config: Configuration, line: EngineLine, mesh: int) -> RootStrength:
     """Pair and strength of one mesh of a line, without load; flanks, material and strength of the configuration."""
-    given, own = line.drive.pairs[mesh], section(config, "mesh")
+    given, own = line.drive.pairs[mesh], config.section("mesh")
     # the mesh code knows gears by their sides, the tables by the names of the machine
     pair = replace(given, pinion=replace(given.pinion, name="pinion"), wheel=replace(given.wheel, name="wheel"))
     flanks = SlicedPair(
@@ -139,8 +139,8 @@ def read_mesh_strength(config: Mapping[str, Any], line: EngineLine, mesh: int) -
     return RootStrength(
         flanks=flanks,
         sliced=flanks.modification.is_any or pair.pinion.helix_angle != 0.0,
-        strength=read(Strength, section(config, "strength"), "strength"),
-        grade=read(Quality, section(config, "quality"), "quality").iso1328_grade,
+        strength=read(Strength, config.section("strength"), "strength"),
+        grade=read(Quality, config.section("quality"), "quality").iso1328_grade,
     )
 
 

@@ -26,8 +26,9 @@ from gensig.driveline.linear.forced import (
 )
 from gensig.driveline.linear.matrices import LineMatrices
 from gensig.errors import ConfigError
+from gensig.options.configuration import Configuration
 from gensig.sensing.toothed_wheel import ToothedWheel, draw_wheel, instantaneous_speed
-from gensig.systems.registry import LINE, section
+from gensig.systems.registry import LINE
 
 Array = NDArray[np.float64]
 
@@ -112,14 +113,14 @@ class EngineLine:
         return self.drive.numbers.index(number)
 
 
-def read_engine_line(config: Mapping[str, Any]) -> EngineLine:
+def read_engine_line(config: Configuration) -> EngineLine:
     """The drive line and the engine, or motor, of a configuration.
 
     Raises
     ------
     ConfigError    for a system that is no drive line, none or an ill excitation, nodes that the tables have not
     """
-    kind = section(config, "system").get("kind")
+    kind = config.section("system").get("kind")
     if kind != LINE:
         raise ConfigError(
             f"system.kind = {kind!r} is no drive line; take system=engine_gear_train, two_stage_gearbox or shaft_line"

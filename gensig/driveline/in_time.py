@@ -2,9 +2,8 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Sequence
 from dataclasses import dataclass
-from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
@@ -14,6 +13,7 @@ from gensig.driveline.running import Governor, OwnMesh, mesh_forces, running_lin
 from gensig.driveline.teeth import ToothLaw, sound_meshes
 from gensig.driveline.time.newmark import LineSolver
 from gensig.mesh.options import read_mesh_options, read_slice_options
+from gensig.options.configuration import Configuration
 from gensig.systems.registry import read_material
 
 Array = NDArray[np.float64]
@@ -49,7 +49,7 @@ class TimeResponse:
     energy_residual: float
 
 
-def own_meshes(machine: EngineLine, config: Mapping[str, Any], speed: float, torque: float) -> dict[int, OwnMesh]:
+def own_meshes(machine: EngineLine, config: Configuration, speed: float, torque: float) -> dict[int, OwnMesh]:
     """Tables of sound teeth of the meshes that have any, by their place, each under its mean force."""
     mesh = config["mesh"]
     law = ToothLaw(material=read_material(config), options=read_mesh_options(mesh), slices=read_slice_options(mesh))

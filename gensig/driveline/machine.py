@@ -8,9 +8,8 @@ from __future__ import annotations
 
 import math
 import warnings
-from collections.abc import Mapping, Sequence
+from collections.abc import Sequence
 from dataclasses import dataclass, replace
-from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
@@ -50,12 +49,13 @@ from gensig.mesh.options import SliceOptions, read_mesh_options, read_slice_opti
 from gensig.mesh.pair_table import PairTable
 from gensig.mesh.sliced.sliced_table import SlicedTable
 from gensig.operation.options import read_operating
+from gensig.options.configuration import Configuration
 from gensig.sensing.encoder import Disc
 from gensig.sensing.manufacturing import Quality, Specimen, perfect_specimen
 from gensig.sensing.options import read_sensing
 from gensig.sensing.toothed_wheel import ToothedWheel, draw_wheel, instantaneous_speed
 from gensig.systems.pair_machine import CleanRecord, PairMachine, Run, Start
-from gensig.systems.registry import read_heat, read_material, read_modification, section
+from gensig.systems.registry import read_heat, read_material, read_modification
 from gensig.systems.stiffness_curves import StiffnessCurves, stiffness_curves
 from gensig.systems.supports import in_gearbox
 from gensig.units import SPEED, read
@@ -373,7 +373,7 @@ class LineMachine(PairMachine):
         return instantaneous_speed(wheel, disc, angle, self.sensing.sampling_rate) - ratio * motion.nominal_speed
 
 
-def read_line_machine(config: Mapping[str, Any]) -> LineMachine:
+def read_line_machine(config: Configuration) -> LineMachine:
     """The machine of a configuration whose system is a drive line.
 
     Raises
@@ -387,8 +387,8 @@ def read_line_machine(config: Mapping[str, Any]) -> LineMachine:
     if read_heat(config).is_any or read_modification(config).is_any:
         raise ConfigError("heat and modification are of a single gear pair; a drive line takes heat=none")
     operating, quality = (
-        read_operating(section(config, "operating")),
-        read(Quality, section(config, "quality"), "quality"),
+        read_operating(config.section("operating")),
+        read(Quality, config.section("quality"), "quality"),
     )
     bodies = []
     for place_of_gear in (mesh.driving, mesh.driven):
@@ -399,16 +399,16 @@ def read_line_machine(config: Mapping[str, Any]) -> LineMachine:
     machine = LineMachine(
         pair=named_by_side(pair),
         material=read_material(config),
-        mesh=read_mesh_options(section(config, "mesh")),
+        mesh=read_mesh_options(config.section("mesh")),
         pinion=bodies[0],
         wheel=bodies[1],
         operating=operating,
-        sensing=read_sensing(section(config, "sensing")),
+        sensing=read_sensing(config.section("sensing")),
         quality=quality,
-        solver=read(Solver, section(config, "solver"), "solver"),
+        solver=read(Solver, config.section("solver"), "solver"),
         engine=engine,
         place=place,
-        slices=read_slice_options(section(config, "mesh")),
+        slices=read_slice_options(config.section("mesh")),
     )
     return replace(machine, operating=replace(operating, speed=operating.speed * machine.ratio))
 

@@ -12,6 +12,7 @@ from gensig.dynamics.bearing import Shaft as BearingShaft
 from gensig.dynamics.pair import Body, Support
 from gensig.errors import ConfigError
 from gensig.material import Material
+from gensig.options.configuration import Section
 from gensig.units import read, unit
 
 HELICAL_MESHES = ("sliced", "constant")
@@ -91,7 +92,7 @@ class LineOptions:
     campbell: Campbell
 
 
-def read_options(machine: Mapping[str, Any]) -> LineOptions:
+def read_options(machine: Section) -> LineOptions:
     """The keys of ``system``, typed and checked."""
     held = machine.get("support")
     if not isinstance(held, Mapping):

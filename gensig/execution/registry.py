@@ -2,28 +2,28 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Mapping
-from typing import Any
+from collections.abc import Callable
 
 from gensig.errors import ConfigError
 from gensig.execution.array import ArrayExecutor
 from gensig.execution.base import Executor, read_n_workers, whole_number
 from gensig.execution.dask import DaskExecutor
 from gensig.execution.local import LocalExecutor
+from gensig.options.configuration import Section
 
 
-def _local(section: Mapping[str, Any]) -> Executor:
+def _local(section: Section) -> Executor:
     return LocalExecutor(n_workers=read_n_workers(section["n_workers"]))
 
 
-def _dask(section: Mapping[str, Any]) -> Executor:
+def _dask(section: Section) -> Executor:
     address = section["address"]
     if address is not None and not isinstance(address, str):
         raise ConfigError(f"executor.address = {address!r} must be text such as tcp://10.0.0.1:8786, or null")
     return DaskExecutor(n_workers=read_n_workers(section["n_workers"]), address=address)
 
 
-def _slurm(section: Mapping[str, Any]) -> Executor:
+def _slurm(section: Section) -> Executor:
     missing = [key for key in ("shard_index", "shard_count") if section[key] is None]
     if missing:
         raise ConfigError(
@@ -37,10 +37,10 @@ def _slurm(section: Mapping[str, Any]) -> Executor:
     )
 
 
-EXECUTORS: dict[str, Callable[[Mapping[str, Any]], Executor]] = {"local": _local, "dask": _dask, "slurm": _slurm}
+EXECUTORS: dict[str, Callable[[Section], Executor]] = {"local": _local, "dask": _dask, "slurm": _slurm}
 
 
-def read_executor(section: Mapping[str, Any]) -> Executor:
+def read_executor(section: Section) -> Executor:
     """The executor of a configuration.
 
     Raises

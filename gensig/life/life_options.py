@@ -13,6 +13,7 @@ from gensig.life.load_history import DrawnBlocks
 from gensig.life.pit_growth import PitGrowthOptions
 from gensig.life.snapshots import SPACINGS
 from gensig.life.spread import Spread
+from gensig.options.configuration import Configuration
 from gensig.units import from_si, read, to_si, unit
 
 RUN_TO_FAILURE = "run_to_failure"
@@ -83,7 +84,7 @@ class LifeOptions:
             )
 
 
-def runs_to_failure(config: Mapping[str, Any]) -> bool:
+def runs_to_failure(config: Configuration) -> bool:
     """Whether the units of a configuration live; those of earlier versions have no ``life``."""
     return config.get("life", {"kind": NO_LIFE})["kind"] != NO_LIFE
 

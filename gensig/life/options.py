@@ -2,11 +2,11 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping
 from dataclasses import dataclass
 from typing import Any
 
 from gensig.errors import ConfigError
+from gensig.options.configuration import Section
 from gensig.units import from_si, read, split_unit, unit
 
 CHOICES = {
@@ -106,7 +106,7 @@ def _require_positive(place: str, values: Any, keys: tuple[str, ...]) -> None:
             raise ConfigError(f"{place}.{key} = {from_si(key, value):g} must be positive")
 
 
-def read_wear_options(values: Mapping[str, Any]) -> WearOptions:
+def read_wear_options(values: Section) -> WearOptions:
     """Options from the boundary keys of ``wear``."""
     sides = {name: read(FlankMaterial, values.get(name, {}), f"wear.{name}") for name in SIDES}
     own = {key: value for key, value in values.items() if key not in SIDES}

@@ -2,11 +2,10 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping
 from dataclasses import dataclass, fields
-from typing import Any
 
 from gensig.errors import ConfigError
+from gensig.options.configuration import Section
 from gensig.units import read
 
 CHOICES = {
@@ -123,12 +122,12 @@ class SliceOptions:
 SLICE_KEYS = frozenset(field.name for field in fields(SliceOptions))
 
 
-def read_slice_options(values: Mapping[str, Any]) -> SliceOptions:
+def read_slice_options(values: Section) -> SliceOptions:
     """Slices from the boundary keys of ``mesh``."""
     return read(SliceOptions, {key: value for key, value in values.items() if key in SLICE_KEYS}, "mesh")
 
 
-def read_mesh_options(values: Mapping[str, Any]) -> MeshOptions:
+def read_mesh_options(values: Section) -> MeshOptions:
     """Options from boundary keys; a convention that is null follows ``law``."""
     convention = CONVENTIONS.get(str(values.get("law")))
     if convention is None:

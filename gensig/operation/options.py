@@ -13,6 +13,7 @@ from numpy.typing import NDArray
 from gensig.errors import ConfigError
 from gensig.operation.courses import Profile, Ramp, RandomWalk, Ripple
 from gensig.operation.setpoint import Operating
+from gensig.options.configuration import Section
 from gensig.text.user_file import check_columns, read_table
 from gensig.units import read, to_si
 
@@ -73,12 +74,12 @@ class Schedule:
 SCHEDULE_KEYS = tuple(Schedule.__dataclass_fields__)
 
 
-def read_schedule(values: Mapping[str, Any]) -> Schedule:
+def read_schedule(values: Section) -> Schedule:
     """Turns and seed of a group ``operating``; ConfigError for what cannot be used."""
     return read(Schedule, {key: values[key] for key in SCHEDULE_KEYS if key in values}, "operating")
 
 
-def read_operating(values: Mapping[str, Any]) -> Operating:
+def read_operating(values: Section) -> Operating:
     """Set-points, courses and drive of a group ``operating``.
 
     Raises
@@ -100,7 +101,7 @@ def read_operating(values: Mapping[str, Any]) -> Operating:
     return read(Operating, own, "operating", **profiles, **ripples)
 
 
-def read_course(values: Mapping[str, Any], key: str) -> Course | None:
+def read_course(values: Section, key: str) -> Course | None:
     """The course that ``key``, speed_profile or torque_profile, of a group ``operating`` describes; None for null.
 
     Raises
@@ -176,7 +177,7 @@ def _read_file(where: str, own: Mapping[str, Any], quantity: str, set_point: Any
     return FileCourse(key=where, file=file, profile_given=profile, step=step, is_absolute=value == quantity)
 
 
-def read_ripple(values: Mapping[str, Any], key: str) -> Ripple | None:
+def read_ripple(values: Section, key: str) -> Ripple | None:
     """The ripple that ``key``, speed_ripple or torque_ripple, of a group ``operating`` describes; None for null.
 
     Raises

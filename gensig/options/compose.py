@@ -1,4 +1,4 @@
-"""The only door to Hydra: overrides in, a plain resolved dictionary out, mistakes as one line.
+"""The only door to Hydra: overrides in, a `Configuration` out, mistakes as one line.
 
 Nothing of Hydra's own (working directories, logs, ``outputs/``) is created, and nothing is instantiated.
 """
@@ -22,12 +22,13 @@ from omegaconf.errors import OmegaConfBaseException
 
 from gensig.errors import ConfigError
 from gensig.options import files as option_files
+from gensig.options.configuration import Configuration
 from gensig.text import nearest
 
 CONFIG_MODULE = "gensig.configs"
 
 
-def compose(config_name: str, overrides: Sequence[str] = (), *, config_dir: str | Path | None = None) -> dict[str, Any]:
+def compose(config_name: str, overrides: Sequence[str] = (), *, config_dir: str | Path | None = None) -> Configuration:
     """Compose one configuration.
 
     Parameters
@@ -38,7 +39,7 @@ def compose(config_name: str, overrides: Sequence[str] = (), *, config_dir: str 
 
     Returns
     -------
-    dict, every interpolation resolved
+    Configuration, every interpolation resolved
 
     Raises
     ------
@@ -57,7 +58,7 @@ def compose(config_name: str, overrides: Sequence[str] = (), *, config_dir: str 
         except (HydraException, OmegaConfBaseException, ValueError) as error:
             raise ConfigError(_explain(error, config_name, words, config_dir)) from None
     assert isinstance(resolved, dict)
-    return {str(key): value for key, value in resolved.items()}
+    return Configuration({str(key): value for key, value in resolved.items()})
 
 
 def sweep(overrides: Sequence[str]) -> list[list[str]]:

@@ -1,10 +1,9 @@
-"""What a plan means for the courses of its records: a walk for each condition, and how long so many turns take."""
+"""Courses of a plan's records: one random walk per condition; durations given in revolutions."""
 
 from __future__ import annotations
 
 import math
-from collections.abc import Collection, Mapping
-from typing import Any
+from collections.abc import Collection
 
 from gensig.dataset.distributions import check_distribution
 from gensig.errors import ConfigError
@@ -18,6 +17,7 @@ from gensig.operation.options import (
     read_ripple,
     read_schedule,
 )
+from gensig.options.configuration import Configuration
 from gensig.record.machines import read_machine
 from gensig.units import to_si
 
@@ -25,11 +25,11 @@ SEED_KEY, DURATION_KEY, SPEED_KEY = "operating.course_seed", "operating.duration
 EVERY_SEED = {"distribution": "integers", "low": 0, "high": 999_999, "levels": None}
 
 
-def settle_courses(config: dict[str, Any], typed: Collection[str]) -> None:
-    """Put into a composed configuration what follows for its courses from the plan.
+def settle_courses(config: Configuration, typed: Collection[str]) -> Configuration:
+    """The configuration with what follows from its plan for its courses.
 
-    Random walks get a seed for each condition in ``plan.vary``, unless ``operating.course_seed`` is among the keys that
-    were ``typed``; ``operating.duration_s`` becomes that of ``operating.turns``.
+    Random walks get a seed for each condition in ``plan.vary``, unless ``operating.course_seed`` is
+    among the keys that were ``typed``. ``operating.duration_s`` becomes that of ``operating.turns``.
 
     Raises
     ------
@@ -45,25 +45,25 @@ def settle_courses(config: dict[str, Any], typed: Collection[str]) -> None:
                 f"name its column factor, or pin {varied}"
             )
     if any(isinstance(course, RandomWalk) for course in courses.values()) and SEED_KEY not in typed:
-        operating.setdefault("course_seed", 0)
-        vary.setdefault(SEED_KEY, dict(EVERY_SEED))
+        config = config.with_keys("operating", course_seed=operating.get("course_seed", 0))
+        config = config.with_keys("plan", vary={**vary, SEED_KEY: vary.get(SEED_KEY, dict(EVERY_SEED))})
     schedule = read_schedule(operating)
     if schedule.turns is None:
-        return
+        return config
     if DURATION_KEY in typed:
         raise ConfigError(f"{DURATION_KEY} and operating.turns are both given; leave one out")
-    steady = {**operating, **dict.fromkeys((*QUANTITIES, *RIPPLES))}
-    system = read_machine({**config, "operating": steady})
+    system = read_machine(config.with_keys("operating", **dict.fromkeys((*QUANTITIES, *RIPPLES))))
     least = least_speed(config, system.operating.speed)
     n_teeth = {"pinion": system.pair.pinion.n_teeth, "wheel": system.pair.wheel.n_teeth}
     gears = _faulted(config) & set(n_teeth) if schedule.turns_of == "faulted" else {schedule.turns_of}
     slowdown = max(n_teeth[gear] for gear in gears or {"pinion"}) / n_teeth["pinion"]
     seconds = schedule.turns * slowdown * 2.0 * math.pi / least
     rate = system.sensing.sampling_rate
-    operating["duration_s"] = math.ceil(seconds * rate * (1.0 - 1e-12)) / rate
+    duration = math.ceil(seconds * rate * (1.0 - 1e-12)) / rate
+    return config.with_keys("operating", duration_s=duration)
 
 
-def least_speed(config: Mapping[str, Any], set_speed: float) -> float:
+def least_speed(config: Configuration, set_speed: float) -> float:
     """The slowest set speed of the pinion that records of a plan can have, rad/s.
 
     The lower end of what the plan draws (else ``set_speed`` in rad/s), times the smallest factor of the course.
@@ -88,6 +88,6 @@ def least_speed(config: Mapping[str, Any], set_speed: float) -> float:
     return set_speed * factor
 
 
-def _faulted(config: Mapping[str, Any]) -> set[str]:
+def _faulted(config: Configuration) -> set[str]:
     """Gears that carry a fault in any class."""
     return {str(part.get("gear")) for fault in config["classes"].values() for part in fault_parts(fault)}

@@ -12,6 +12,7 @@ from gensig.dataset.distributions import GRID, design_points, level_values, n_le
 from gensig.errors import ConfigError
 from gensig.faults.registry import COMPOUND, fault_parts, read_faults
 from gensig.geometry.tooth_profile import root_curve_point
+from gensig.options.configuration import Configuration
 from gensig.record.machines import read_machine
 from gensig.systems.registry import LINE, read_pair
 from gensig.units import from_si, split_unit, to_si
@@ -22,7 +23,7 @@ OWN = ("of", CEILING)
 
 
 def draw_values(
-    config: Mapping[str, Any], vary: Mapping[str, Any], points: NDArray[np.int64], rng: np.random.Generator, where: str
+    config: Configuration, vary: Mapping[str, Any], points: NDArray[np.int64], rng: np.random.Generator, where: str
 ) -> dict[str, list[Any]]:
     """Values of every varied key, (condition,) each.
 
@@ -52,9 +53,7 @@ def fault_sizes(fault: Mapping[str, Any]) -> dict[str, float]:
     return {key: float(value) for key, value in numbers.items()}
 
 
-def fault_specs(
-    config: Mapping[str, Any], fault: Mapping[str, Any]
-) -> tuple[dict[str, Any], dict[str, tuple[int, str]]]:
+def fault_specs(config: Configuration, fault: Mapping[str, Any]) -> tuple[dict[str, Any], dict[str, tuple[int, str]]]:
     """Distributions of a fault by name, and the part and key that each is of."""
     read_faults(fault)
     specs: dict[str, Any] = {}
@@ -69,7 +68,7 @@ def fault_specs(
 
 
 def draw_faults(
-    config: Mapping[str, Any], fault: Mapping[str, Any], points: NDArray[np.int64], rng: np.random.Generator
+    config: Configuration, fault: Mapping[str, Any], points: NDArray[np.int64], rng: np.random.Generator
 ) -> list[dict[str, Any]]:
     """One complete fault a condition, its severity distribution drawn; one design for all parts of a compound fault."""
     specs, places = fault_specs(config, fault)
@@ -85,7 +84,7 @@ def draw_faults(
     return faults
 
 
-def _gear_sizes(config: Mapping[str, Any], gear: str) -> tuple[int, dict[str, float]]:
+def _gear_sizes(config: Configuration, gear: str) -> tuple[int, dict[str, float]]:
     """Teeth of a gear, and the sizes in mm that a fault may be a share of."""
     if config["system"]["kind"] == LINE:  # whose gears stand in a table
         own = getattr(read_machine(config).pair, gear)
@@ -96,13 +95,13 @@ def _gear_sizes(config: Mapping[str, Any], gear: str) -> tuple[int, dict[str, fl
     return values["n_teeth"], sizes
 
 
-def _root_chord(config: Mapping[str, Any], gear: str) -> float:
+def _root_chord(config: Configuration, gear: str) -> float:
     """Thickness of a gear's tooth in the middle of its root curve, where cracks begin, m."""
     pair = read_machine(config).pair if config["system"]["kind"] == LINE else read_pair(config)
     return 2.0 * root_curve_point(getattr(pair, gear), "arc_mid")[1]
 
 
-def _for_gear(config: Mapping[str, Any], gear: str, key: str, spec: Any) -> Any:
+def _for_gear(config: Configuration, gear: str, key: str, spec: Any) -> Any:
     """A distribution for the faulted gear: ``distribution: tooth`` over its teeth, ``of`` as shares of a size of it."""
     if not isinstance(spec, Mapping):
         return spec

@@ -21,9 +21,10 @@ from gensig.life.load_history import History, draw_history, given_history
 from gensig.life.pit_growth import PitGrowthOptions
 from gensig.life.snapshots import snapshot_times
 from gensig.life.wear.wear_growth import WearGrowth, WearTable, wear_table
+from gensig.options.configuration import Configuration, whole_number
 from gensig.plan.draws import draw_faults, draw_values
-from gensig.record.inputs import Stream, read_seed, replace_key, stream, whole_number
 from gensig.record.machines import read_machine
+from gensig.record.streams import Stream, stream
 from gensig.record.vibration_limit import limited_by_vibration
 from gensig.systems.growth_laws import crack_law, pit_law
 from gensig.systems.pair_machine import PairMachine
@@ -60,7 +61,7 @@ class Snapshot:
     is_last: bool
 
 
-def snapshots(config: Mapping[str, Any]) -> Iterator[Snapshot]:
+def snapshots(config: Configuration) -> Iterator[Snapshot]:
     """All looks at all lives, life by life in order of time.
 
     Classes are dealt to units in turn, in an order drawn anew for each round, so that no number of a unit or gearbox
@@ -70,7 +71,7 @@ def snapshots(config: Mapping[str, Any]) -> Iterator[Snapshot]:
     ------
     ConfigError    for a plan that lives cannot follow, and classes that do not grow
     """
-    seed, options, names = read_seed(config), read_life(config["life"]), list(config["plan"]["classes"])
+    seed, options, names = config.seed, read_life(config["life"]), list(config["plan"]["classes"])
     n_units = _checked_units(config, options)
     machine = read_machine(config)
     points = _setpoints(config, options, n_units)
@@ -127,7 +128,7 @@ class _Laws:
     """The laws of a plan, each worked out once for the gears and shapes that it depends on."""
 
     def __init__(
-        self, config: Mapping[str, Any], options: LifeOptions, machine: PairMachine, least: float, greatest: float
+        self, config: Configuration, options: LifeOptions, machine: PairMachine, least: float, greatest: float
     ) -> None:
         self.options, self.machine = options, machine
         self._cracks: dict[Crack, CrackGrowth] = {}
@@ -172,7 +173,7 @@ class _Laws:
             return pit_law(self.machine, made, own, first, self._torques), 0.0
         assert isinstance(own, WearGrowthOptions)
         if self._table is None:
-            sound = {**self._config, "fault": HEALTHY}
+            sound = self._config.with_entries(fault=HEALTHY)
             limited, _ = limited_by_vibration(read_wear_case(sound), sound)
             self._table = wear_table(limited, *self._torques)
         case = self._table.lives[0].case
@@ -192,7 +193,7 @@ def _like(crack: Crack) -> Crack:
     )
 
 
-def _checked_units(config: Mapping[str, Any], options: LifeOptions) -> int:
+def _checked_units(config: Configuration, options: LifeOptions) -> int:
     """Number of lives; refuses what a plan of lives does not ask."""
     plan = config["plan"]
     for key in ("n_records", "conditions_per_unit"):
@@ -214,13 +215,13 @@ def _checked_units(config: Mapping[str, Any], options: LifeOptions) -> int:
                 f"plan.classes: {name}: wear is not followed on a drive line; take life=crack_growth or life=pit_growth"
             )
     for key in options.drift:
-        replace_key({name: dict(part) if isinstance(part, dict) else part for name, part in config.items()}, key, 0.0)
+        config.with_values({key: 0.0})  # refuses keys that cannot drift
         if key in plan["vary"] or key in (SPEED, TORQUE):
             raise ConfigError(f"life.drift: '{key}' is drawn for each set-point already; let one of the two go")
     return whole_number("plan.n_units", plan["n_units"], at_least=1)
 
 
-def _setpoints(config: Mapping[str, Any], options: LifeOptions, n_units: int) -> list[dict[str, float]]:
+def _setpoints(config: Configuration, options: LifeOptions, n_units: int) -> list[dict[str, float]]:
     """Values of every set-point of every unit, those of a unit beside each other."""
     vary = config["plan"]["vary"]
     blocks = options.blocks
@@ -231,7 +232,7 @@ def _setpoints(config: Mapping[str, Any], options: LifeOptions, n_units: int) ->
     given = None if blocks is None else given_history(blocks, options.horizon)
     n_setpoints = options.n_setpoints if given is None else len(given.speed)
     points = np.arange(n_units * n_setpoints)
-    drawn_values = draw_values(config, vary, points, stream(read_seed(config), Stream.CONDITION), "plan")
+    drawn_values = draw_values(config, vary, points, stream(config.seed, Stream.CONDITION), "plan")
     found = [{key: float(values[k]) for key, values in drawn_values.items()} for k in points.tolist()]
     if given is not None:
         for k, values in enumerate(found):
@@ -246,7 +247,7 @@ def _history(options: LifeOptions, speed: Array, torque: Array, rng: np.random.G
     return draw_history(options.drawn, speed, torque, options.horizon, rng)
 
 
-def _number(config: Mapping[str, Any], key: str, values: Mapping[str, float]) -> float:
+def _number(config: Configuration, key: str, values: Mapping[str, float]) -> float:
     """A number of the configuration as the set-point has it."""
     if key in values:
         return values[key]

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import copy
 import itertools
 import json
 import math
@@ -13,7 +12,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from gensig.dataset.distributions import GRID, LEVELS, n_levels
+from gensig.dataset.distributions import LEVELS, n_levels
 from gensig.dataset.plan import Plan, record_ids, shard_places
 from gensig.dataset.schema import SCALES, SIGNALS
 from gensig.errors import ConfigError
@@ -22,28 +21,20 @@ from gensig.faults.registry import fault_parts, read_faults
 from gensig.life.life_options import runs_to_failure
 from gensig.life.options import read_wear_options
 from gensig.mesh.pair_table import check_teeth
+from gensig.options.configuration import Configuration
 from gensig.plan.draws import draw_faults, draw_values, fault_sizes, fault_specs
 from gensig.plan.lives import snapshots
-from gensig.record.inputs import (
-    MISSING,
-    Stream,
-    read_seed,
-    record_system,
-    replace_key,
-    stream,
-    whole_number,
-)
+from gensig.record.inputs import MISSING, InputReader
 from gensig.record.machines import read_machine
+from gensig.record.options import PlanOptions, read_dataset_options, read_plan_options
 from gensig.record.simulate import signal_shapes
+from gensig.record.streams import Stream, stream
 from gensig.systems.pair_machine import PairMachine, severity
-from gensig.systems.shaft_sensors import SWITCHES
 from gensig.units import from_si
 
 SHARD_BYTES = 65_536_000  # 80 records of 4 x 51,200 float32 samples
 MOST_IN_GRID = 1_000_000  # records; a product of levels is soon larger than meant
-KEYS = (
-    "n_records", "n_units", "n_gearboxes", "conditions_per_unit", "n_repeats", "classes", "design", "vary", "sham",
-)  # fmt: skip
+COUNT_BYTES = 2  # of a sample stored as an int16 count
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -68,29 +59,33 @@ class Counts:
     fault_points: NDArray[np.int64]
 
 
-def make_plan(config: Mapping[str, Any]) -> Plan:
+def make_plan(config: Configuration) -> Plan:
     """Draw every input of every record.
 
-    Nested by unit, condition, fault and repeat. What shares a ``condition_id`` is one unit at one set-point: one record
-    a class and repeat, in random order within each repeat, so that neither position nor any drawn value tells the
-    class. Repeats share the fault too; each has a start and noise of its own.
+    Nested by unit, condition, fault and repeat. Records that share a ``condition_id`` are of one unit
+    at one set-point: one record a class and repeat, in random order within each repeat, so that
+    neither position nor any drawn value tells the class. Repeats share the fault too; each has a start
+    and noise of its own.
 
     Raises
     ------
     ConfigError    for counts, keys or distributions that cannot be used
     """
-    _check_plan(config)
+    options = read_plan_options(config)
+    for key in options.vary:
+        config.with_values({key: 0.0})  # refuses keys that cannot be varied
     if "wear" in config:  # configurations of earlier data sets have none
         read_wear_options(config["wear"])
     if runs_to_failure(config):
-        return _plan_of_lives(config)
-    seed, names = read_seed(config), list(config["plan"]["classes"])
+        return _plan_of_lives(config, options)
+    seed, names = config.seed, options.classes
     counts = read_counts(config)
+    reader = InputReader(config)
     machine = read_machine(config)
     machine.check()
     signal_shapes(config, machine)  # refuses what the machine does not tell
-    vary, points = config["plan"]["vary"], counts.condition_points
-    conditions = draw_values(config, vary, points, stream(seed, Stream.CONDITION), "plan")
+    rng = stream(seed, Stream.CONDITION)
+    conditions = draw_values(config, options.vary, counts.condition_points, rng, "plan")
     faults = {
         name: draw_faults(config, fault, counts.fault_points, stream(seed, Stream.FAULT, index))
         for index, (name, fault) in enumerate(config["classes"].items())
@@ -101,199 +96,193 @@ def make_plan(config: Mapping[str, Any]) -> Plan:
         unit = condition % counts.n_units
         values = {key: drawn[condition] for key, drawn in conditions.items()}
         if repeat == 0:
-            system = record_system(config, values)
-            system.pair.require_continuous_drive()
-        for place in stream(seed, Stream.ORDER, condition * counts.n_repeats + repeat).permutation(len(names)):
+            machine = reader.machine(values)
+            machine.pair.require_continuous_drive()
+        order = stream(seed, Stream.ORDER, condition * counts.n_repeats + repeat)
+        for label in order.permutation(len(names)):
             if len(rows) == counts.n_records:
                 break
-            name = names[place]
-            fault = faults[name][condition]
+            name = names[label]
             # The first sound record of a condition starts as the twin that sets the noise does: it is that twin.
             is_twin = name == sound and repeat == 0
             start = stream(seed, Stream.TWIN, condition) if is_twin else stream(seed, Stream.START, len(rows))
+            fault = _Fault(plain=faults[name][condition], is_sham=options.sham)
             rows.append(
                 {
-                    "label": int(place),
+                    "label": int(label),
                     "label_name": name,
-                    "unit_id": f"unit-{unit:04d}",
-                    "gearbox_id": f"gearbox-{unit % counts.n_gearboxes:04d}",
-                    "specimen_id": f"specimen-{unit // counts.n_gearboxes:04d}",
+                    **_unit_ids(unit, unit % counts.n_gearboxes, unit // counts.n_gearboxes),
                     "condition_id": f"condition-{condition:06d}",
                     "repeat": repeat,
-                    **_row(config, system, fault, values, start),
+                    **_row(machine, fault, values, start),
                 }
             )
     return _as_plan(config, rows)
 
 
-def _plan_of_lives(config: Mapping[str, Any]) -> Plan:
+def _plan_of_lives(config: Configuration, options: PlanOptions) -> Plan:
     """One row a snapshot, life by life; every unit has gears of its own, as they fail only once."""
-    seed, names = read_seed(config), list(config["plan"]["classes"])
     machine = read_machine(config)
     machine.check()
     machine.pair.require_continuous_drive()
-    n_gearboxes = read_gearboxes(config, whole_number("plan.n_units", config["plan"]["n_units"], at_least=1))
-    machines: dict[tuple[tuple[str, float], ...], PairMachine] = {}
+    n_gearboxes = count_gearboxes(options)
+    reader = InputReader(config)
     rows: list[dict[str, Any]] = []
     for look in snapshots(config):
-        drawn = tuple(look.values.items())
-        if drawn not in machines:
-            machines[drawn] = record_system(config, look.values)
-        start = stream(seed, Stream.START, len(rows))
+        start = stream(config.seed, Stream.START, len(rows))
+        fault = _Fault(plain=look.fault, is_sham=options.sham, is_checked=look.is_last)
         rows.append(
             {
                 "label": look.label,
-                "label_name": names[look.label],
-                "unit_id": f"unit-{look.unit:04d}",
-                "gearbox_id": f"gearbox-{look.unit % n_gearboxes:04d}",
-                "specimen_id": f"specimen-{look.unit:04d}",
+                "label_name": options.classes[look.label],
+                **_unit_ids(look.unit, look.unit % n_gearboxes, look.unit),
                 "condition_id": f"condition-{look.condition:06d}",
                 "repeat": 0,
-                **_row(config, machines[drawn], look.fault, look.values, start, is_checked=look.is_last),
+                **_row(reader.machine(look.values), fault, look.values, start),
                 **look.columns,
             }
         )
     return _as_plan(config, rows)
 
 
-def read_gearboxes(config: Mapping[str, Any], n_units: int) -> int:
+def _unit_ids(unit: int, gearbox: int, specimen: int) -> dict[str, str]:
+    """Ids of a unit, its gearbox and its set of gears; `RecordNumbers` reads their numbers back."""
+    return {
+        "unit_id": f"unit-{unit:04d}",
+        "gearbox_id": f"gearbox-{gearbox:04d}",
+        "specimen_id": f"specimen-{specimen:04d}",
+    }
+
+
+def count_gearboxes(options: PlanOptions) -> int:
     """Number of gearboxes, at most one a unit; about the square root of the units where it is not given."""
-    given = config["plan"]["n_gearboxes"]
-    asked = round(math.sqrt(n_units)) if given is None else given
-    return min(n_units, whole_number("plan.n_gearboxes", asked, at_least=1))
+    if options.n_gearboxes is None:
+        return min(options.n_units, round(math.sqrt(options.n_units)))
+    return min(options.n_units, options.n_gearboxes)
 
 
-def read_counts(config: Mapping[str, Any]) -> Counts:
+def read_counts(config: Configuration) -> Counts:
     """Check and work out every count of the plan; a grid's from its levels.
 
     Raises
     ------
     ConfigError    for counts that cannot be used or do not agree
     """
-    plan = config["plan"]
-    n_classes = len(plan["classes"])
-    n_units = whole_number("plan.n_units", plan["n_units"], at_least=1)
-    n_gearboxes = read_gearboxes(config, n_units)
-    n_repeats = whole_number("plan.n_repeats", plan["n_repeats"], at_least=1)
-    per_unit, n_faults = plan["conditions_per_unit"], 1
-    if plan["design"] == GRID:
+    plan = read_plan_options(config)
+    n_classes = len(plan.classes)
+    per_unit, n_faults = plan.conditions_per_unit, 1
+    if plan.is_grid:
         if per_unit is not None:
             raise ConfigError(f"plan.conditions_per_unit = {per_unit!r}: a grid's levels say how many; leave it null")
-        per_unit, n_faults = _grid_size(config)
-    n_records = plan["n_records"]
-    if n_records is not None:
-        whole_number("plan.n_records", n_records, at_least=n_classes)
-    if per_unit is None:
-        if n_records is None:
-            raise ConfigError("plan.n_records = null: give a number, plan.conditions_per_unit, or plan.design=grid")
-        n_conditions = math.ceil(n_records / (n_classes * n_repeats))
+        per_unit, n_faults = _grid_size(config, plan)
+    n_records = plan.n_records
+    if per_unit is not None:
+        n_conditions = plan.n_units * per_unit * n_faults
+        product = n_conditions * n_classes * plan.n_repeats
+        n_records = _fitting(plan, product, (plan.n_units, per_unit, n_faults, n_classes))
+    elif n_records is not None:
+        n_conditions = math.ceil(n_records / (n_classes * plan.n_repeats))
     else:
-        n_conditions = n_units * whole_number("plan.conditions_per_unit", per_unit, at_least=1) * n_faults
-        n_records = _fitting(plan, n_conditions * n_classes * n_repeats, (n_units, per_unit, n_faults, n_classes))
-    points = np.arange(n_conditions) // n_units
+        raise ConfigError("plan.n_records = null: give a number, plan.conditions_per_unit, or plan.design=grid")
+    points = np.arange(n_conditions) // plan.n_units
     return Counts(
         n_records=n_records,
-        n_units=n_units,
-        n_gearboxes=n_gearboxes,
-        n_repeats=n_repeats,
+        n_units=plan.n_units,
+        n_gearboxes=count_gearboxes(plan),
+        n_repeats=plan.n_repeats,
         n_conditions=n_conditions,
         condition_points=points // n_faults,
         fault_points=points % n_faults,
     )
 
 
-def _check_plan(config: Mapping[str, Any]) -> None:
-    """Refuse keys that plans of any kind do not have."""
-    plan = config["plan"]
-    if odd := sorted(set(plan).symmetric_difference(KEYS)):
-        raise ConfigError(
-            f"plan: {'unknown' if odd[0] in plan else 'missing'} key '{odd[0]}'; it has {', '.join(KEYS)}"
-        )
-    if not isinstance(plan["sham"], bool):
-        raise ConfigError(f"plan.sham = {plan['sham']!r} must be true or false")
-    for key in plan["vary"]:
-        replace_key(copy.deepcopy(dict(config)), key, 0.0)
-
-
-def _grid_size(config: Mapping[str, Any]) -> tuple[int, int]:
+def _grid_size(config: Configuration, plan: PlanOptions) -> tuple[int, int]:
     """Points of the grid over the conditions, and the least number that the grids of all faults divide."""
-    vary = config["plan"]["vary"]
-    for key, spec in vary.items():
+    for key, spec in plan.vary.items():
         if n_levels(f"plan.vary.{key}", spec) is None and LEVELS not in spec:
             raise ConfigError(
                 f"plan.vary.{key}: a grid needs its levels: give levels: 4 or so, distribution: choice, or "
                 "levels: null to draw it all the same"
             )
     n_faults = [_n_points("fault", specs) for specs in _fault_varies(config).values()]
-    return _n_points("plan", vary), math.lcm(*n_faults)
+    return _n_points("plan", plan.vary), math.lcm(*n_faults)
 
 
 def _n_points(where: str, vary: Mapping[str, Any]) -> int:
     return math.prod(n_levels(f"{where}.vary.{key}", spec) or 1 for key, spec in vary.items())
 
 
-def _fault_varies(config: Mapping[str, Any]) -> dict[str, dict[str, Any]]:
+def _fault_varies(config: Configuration) -> dict[str, dict[str, Any]]:
     """Distributions of the keys of each class."""
     return {name: fault_specs(config, fault)[0] for name, fault in config["classes"].items()}
 
 
-def describe_design(config: Mapping[str, Any]) -> str:
+def describe_design(config: Configuration) -> str:
     """The design in words: of a grid the number of levels of each key, and the keys that are drawn all the same."""
-    plan = config["plan"]
-    if plan["design"] != GRID:
-        return str(plan["design"])
+    plan = read_plan_options(config)
+    if not plan.is_grid:
+        return plan.design
     of_faults = {f"{name}.{key}": spec for name, vary in _fault_varies(config).items() for key, spec in vary.items()}
-    keys = {key: n_levels(key, spec) for key, spec in {**plan["vary"], **of_faults}.items()}
+    keys = {key: n_levels(key, spec) for key, spec in {**plan.vary, **of_faults}.items()}
     crossed = " x ".join(f"{key} {n}" for key, n in keys.items() if n is not None)
     drawn = ", ".join(key for key, n in keys.items() if n is None)
     return f"grid of {crossed or 'no key'}" + (f"; drawn: {drawn}" if drawn else "")
 
 
-def _fitting(plan: Mapping[str, Any], n_records: int, counts: tuple[int, ...]) -> int:
+def _fitting(plan: PlanOptions, n_records: int, counts: tuple[int, ...]) -> int:
     """The number of records that follows from the others, if ``plan.n_records`` has nothing against it."""
     names = ("units", "conditions", "faults", "classes", "repeats")
-    product = " x ".join(f"{n:,} {name}" for n, name in zip((*counts, plan["n_repeats"]), names, strict=True) if n > 1)
-    told = f"{n_records:,} records ({product})" if product else "1 record"
-    if plan["design"] == GRID and n_records > MOST_IN_GRID:
-        raise ConfigError(f"the grid has {told}, more than {MOST_IN_GRID:,}; take fewer levels, units or repeats")
-    if plan["n_records"] not in (None, n_records):
+    product = " x ".join(f"{n:,} {name}" for n, name in zip((*counts, plan.n_repeats), names, strict=True) if n > 1)
+    sum_of_all = f"{n_records:,} records ({product})" if product else "1 record"
+    if plan.is_grid and n_records > MOST_IN_GRID:
+        raise ConfigError(f"the grid has {sum_of_all}, more than {MOST_IN_GRID:,}; take fewer levels, units or repeats")
+    if plan.n_records not in (None, n_records):
         raise ConfigError(
-            f"plan.n_records = {plan['n_records']}, but the plan has {told}; plan.n_records=null takes them"
+            f"plan.n_records = {plan.n_records}, but the plan has {sum_of_all}; plan.n_records=null takes them"
         )
     return n_records
 
 
+@dataclass(frozen=True, slots=True, kw_only=True)
+class _Fault:
+    """The fault of one row, with its sizes drawn.
+
+    ``is_sham`` keeps its label and gives it severity 0. The teeth of a row with a larger fault of the
+    same life need no check: ``is_checked`` is false.
+    """
+
+    plain: Mapping[str, Any]
+    is_sham: bool
+    is_checked: bool = True
+
+
 def _row(
-    config: Mapping[str, Any],
-    system: PairMachine,
-    fault: dict[str, Any],
-    values: dict[str, float],
-    start: np.random.Generator,
-    *,
-    is_checked: bool = True,
+    machine: PairMachine, fault: _Fault, values: Mapping[str, float], start: np.random.Generator
 ) -> dict[str, Any]:
-    """Columns of one record that follow from its drawn values; the teeth of one with larger faults need no check."""
-    applied = read_faults(fault)
-    if is_checked:
-        check_teeth(system.pair, system.material, system.mesh, faulty_teeth(system.pair, applied))
-    parts = fault_parts(fault)
+    """Columns of one record that follow from its drawn values."""
+    applied = read_faults(fault.plain)
+    if fault.is_checked:
+        check_teeth(machine.pair, machine.material, machine.mesh, faulty_teeth(machine.pair, applied))
+    parts = fault_parts(fault.plain)
+    tooth = int(start.integers(machine.pair.pinion.n_teeth))
+    mate = int(start.integers(machine.pair.wheel.n_teeth))
     return {
         "faults_json": json.dumps(parts, separators=(",", ":")),
-        "severity": 0.0 if config["plan"]["sham"] else severity(applied, system.pair),
+        "severity": 0.0 if fault.is_sham else severity(applied, machine.pair),
         "fault_gear": applied[0].gear if applied else "",
         "fault_tooth": applied[0].first_tooth if applied else -1,
-        "start_tooth_pinion": (tooth := int(start.integers(system.pair.pinion.n_teeth))),
-        "start_tooth_wheel": system.driven_tooth(tooth, int(start.integers(system.pair.wheel.n_teeth))),
+        "start_tooth_pinion": tooth,
+        "start_tooth_wheel": machine.driven_tooth(tooth, mate),
         "start_phase": float(start.random()),
-        "speed_set_rpm": from_si("speed_rpm", system.operating.speed),
-        "torque_nm": system.operating.torque,
-        "snr_db": MISSING if system.sensing.snr is None else system.sensing.snr,
+        "speed_set_rpm": from_si("speed_rpm", machine.operating.speed),
+        "torque_nm": machine.operating.torque,
+        "snr_db": MISSING if machine.sensing.snr is None else machine.sensing.snr,
         **{f"params/{key}": float(value) for key, value in values.items()},
-        **{f"params/fault.{key}": value for key, value in fault_sizes(fault).items()},
+        **{f"params/fault.{key}": value for key, value in fault_sizes(fault.plain).items()},
     }
 
 
-def _as_plan(config: Mapping[str, Any], rows: list[dict[str, Any]]) -> Plan:
+def _as_plan(config: Configuration, rows: list[dict[str, Any]]) -> Plan:
     """Rows to columns; a parameter that a record has not is NaN. The rows are emptied: nothing is held twice."""
     names: dict[str, None] = {}
     for row in rows:
@@ -305,29 +294,22 @@ def _as_plan(config: Mapping[str, Any], rows: list[dict[str, Any]]) -> Plan:
     return Plan(columns=columns)
 
 
-def records_per_shard(config: Mapping[str, Any]) -> int:
+def records_per_shard(config: Configuration) -> int:
     """As configured, else about 64 MB of samples."""
-    given = config["dataset"]["records_per_shard"]
-    if given is not None:
-        return whole_number("dataset.records_per_shard", given, at_least=1)
-    return max(1, SHARD_BYTES // record_bytes(config))
+    given = read_dataset_options(config).records_per_shard
+    return max(1, SHARD_BYTES // record_bytes(config)) if given is None else given
 
 
-def record_bytes(config: Mapping[str, Any], *, as_stored: bool = False) -> int:
+def record_bytes(config: Configuration, *, as_stored: bool = False) -> int:
     """Bytes of one record's samples, ``as_stored`` in the chosen type before compression, else in single precision.
 
     Shards are cut by the latter, so that how samples are stored does not change a plan.
     """
-    bulk = {name: shape for name, shape in signal_shapes(config, read_machine(config)).items() if SIGNALS[name].is_bulk}
-    counts = as_stored and config["dataset"]["sample_type"] == "int16"
-    return sum(
-        math.prod(shape) * (2 if counts and name in SCALES else SIGNALS[name].n_bytes) for name, shape in bulk.items()
-    )
-
-
-def check_switches(config: Mapping[str, Any]) -> None:
-    """Raise ConfigError for a switch of ``dataset`` that is neither true nor false."""
-    switches = ("clean", "source", "operating", "mesh_state", "detectability", "healthy_twin")
-    for key in (*(f"store_{switch}" for switch in switches), *SWITCHES):
-        if not isinstance(config["dataset"][key], bool):
-            raise ConfigError(f"dataset.{key} = {config['dataset'][key]!r} must be true or false")
+    shapes = signal_shapes(config, read_machine(config))
+    as_counts = as_stored and read_dataset_options(config).sample_type == "int16"
+    n_bytes = 0
+    for name, shape in shapes.items():
+        if SIGNALS[name].is_bulk:
+            width = COUNT_BYTES if as_counts and name in SCALES else SIGNALS[name].n_bytes
+            n_bytes += math.prod(shape) * width
+    return n_bytes

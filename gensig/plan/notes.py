@@ -2,23 +2,21 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping
-from typing import Any
-
 from gensig.dataset.plan import Plan
 from gensig.dataset.splitting.protocols import why_left_out
 from gensig.life.life_options import runs_to_failure
+from gensig.options.configuration import Configuration
 
 BY_MACHINE = {"by_unit": "unit", "cross_specimen": "set of gears", "cross_gearbox": "gearbox"}
 
 
-def plan_notes(config: Mapping[str, Any], plan: Plan) -> list[str]:
+def plan_notes(config: Configuration, plan: Plan) -> list[str]:
     """At most one line: fewer units than asked for, and which splits by machine are not possible."""
-    parts = [_units_left_out(config, plan), _splits_left_out(plan, int(config["seed"]))]
+    parts = [_units_left_out(config, plan), _splits_left_out(plan, config.seed)]
     return ["; ".join(part for part in parts if part)] if any(parts) else []
 
 
-def _units_left_out(config: Mapping[str, Any], plan: Plan) -> str:
+def _units_left_out(config: Configuration, plan: Plan) -> str:
     asked, used = config["plan"]["n_units"], n_different(plan, "unit_id")
     if used >= asked or runs_to_failure(config):
         return ""

@@ -14,6 +14,7 @@ from typing import Any
 from gensig.errors import ConfigError
 from gensig.faults.registry import COMPOUND, fault_parts
 from gensig.options.compose import compose, options, override_keys, typed_mapping
+from gensig.options.configuration import Configuration
 from gensig.plan.condition_courses import settle_courses
 from gensig.systems.registry import SIDES
 
@@ -29,11 +30,12 @@ class DerivedValueWarning(UserWarning):
 class Request:
     """A composed configuration and the overrides as typed.
 
-    ``config`` holds plain values only; its ``classes`` maps every class of the plan to its fault option, so that the
-    folder of a data set needs no package to be understood. ``notes`` say what of an option's plan the overrides undo.
+    ``classes`` of ``config`` maps every class of the plan to its fault option, so that the folder of
+    a data set needs no package to be understood. ``notes`` lists settings of the selected option that
+    an override replaced.
     """
 
-    config: dict[str, Any]
+    config: Configuration
     overrides: tuple[str, ...]
     notes: tuple[str, ...] = ()
 
@@ -55,7 +57,7 @@ def read_request(overrides: Sequence[str], *, config_dir: str | Path | None = No
         word.lstrip("+").partition("=")[0]: word for word in overrides if word.lstrip("+").startswith("fault.")
     }
     others = [word for word in overrides if word not in fault_words.values()]
-    base = compose(CONFIG_NAME, others, config_dir=config_dir)
+    base = compose(CONFIG_NAME, others, config_dir=config_dir).plain()
     _check_shape(base)
     plan = base["plan"]
     names = [typed["fault"]] if "fault" in typed else plan["classes"] or [base["fault"]["kind"]]
@@ -97,9 +99,9 @@ def read_request(overrides: Sequence[str], *, config_dir: str | Path | None = No
     pinned.update({key: None for key in plan_vary if key in typed})
     if pinned:
         notes.append(f"pinned, no longer varied: {', '.join(f'{key} = {typed[key]}' for key in pinned)}")
-    config = {**base, "fault": selected, "classes": classes}
-    _reset_derived(config, set(typed) | set(plan["vary"]))
-    settle_courses(config, typed)
+    base |= {"fault": selected, "classes": classes}
+    _reset_derived(base["gear"], set(typed) | set(plan["vary"]))
+    config = settle_courses(Configuration(base), typed)
     return Request(config=config, overrides=as_typed, notes=tuple(notes))
 
 
@@ -109,7 +111,7 @@ def _fault_option(overrides: Sequence[str], config_dir: str | Path | None) -> di
     No fault of the package refers to a key of another group, so only groups and keys of the fault itself count.
     """
     if config_dir is not None or any("${" in word or word.startswith("hydra.") for word in overrides):
-        return dict(compose(CONFIG_NAME, overrides, config_dir=config_dir)["fault"])
+        return compose(CONFIG_NAME, overrides, config_dir=config_dir)["fault"].plain()
     keys = [(word, word.lstrip("+~").partition("=")[0]) for word in overrides]
     counting = (word for word, key in keys if "." not in key or key.startswith("fault."))
     return copy.deepcopy(_packaged_fault(tuple(word for word in counting if not word.startswith(PLAIN_WORDS))))
@@ -117,7 +119,7 @@ def _fault_option(overrides: Sequence[str], config_dir: str | Path | None) -> di
 
 @functools.lru_cache(maxsize=64)
 def _packaged_fault(overrides: tuple[str, ...]) -> dict[str, Any]:
-    return dict(compose(CONFIG_NAME, overrides)["fault"])
+    return compose(CONFIG_NAME, overrides)["fault"].plain()
 
 
 def _with_whole_parts(fault: dict[str, Any], config_dir: str | Path | None) -> dict[str, Any]:
@@ -143,14 +145,14 @@ PLAIN_KEYS = ("seed", "out")
 PLAIN_WORDS = tuple(f"{key}=" for key in PLAIN_KEYS)
 
 
-def _check_shape(config: Mapping[str, Any]) -> None:
+def _check_shape(composed: Mapping[str, Any]) -> None:
     """Raise for groups that were replaced or deleted, and for keys that nothing reads."""
     for key in SECTIONS:
-        if not isinstance(config.get(key), dict):
+        if not isinstance(composed.get(key), dict):
             raise ConfigError(
-                f"{key} = {config.get(key)!r} must be a group of keys; choose an option or leave it alone"
+                f"{key} = {composed.get(key)!r} must be a group of keys; choose an option or leave it alone"
             )
-    for key in config:
+    for key in composed:
         if key not in SECTIONS + OPTIONAL_SECTIONS + PLAIN_KEYS:
             raise ConfigError(f"unknown key '{key}'; the configuration has {', '.join(SECTIONS + PLAIN_KEYS)}")
 
@@ -165,9 +167,8 @@ def _no_such_fault_key(key: str, selected: Mapping[str, Any]) -> str:
     return f"unknown key '{key}' for fault={selected['kind']}, {has}; fault offers: {', '.join(options('fault'))}"
 
 
-def _reset_derived(config: Mapping[str, Any], touched: set[str]) -> None:
+def _reset_derived(gear: dict[str, Any], touched: set[str]) -> None:
     """Derive mass and inertia anew where teeth, module or width are no longer those the source weighed."""
-    gear = config["gear"]
     for side in SIDES:
         changed = sorted(touched & {"gear.normal_module_mm", f"gear.{side}.n_teeth", f"gear.{side}.face_width_mm"})
         lost = [

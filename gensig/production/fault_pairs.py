@@ -2,9 +2,8 @@
 
 from __future__ import annotations
 
-import copy
 import math
-from collections.abc import Mapping, Sequence
+from collections.abc import Sequence
 from dataclasses import dataclass, replace
 from typing import Any
 
@@ -14,26 +13,15 @@ from numpy.typing import NDArray
 from gensig.dynamics.decimation import usable_band
 from gensig.errors import ConfigError, SimulationError
 from gensig.faults.registry import fault_parts, without_vary
+from gensig.options.configuration import Configuration, whole_number
 from gensig.plan.condition_courses import SEED_KEY, settle_courses
 from gensig.plan.make import make_plan
 from gensig.production.streaming import epoch_seed
-from gensig.record.inputs import (
-    Stream,
-    read_seed,
-    record_system,
-    row_clean,
-    row_instrument,
-    row_noisy,
-    row_run,
-    row_values,
-    shaken,
-    stream,
-    twin_start,
-    whole_number,
-)
+from gensig.record.inputs import InputReader, RecordInputs, Row, simulate_motions, twin_start
+from gensig.record.options import read_plan_options
+from gensig.record.streams import Stream, stream
 from gensig.sensing.instrument import Instrument
-from gensig.systems.lead_in import simulate_with_lead_in
-from gensig.systems.pair_machine import CleanRecord, PairMachine, Run
+from gensig.systems.pair_machine import CleanRecord
 from gensig.systems.registry import read_system
 
 Array = NDArray[np.float64]
@@ -75,7 +63,7 @@ class FaultPairs:
 
     Attributes
     ----------
-    config : dict                  the composed configuration
+    config : Configuration         as composed
     speeds_rpm, torques_nm : of the pinion, rising
     n_units : machines of the same build: each another set of gears, and another gearbox unless ``plan.n_gearboxes``
               says how many there are
@@ -85,7 +73,7 @@ class FaultPairs:
     fixed_power : (unit, channel) or None         power of the noise where it is that of the set-point everywhere
     """
 
-    config: dict[str, Any]
+    config: Configuration
     speeds_rpm: tuple[float, ...]
     torques_nm: tuple[float, ...]
     n_units: int
@@ -106,39 +94,30 @@ class FaultPairs:
     def cell(self, place: int) -> PairCell:
         """Simulate the cell of speed ``place // len(torques_nm)`` and torque ``place % len(torques_nm)``."""
         rows = self.rows[place * self.n_units : (place + 1) * self.n_units]
-        machines = [record_system(self.config, row_values(row)) for row in rows]
-        sound = [_sound(self.config, system, row) for system, row in zip(machines, rows, strict=True)]
-        faulty = [
-            replace(row_run(self.config, system, row), start=run.start)
-            for system, row, run in zip(machines, rows, sound, strict=True)
-        ]
-        results = simulate_with_lead_in([*sound, *faulty])
+        sound, faulty = _contrasts(self.config, rows)
+        motions = simulate_motions([*sound, *faulty])
         n_samples = round(self.duration * self.sampling_rate)
         shape = (self.n_units, len(self.channel_names), n_samples)
         signals = {name: np.full(shape, np.nan) for name in ("residual", "sound", "faulty")}
         angles = {name: np.full((self.n_units, n_samples), np.nan) for name in ("sound_angle", "faulty_angle")}
         power = np.full(shape[:2], np.nan)
-        for unit, (system, row) in enumerate(zip(machines, rows, strict=True)):
-            asked = ((sound[unit], results[unit]), (faulty[unit], results[self.n_units + unit]))
-            found = [shaken(self.config, row, run, result) for run, result in asked]
-            pair = [record for record in found if isinstance(record, CleanRecord)]
-            if len(pair) < len(found):
+        for unit, inputs in enumerate(faulty):
+            without, with_fault = motions[unit], motions[self.n_units + unit]
+            if isinstance(without, SimulationError) or isinstance(with_fault, SimulationError):
                 continue
-            instrument = row_instrument(self.config, system, row)
-            power[unit] = (
-                _noise_power(system, instrument, pair[0]) if self.fixed_power is None else self.fixed_power[unit]
-            )
-            clean = [row_clean(self.config, row, instrument, one.acceleration) for one in pair]
-            for name, one, record in zip(("sound", "faulty"), clean, pair, strict=True):
-                signals[name][unit] = row_noisy(self.config, row, instrument, one, power[unit])[0]
-                angles[f"{name}_angle"][unit] = record.shaft_angle
+            power[unit] = _noise_power(inputs, without) if self.fixed_power is None else self.fixed_power[unit]
+            clean = []
+            for name, motion in (("sound", without), ("faulty", with_fault)):
+                clean.append(inputs.clean(motion.acceleration))
+                signals[name][unit] = inputs.noisy(clean[-1], power[unit])[0]
+                angles[f"{name}_angle"][unit] = motion.shaft_angle
             signals["residual"][unit] = clean[1] - clean[0]
         shape_of_noise = np.ones((1, 1, 1)) if self.noise_shape is None else self.noise_shape
         return PairCell(**signals, **angles, noise_power=power, noise_density=power[:, :, None] * shape_of_noise)
 
 
 def make_pairs(
-    config: Mapping[str, Any],
+    config: Configuration,
     *,
     speeds_rpm: Sequence[float] | None = None,
     torques_nm: Sequence[float] | None = None,
@@ -161,9 +140,8 @@ def make_pairs(
     ------
     ConfigError    for a machine without fault or noise, and for numbers that cannot be used
     """
-    own = copy.deepcopy(dict(config))
-    own["seed"] = epoch_seed(read_seed(own), epoch)
-    fault, sensing = own["fault"], own["sensing"]
+    config = config.with_entries(seed=epoch_seed(config.seed, epoch))
+    fault, sensing = config["fault"], config["sensing"]
     if not fault_parts(fault):
         raise ConfigError(
             f"fault={fault['kind']}: there is nothing to find; choose a fault, for instance fault=crack "
@@ -176,13 +154,13 @@ def make_pairs(
     if sensing["snr_reference"] != "healthy_twin":
         raise ConfigError("sensing.snr_reference: noise that follows the record tells the fault; use healthy_twin")
     whole_number("the number of units", n_units, at_least=FEWEST_UNITS)
-    speeds = _levels("speeds in r/min", speeds_rpm, own["operating"]["speed_rpm"], SPEED_SHARES)
-    torques = _levels("torques in N m", torques_nm, own["operating"]["torque_nm"], TORQUE_SHARES)
+    speeds = _levels("speeds in r/min", speeds_rpm, config["operating"]["speed_rpm"], SPEED_SHARES)
+    torques = _levels("torques in N m", torques_nm, config["operating"]["torque_nm"], TORQUE_SHARES)
     if len(speeds) * len(torques) > MOST_CELLS:
         raise ConfigError(f"{len(speeds)} speeds x {len(torques)} torques are more than {MOST_CELLS} cells; give fewer")
-    own |= {"fault": without_vary(fault), "classes": {fault["kind"]: without_vary(fault)}}
-    own["dataset"] = {**own["dataset"], "store_mesh_state": False}
-    planned, rows = _planned(own, speeds, torques, n_units)
+    config = config.with_entries(fault=without_vary(fault), classes={fault["kind"]: without_vary(fault)})
+    config = config.with_keys("dataset", store_mesh_state=False)
+    planned, rows = _planned(config, speeds, torques, n_units)
     system = read_system(planned)
     teeth = {"pinion": system.pair.pinion.n_teeth, "wheel": system.pair.wheel.n_teeth}
     faulted = dict.fromkeys(str(part["gear"]) for part in fault_parts(fault))
@@ -197,8 +175,8 @@ def make_pairs(
         usable_frequency=usable_band(system.sensing.sampling_rate)[1],
         duration=system.operating.duration,
         rows=tuple(rows),
-        noise_shape=None if system.sensing.has_white_noise else _noise_shape(planned, system, rows[:n_units]),
-        fixed_power=_power_at_set_point(own, n_units) if fixed_noise else None,
+        noise_shape=None if system.sensing.has_white_noise else _noise_shape(planned, rows[:n_units]),
+        fixed_power=_power_at_set_point(config, n_units) if fixed_noise else None,
     )
 
 
@@ -215,68 +193,74 @@ def _levels(what: str, given: Sequence[float] | None, set_point: float, shares: 
 
 
 def _planned(
-    config: Mapping[str, Any], speeds: Sequence[float], torques: Sequence[float], n_units: int
-) -> tuple[dict[str, Any], list[dict[str, Any]]]:
+    config: Configuration, speeds: Sequence[float], torques: Sequence[float], n_units: int
+) -> tuple[Configuration, list[dict[str, Any]]]:
     """The configuration with a plan of one row a cell and unit, and those rows, each unit in a gearbox of its own."""
-    plan = config["plan"]
-    asked = plan["n_gearboxes"]
-    n_gearboxes = n_units if asked is None else whole_number("plan.n_gearboxes", asked, at_least=1)
-    map_of: dict[str, Any] = {
-        "n_records": None,
-        "n_units": n_units,
-        "n_gearboxes": 1,
-        "conditions_per_unit": None,
-        "n_repeats": 1,
-        "classes": list(config["classes"]),
-        "design": "grid",
-        "vary": {
+    plan = read_plan_options(config)
+    n_gearboxes = n_units if plan.n_gearboxes is None else plan.n_gearboxes
+    config = config.with_keys(
+        "plan",
+        n_records=None,
+        n_units=n_units,
+        n_gearboxes=1,
+        conditions_per_unit=None,
+        n_repeats=1,
+        classes=list(config["classes"]),
+        design="grid",
+        vary={
             SPEED: {"distribution": "choice", "values": list(speeds)},
             TORQUE: {"distribution": "choice", "values": list(torques)},
         },
-    }
-    own = {**config, "operating": dict(config["operating"]), "plan": {**plan, **map_of}}
-    settle_courses(own, () if SEED_KEY in plan["vary"] else (SEED_KEY,))
-    table = make_plan(own)
+    )
+    config = settle_courses(config, () if SEED_KEY in plan.vary else (SEED_KEY,))
+    table = make_plan(config)
     rows = [table.record(index) for index in range(table.n_records)]
-    return own, [
-        {**row, "gearbox_id": f"gearbox-{index % n_units % n_gearboxes:04d}"} for index, row in enumerate(rows)
-    ]
+    gearboxes = [f"gearbox-{index % n_units % n_gearboxes:04d}" for index in range(len(rows))]
+    return config, [{**row, "gearbox_id": gearbox} for row, gearbox in zip(rows, gearboxes, strict=True)]
 
 
-def _sound(config: Mapping[str, Any], system: PairMachine, row: Mapping[str, Any]) -> Run:
-    """The healthy twin that sets the noise of a data set."""
-    return replace(row_run(config, system, row), faults=(), start=twin_start(config, system, row))
+def _contrasts(config: Configuration, rows: Sequence[Row]) -> tuple[list[RecordInputs], list[RecordInputs]]:
+    """Each row without and with its fault, from the start of the healthy twin that sets the noise of a data set.
+
+    Both are records: their nuisances and noise are those of the row.
+    """
+    reader = InputReader(config)
+    inputs = [reader.inputs(row) for row in rows]
+    starts = [twin_start(each.machine, each.stream(Stream.TWIN)) for each in inputs]
+    faulty = [each.from_start(start) for each, start in zip(inputs, starts, strict=True)]
+    return [each.without_faults() for each in faulty], faulty
 
 
-def _noise_power(system: PairMachine, instrument: Instrument, sound: CleanRecord) -> Array:
+def _noise_power(inputs: RecordInputs, sound: CleanRecord) -> Array:
+    instrument, sensing = inputs.instrument, inputs.machine.sensing
     reference = instrument.power(instrument.measure(sound.acceleration))
-    return reference * system.sensing.noise_factor(float(system.sensing.snr or 0.0))
+    return reference * sensing.noise_factor(float(sensing.snr or 0.0))
 
 
-def _power_at_set_point(config: Mapping[str, Any], n_units: int) -> Array:
+def _power_at_set_point(config: Configuration, n_units: int) -> Array:
     """Noise power of every unit at the configured speed and torque, (unit, channel)."""
     operating = config["operating"]
-    own, rows = _planned(config, [operating["speed_rpm"]], [operating["torque_nm"]], n_units)
-    machines = [record_system(own, row_values(row)) for row in rows]
-    runs = [_sound(own, system, row) for system, row in zip(machines, rows, strict=True)]
+    planned, rows = _planned(config, [operating["speed_rpm"]], [operating["torque_nm"]], n_units)
+    sound, _ = _contrasts(planned, rows)
     powers = []
-    for system, row, run, result in zip(machines, rows, runs, simulate_with_lead_in(runs), strict=True):
-        record = shaken(own, row, run, result)
-        if isinstance(record, SimulationError):
-            raise record
-        powers.append(_noise_power(system, row_instrument(own, system, row), record))
+    for inputs, motion in zip(sound, simulate_motions(sound), strict=True):
+        if isinstance(motion, SimulationError):
+            raise motion
+        powers.append(_noise_power(inputs, motion))
     return np.stack(powers)
 
 
-def _noise_shape(config: Mapping[str, Any], system: PairMachine, rows: Sequence[Mapping[str, Any]]) -> Array:
+def _noise_shape(config: Configuration, rows: Sequence[Row]) -> Array:
     """Density of each unit's noise at power 1, averaged over draws and neighbouring bins, (unit, channel, bin)."""
-    n_samples = round(system.operating.duration * system.sensing.sampling_rate)
-    silent = np.zeros((len(system.sensing.channel_names), n_samples))
+    reader = InputReader(config)
     densities = []
     for unit, row in enumerate(rows):
-        drawn = row_instrument(config, system, row)
-        ideal = Instrument(sensing=replace(system.sensing, sensor=None), path=drawn.path, sensors=None)
-        children = stream(read_seed(config), Stream.NOISE, unit).spawn(NOISE_DRAWS)
+        inputs = reader.inputs(row)
+        sensing = inputs.machine.sensing
+        n_samples = round(inputs.machine.operating.duration * sensing.sampling_rate)
+        silent = np.zeros((len(sensing.channel_names), n_samples))
+        ideal = Instrument(sensing=replace(sensing, sensor=None), path=inputs.instrument.path, sensors=None)
+        children = stream(config.seed, Stream.NOISE, unit).spawn(NOISE_DRAWS)
         noises = (ideal.record(silent, np.ones(len(silent)), rng)[0] for rng in children)
         density = np.mean([np.abs(np.fft.rfft(noise, axis=-1)) ** 2 for noise in noises], axis=0) / n_samples
         densities.append([_smoothed(line) for line in density])

@@ -36,9 +36,10 @@ from gensig.dynamics.decimation import usable_band
 from gensig.errors import ConfigError, DatasetError
 from gensig.execution.base import Executor, ShardFailure
 from gensig.life.life_options import runs_to_failure
-from gensig.plan.make import check_switches, make_plan
-from gensig.record.inputs import read_seed
+from gensig.options.configuration import Configuration
+from gensig.plan.make import make_plan
 from gensig.record.machines import read_machine
+from gensig.record.options import DatasetOptions, read_dataset_options
 from gensig.record.simulate import signal_shapes, simulate_records
 from gensig.systems.pair_machine import PairMachine
 from gensig.units import channel_unit, from_si
@@ -65,22 +66,22 @@ class Progress:
     reason: str
 
 
-def begin_folder(config: dict[str, Any], overrides: Sequence[str], out: Path) -> Plan:
+def begin_folder(config: Configuration, overrides: Sequence[str], out: Path) -> Plan:
     """Plan a data set and make its folder, ready for ``run_folder``; nothing is touched if anything is wrong."""
     for key, allowed in (("compression", COMPRESSIONS), ("sample_type", SAMPLE_TYPES)):
         if config["dataset"][key] not in allowed:
             raise ConfigError(f"dataset.{key} = {config['dataset'][key]!r}; allowed: {', '.join(allowed)}")
-    creation_options(config["dataset"]["compression"])  # refuses one whose package is missing
-    check_switches(config)
+    dataset = read_dataset_options(config)
+    creation_options(dataset.compression)  # refuses one whose package is missing
     plan = make_plan(config)
-    recorded = {**config, "out": None}
+    recorded = config.with_entries(out=None).plain()
     create_folder(
         out,
         config=recorded,
         overrides=overrides,
         plan=plan,
         identity=identity_hash(recorded, __version__),
-        seed=read_seed(config),
+        seed=config.seed,
         generator_version=__version__,
     )
     log(out, f"gensig {__version__}: {plan.n_records} records in {plan.n_shards} shards are planned")
@@ -88,7 +89,7 @@ def begin_folder(config: dict[str, Any], overrides: Sequence[str], out: Path) ->
 
 
 def run_folder(
-    out: Path, *, executor: Executor, on_shard: Callable[[Progress], None], asked: Mapping[str, Any] | None = None
+    out: Path, *, executor: Executor, on_shard: Callable[[Progress], None], asked: Configuration | None = None
 ) -> tuple[int, list[str]]:
     """Make the shards that a folder still lacks, then close it; a task of an array job makes its share only.
 
@@ -104,7 +105,7 @@ def run_folder(
     there is none
     """
     out = out.resolve()
-    joined_folder(out, asked=asked)
+    joined_folder(out, asked=None if asked is None else asked.plain())
     if executor.closes:
         collect_receipts(out)
     manifest = read_manifest(out)
@@ -221,10 +222,10 @@ def write_shard(out: Path, shard_index: int) -> WrittenShard:
 
 
 @functools.lru_cache(maxsize=1)
-def _folder_inputs(out: Path, _changed: int) -> tuple[dict[str, Any], PlanRows, list[int]]:
+def _folder_inputs(out: Path, _changed: int) -> tuple[Configuration, PlanRows, list[int]]:
     """Configuration, plan and records of each shard, read once by a process that makes many shards of one folder."""
     manifest, config = joined_folder(out)
-    return config, PlanRows(out / PLAN), [entry.rows for entry in manifest.shards]
+    return Configuration(config), PlanRows(out / PLAN), [entry.rows for entry in manifest.shards]
 
 
 def _check_places(out: Path, rows: Sequence[Mapping[str, Any]], shard_index: int, first: int) -> None:
@@ -232,39 +233,40 @@ def _check_places(out: Path, rows: Sequence[Mapping[str, Any]], shard_index: int
         raise DatasetError(f"{out / PLAN} and the manifest disagree on shard {shard_index}; restore both from a copy")
 
 
-def block_length(config: Mapping[str, Any]) -> int:
+def block_length(config: Configuration) -> int:
     """Records that are simulated at a time: enough to fill the lanes with them and their twins, few enough to hold."""
     system = read_machine(config)
     n_bytes = 8 * len(system.sensing.channels) * round(system.operating.duration * system.sensing.sampling_rate)
     return max(n_lanes(system.solver.precision), min(MOST_BLOCK, BLOCK_BYTES // n_bytes))
 
 
-def open_shard(path: Path, config: Mapping[str, Any], n_records: int, params: Sequence[str]) -> ShardWriter:
+def open_shard(path: Path, config: Configuration, n_records: int, params: Sequence[str]) -> ShardWriter:
     """Writer for records of one configuration."""
-    system = read_machine(config)
+    system, dataset = read_machine(config), read_dataset_options(config)
     return ShardWriter(
         path,
         n_records=n_records,
         signals=signal_shapes(config, system),
         params=params,
         attributes=root_attributes(config, system),
-        compression=config["dataset"]["compression"],
-        sample_type=config["dataset"]["sample_type"],
+        compression=dataset.compression,
+        sample_type=dataset.sample_type,
         lives=runs_to_failure(config),
     )
 
 
-def _shaft_sensors(config: Mapping[str, Any], system: PairMachine) -> dict[str, Any]:
-    """What a reader of the stored shaft signals has to know."""
+def _shaft_sensors(dataset: DatasetOptions, system: PairMachine) -> dict[str, Any]:
+    """Attributes of the stored shaft signals: shafts, pulses and lines."""
     tacho, encoder = system.sensing.tacho, system.sensing.encoder
-    of_tacho = {"tacho_shaft": tacho.shaft, "tacho_pulses_per_turn": tacho.pulses_per_turn}
-    of_encoder = {"encoder_shaft": encoder.shaft, "encoder_lines_per_turn": encoder.lines_per_turn}
-    return (of_tacho if config["dataset"]["store_tacho"] else {}) | (
-        of_encoder if config["dataset"]["store_encoder"] else {}
-    )
+    attributes: dict[str, Any] = {}
+    if dataset.store_tacho:
+        attributes |= {"tacho_shaft": tacho.shaft, "tacho_pulses_per_turn": tacho.pulses_per_turn}
+    if dataset.store_encoder:
+        attributes |= {"encoder_shaft": encoder.shaft, "encoder_lines_per_turn": encoder.lines_per_turn}
+    return attributes
 
 
-def root_attributes(config: Mapping[str, Any], system: PairMachine) -> dict[str, Any]:
+def root_attributes(config: Configuration, system: PairMachine) -> dict[str, Any]:
     """What is the same for every record of a data set."""
     pair = system.pair
     return {
@@ -274,7 +276,7 @@ def root_attributes(config: Mapping[str, Any], system: PairMachine) -> dict[str,
         "channel_names": list(system.sensing.channel_names),
         "source_names": list(system.sensing.channels),
         "channel_units": [channel_unit(name) for name in system.sensing.channel_names],
-        **_shaft_sensors(config, system),
+        **_shaft_sensors(read_dataset_options(config), system),
         **({"torque_of": system.torque_of} if system.torque_of else {}),
         "class_names": list(config["plan"]["classes"]),
         "n_teeth_pinion": pair.pinion.n_teeth,
@@ -287,5 +289,5 @@ def root_attributes(config: Mapping[str, Any], system: PairMachine) -> dict[str,
         "center_distance_mm": from_si("center_distance_mm", pair.center_distance),
         "transverse_contact_ratio": pair.transverse_contact_ratio,
         "overlap_ratio": pair.overlap_ratio,
-        "config_json": json.dumps({**config, "out": None, "executor": None}, sort_keys=True),
+        "config_json": json.dumps(config.with_entries(out=None, executor=None).plain(), sort_keys=True),
     }

@@ -7,13 +7,13 @@ import tempfile
 import time
 import warnings
 from collections import Counter
-from collections.abc import Callable, Mapping, Sequence
+from collections.abc import Callable, Sequence
 from pathlib import Path
-from typing import Any
 
 from gensig.dataset.folder.failures import commonest
 from gensig.dataset.plan import Plan, plan_text
 from gensig.execution.base import read_n_workers
+from gensig.options.configuration import Configuration
 from gensig.plan.make import describe_design, make_plan
 from gensig.plan.notes import n_different
 from gensig.production.folder import block_length, open_shard
@@ -30,7 +30,7 @@ class FailedRecordsWarning(UserWarning):
 
 
 def predict(
-    config: Mapping[str, Any], *, on_plan: Callable[[Plan, int], None] = lambda _plan, _n_timed: None
+    config: Configuration, *, on_plan: Callable[[Plan, int], None] = lambda _plan, _n_timed: None
 ) -> dict[str, str]:
     """Facts of a data set that is not made yet, by name, as text.
 
@@ -90,12 +90,12 @@ def _warn_of_failed(records: Sequence[Record]) -> None:
         )
 
 
-def _n_processes(config: Mapping[str, Any]) -> int:
+def _n_processes(config: Configuration) -> int:
     """Shards made at a time, also where the rest of ``executor`` is not known yet."""
     return read_n_workers(config["executor"]["n_workers"]) * (config["executor"].get("shard_count") or 1)
 
 
-def _stored_bytes(config: Mapping[str, Any], table: Plan, records: list[Record]) -> int:
+def _stored_bytes(config: Configuration, table: Plan, records: list[Record]) -> int:
     """Bytes of all files, from two shards of different length and what is usual beside them."""
     params = [name.removeprefix("params/") for name in table.columns if name.startswith("params/")]
     sizes = []

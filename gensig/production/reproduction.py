@@ -20,17 +20,9 @@ from gensig.dataset.schema import SCALES, stored_reason
 from gensig.dataset.storage.guard import open_shard, read_rows
 from gensig.dataset.storage.quantization import quantized, read_signal
 from gensig.errors import ConfigError, DatasetError, SimulationError
-from gensig.record.inputs import (
-    record_system,
-    row_clean,
-    row_instrument,
-    row_noisy,
-    row_run,
-    row_values,
-    shaken,
-)
+from gensig.options.configuration import Configuration
+from gensig.record.inputs import InputReader, simulate_motions
 from gensig.record.simulate import Record, simulate_record, simulate_records
-from gensig.systems.lead_in import simulate_with_lead_in
 
 ACCEPTED = 1e-6  # of a record's RMS, where the processor or a library is another
 DECIDING = ("cpu_model", "python", "numpy", "scipy", "numba")  # facts of an environment that bits may depend on
@@ -98,7 +90,7 @@ def reproduce(folder: Path, n_records: int) -> Reproduction:
     )
 
 
-def recorded_row(folder: Path, record: str) -> tuple[dict[str, Any], dict[str, Any]]:
+def recorded_row(folder: Path, record: str) -> tuple[Configuration, dict[str, Any]]:
     """Configuration of a data set and the row of one record, by its number or its id."""
     _, config, plan = _finished(folder)
     ids = plan.columns["record_id"].tolist()
@@ -109,7 +101,7 @@ def recorded_row(folder: Path, record: str) -> tuple[dict[str, Any], dict[str, A
     raise ConfigError(f"--record {record}: {folder} has records 0 to {plan.n_records - 1}, ids {ids[0]} to {ids[-1]}")
 
 
-def simulate_twin(config: Mapping[str, Any], row: Mapping[str, Any]) -> Record:
+def simulate_twin(config: Configuration, row: Mapping[str, Any]) -> Record:
     """The record without its faults: same unit, condition, start and noise, severity zero.
 
     The original less its twin is the residual of the fault, exact but for the rounding of stored samples.
@@ -119,7 +111,7 @@ def simulate_twin(config: Mapping[str, Any], row: Mapping[str, Any]) -> Record:
     SimulationError    where the original or the twin does not stay finite
     """
     original = simulate_record(config, row)
-    sham = {**config, "plan": {**config["plan"], "sham": True}}
+    sham = config.with_keys("plan", sham=True)
     twin = simulate_record(sham, row)
     for record in (original, twin):
         if record.values.get("status") == "failed":
@@ -128,25 +120,22 @@ def simulate_twin(config: Mapping[str, Any], row: Mapping[str, Any]) -> Record:
     sound: dict[str, Any] = {"severity": 0.0, "faults_json": "[]", "fault_gear": "", "fault_tooth": -1}
     if not np.array_equal(signals["noise_power"], original.signals["noise_power"]):
         # noise follows the record, so that the twin alone would have another
-        system = record_system(config, row_values(row))
-        instrument = row_instrument(config, system, row)
-        run = row_run(sham, system, row)
-        healthy = shaken(config, row, run, simulate_with_lead_in([run])[0])
+        inputs = InputReader(sham).inputs(row)
+        (healthy,) = simulate_motions([inputs])
         if isinstance(healthy, SimulationError):
             raise healthy
         signals["noise_power"] = original.signals["noise_power"]
-        clean = row_clean(config, row, instrument, healthy.acceleration)
-        noisy, recorded = row_noisy(config, row, instrument, clean, signals["noise_power"])
+        noisy, conversion = inputs.noisy(inputs.clean(healthy.acceleration), signals["noise_power"])
         signals["acceleration"] = noisy.astype(np.float32)
-        sound |= recorded
+        sound |= conversion
     return Record(signals=signals, values={**twin.values, **sound})
 
 
-def _finished(folder: Path) -> tuple[Manifest, dict[str, Any], Plan]:
+def _finished(folder: Path) -> tuple[Manifest, Configuration, Plan]:
     manifest, config = joined_folder(folder)
     if not manifest.is_complete:
         raise DatasetError(f"{folder} is incomplete; run `gensig resume {folder}` first")
-    return manifest, config, read_plan(folder / PLAN)
+    return manifest, Configuration(config), read_plan(folder / PLAN)
 
 
 def _difference(folder: Path, row: Mapping[str, Any], record: Record) -> tuple[float, float]:

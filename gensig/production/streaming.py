@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import json
 import operator
 from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass, replace
@@ -17,8 +16,9 @@ from gensig.dataset.splitting.protocols import make_splits, why_left_out
 from gensig.dataset.splitting.splits import SUBSETS
 from gensig.dynamics._vector import n_lanes
 from gensig.errors import ConfigError, DatasetError
-from gensig.plan.make import check_switches, make_plan
-from gensig.record.inputs import read_seed, whole_number
+from gensig.options.configuration import Configuration, whole_number
+from gensig.plan.make import make_plan
+from gensig.record.options import read_dataset_options
 from gensig.record.simulate import Record, simulate_records
 
 EPOCH_STREAM = 9100  # spawn key of the seeds of later epochs; the causes of a record and the splits have others
@@ -33,7 +33,7 @@ class RecordStream:
 
     Attributes
     ----------
-    config : dict               the composed configuration, with the root seed
+    config : Configuration      as composed, with the root seed
     epoch : int                 0 for the records of ``generate``, else a draw of as many others
     plan : Plan                 all records of the epoch
     numbers : (record,) int     records of this part, by their number in the plan
@@ -43,7 +43,7 @@ class RecordStream:
     are different gears.
     """
 
-    config: dict[str, Any]
+    config: Configuration
     epoch: int
     plan: Plan
     numbers: NDArray[np.int64]
@@ -51,7 +51,7 @@ class RecordStream:
     @property
     def seed(self) -> int:
         """The seed with which ``gensig generate`` makes this epoch."""
-        return epoch_seed(read_seed(self.config), self.epoch)
+        return epoch_seed(self.config.seed, self.epoch)
 
     @property
     def class_names(self) -> list[str]:
@@ -163,17 +163,17 @@ class RecordStream:
         return _simulate(_at_epoch(self.config, self.epoch), rows)
 
 
-def open_stream(config: Mapping[str, Any], *, epoch: int = 0) -> RecordStream:
+def open_stream(config: Configuration, *, epoch: int = 0) -> RecordStream:
     """All records of a composed configuration; ``out``, ``executor`` and how samples are stored change nothing.
 
     Raises
     ------
     GensigError    for whatever ``make_plan`` refuses
     """
-    plain: dict[str, Any] = {**json.loads(json.dumps(dict(config))), "out": None}
-    check_switches(plain)
-    plan = make_plan(_at_epoch(plain, epoch))
-    return RecordStream(config=plain, epoch=epoch, plan=plan, numbers=np.arange(plan.n_records))
+    config = config.with_entries(out=None)
+    read_dataset_options(config)  # refuses what no data set has
+    plan = make_plan(_at_epoch(config, epoch))
+    return RecordStream(config=config, epoch=epoch, plan=plan, numbers=np.arange(plan.n_records))
 
 
 def epoch_seed(seed: int, epoch: int) -> int:
@@ -184,11 +184,11 @@ def epoch_seed(seed: int, epoch: int) -> int:
     return int(sequence.generate_state(1, np.uint64)[0]) >> 11
 
 
-def _at_epoch(config: Mapping[str, Any], epoch: int) -> dict[str, Any]:
-    return {**config, "seed": epoch_seed(read_seed(config), epoch)}
+def _at_epoch(config: Configuration, epoch: int) -> Configuration:
+    return config.with_entries(seed=epoch_seed(config.seed, epoch))
 
 
-def _simulate(config: Mapping[str, Any], rows: Sequence[Mapping[str, Any]]) -> list[Record]:
+def _simulate(config: Configuration, rows: Sequence[Mapping[str, Any]]) -> list[Record]:
     """Records of some rows of a plan: the one place where this module simulates."""
     return [_as_stored(record) for record in simulate_records(config, rows)]
 

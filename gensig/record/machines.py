@@ -2,21 +2,19 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping
-from typing import Any
-
+from gensig.options.configuration import Configuration
 from gensig.systems.pair_machine import PairMachine
-from gensig.systems.registry import LINE, read_system, section
+from gensig.systems.registry import LINE, read_system
 
 
-def read_machine(config: Mapping[str, Any]) -> PairMachine:
+def read_machine(config: Configuration) -> PairMachine:
     """Build what ``system.kind`` names.
 
     Raises
     ------
     ConfigError, GeometryError    for keys or values that make no machine
     """
-    if section(config, "system").get("kind") != LINE:
+    if config.section("system").get("kind") != LINE:
         return read_system(config)
     from gensig.driveline.machine import (
         read_line_machine,

@@ -1,24 +1,22 @@
-"""The depth of wear from which a machine shakes too much: clean records of it, its flanks worn as a life wears them."""
+"""Depth of wear at which the vibration of a machine reaches a limit, from clean records of worn flanks."""
 
 from __future__ import annotations
 
 import json
-from collections.abc import Mapping, Sequence
+from collections.abc import Sequence
 from dataclasses import dataclass, replace
-from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
 
 from gensig.errors import ConfigError, SimulationError
-from gensig.faults.registry import fault_parts
+from gensig.faults.registry import fault_parts, read_faults
 from gensig.life.options import WearOptions
 from gensig.life.wear.wear_case import WearCase
 from gensig.life.wear.wear_life import WearLife, wear_life
-from gensig.record.inputs import row_instrument, row_run, shaken
-from gensig.record.machines import read_machine
+from gensig.options.configuration import Configuration
+from gensig.record.inputs import InputReader, RecordInputs, simulate_motions
 from gensig.sensing.chain import power
-from gensig.systems.lead_in import simulate_with_lead_in
 from gensig.systems.pair_machine import PairMachine
 from gensig.systems.wear import wear_fault
 from gensig.units import channel_unit
@@ -34,6 +32,7 @@ ROW = {
     "start_tooth_pinion": 0,
     "start_tooth_wheel": 0,
     "start_phase": 0.0,
+    "faults_json": "[]",
 }
 N_LOOKS = 17  # at equal shares of the life to the threshold, new flanks and its end among them
 MOST_STEPS = 10  # further records between the first look that is at the limit and the one before
@@ -67,34 +66,42 @@ class WornVibration:
 
 @dataclass(frozen=True, slots=True, kw_only=True, eq=False)
 class _Bench:
-    """The machine of a configuration, asked how it shakes with flanks worn so far."""
+    """Measures the vibration of a sound machine whose flanks are worn to given depths."""
 
-    config: Mapping[str, Any]
-    machine: PairMachine
+    sound: RecordInputs
     case: WearCase
 
     @property
+    def machine(self) -> PairMachine:
+        """The machine that is measured."""
+        return self.sound.machine
+
+    @property
     def heard(self) -> list[int]:
-        """Places of the sensors that tell m/s2."""
-        return [k for k, name in enumerate(self.machine.sensing.channel_names) if channel_unit(name) == "m/s^2"]
+        """Numbers of the sensors that give m/s2."""
+        names = self.machine.sensing.channel_names
+        return [sensor for sensor, name in enumerate(names) if channel_unit(name) == "m/s^2"]
 
     def rms(self, depths: Sequence[Array]) -> Array:
         """RMS of clean records with (2, slice, node) m off the flanks, (depth, sensor) m/s2; NaN for failed ones."""
-        found = np.full((len(depths), len(self.heard)), np.nan)
-        rows = [
-            {**ROW, "faults_json": json.dumps(fault_parts(wear_fault(self.case, depth)) if depth.any() else [])}
-            for depth in depths
-        ]
-        runs = [replace(row_run(self.config, self.machine, row), tell_mesh=False) for row in rows]
-        for k, (run, result) in enumerate(zip(runs, simulate_with_lead_in(runs), strict=True)):
-            record = shaken(self.config, ROW, run, result)
-            if not isinstance(record, SimulationError):
-                measured = row_instrument(self.config, self.machine, ROW).measure(record.acceleration)
-                found[k] = np.sqrt(power(measured[self.heard]))
-        return found
+        levels = np.full((len(depths), len(self.heard)), np.nan)
+        motions = simulate_motions([self._worn_by(depth) for depth in depths])
+        for k, motion in enumerate(motions):
+            if not isinstance(motion, SimulationError):
+                measured = self.sound.instrument.measure(motion.acceleration)
+                levels[k] = np.sqrt(power(measured[self.heard]))
+        return levels
+
+    def _worn_by(self, depth: Array) -> RecordInputs:
+        """The same record with flanks worn to a depth; its fault passes through text as those of a plan do."""
+        if not depth.any():
+            return self.sound
+        parts = json.loads(json.dumps(fault_parts(wear_fault(self.case, depth))))
+        faults = [fault for part in parts for fault in read_faults(part, "faults_json")]
+        return replace(self.sound, run=replace(self.sound.run, faults=tuple(faults)))
 
 
-def limited_by_vibration(case: WearCase, config: Mapping[str, Any]) -> tuple[WearCase, WornVibration | None]:
+def limited_by_vibration(case: WearCase, config: Configuration) -> tuple[WearCase, WornVibration | None]:
     """A case whose threshold is the depth at which the machine of its configuration reaches a limit of vibration.
 
     The case as it was, and None, where ``wear`` sets no such limit; the case as it was where the life to its threshold
@@ -148,14 +155,15 @@ def limited_by_vibration(case: WearCase, config: Mapping[str, Any]) -> tuple[Wea
     return replace(case, options=replace(options, threshold=limit_depth)), course
 
 
-def _bench(case: WearCase, config: Mapping[str, Any]) -> _Bench:
-    sound = {**config, "plan": {**config["plan"], "sham": False}}
-    machine = read_machine(sound)
-    machine.check()
-    bench = _Bench(config=sound, machine=machine, case=case)
+def _bench(case: WearCase, config: Configuration) -> _Bench:
+    config = config.with_keys("plan", sham=False)
+    config = config.with_keys("dataset", store_mesh_state=False)
+    sound = InputReader(config).inputs(ROW)
+    sound.machine.check()
+    bench = _Bench(sound=sound, case=case)
     if not bench.heard:
         raise ConfigError(
-            f"sensing.channels = {list(machine.sensing.channels)}: a limit of the vibration is in m/s2; name an "
+            f"sensing.channels = {list(bench.machine.sensing.channels)}: a limit of the vibration is in m/s2; name an "
             "acceleration, such as pinion_y"
         )
     return bench

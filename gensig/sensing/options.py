@@ -6,6 +6,7 @@ from collections.abc import Mapping
 from typing import Any
 
 from gensig.errors import ConfigError
+from gensig.options.configuration import Section
 from gensig.sensing.accelerometer import Accelerometer
 from gensig.sensing.chain import Sensing
 from gensig.sensing.encoder import Encoder
@@ -21,7 +22,7 @@ PATHS: dict[str, type[ModalPath] | type[MeasuredPath]] = {"modal": ModalPath, "m
 NESTED = ("path", "sensor", "noise", "nuisances", "tacho", "encoder")
 
 
-def read_sensing(values: Mapping[str, Any]) -> Sensing:
+def read_sensing(values: Section) -> Sensing:
     """Sensing of the boundary keys of a configuration.
 
     Raises

@@ -15,6 +15,7 @@ from gensig.mesh.modification import FlankModification, PairModification, sound_
 from gensig.mesh.options import read_mesh_options, read_slice_options
 from gensig.mesh.thermal.heat import Heat
 from gensig.operation.options import read_operating
+from gensig.options.configuration import Configuration, Section
 from gensig.sensing.manufacturing import Quality
 from gensig.sensing.options import read_sensing
 from gensig.systems.helical_pair import HelicalPair
@@ -39,10 +40,10 @@ LINE = "shaft_line"
 SYSTEM_KEYS = ("kind", "supports", "motor", "load")
 
 
-def read_spur_pair(config: Mapping[str, Any]) -> SpurPair:
+def read_spur_pair(config: Configuration) -> SpurPair:
     """Build a spur pair from the boundary keys of a configuration."""
     modification = read_modification(config)
-    gear = section(config, "gear")
+    gear = config.section("gear")
     if _number("gear.helix_angle_deg", gear["helix_angle_deg"]) != 0.0:
         raise ConfigError(
             f"gear.helix_angle_deg = {gear['helix_angle_deg']:g}: system=spur_pair takes spur gears, 0; helical ones "
@@ -60,28 +61,28 @@ def read_spur_pair(config: Mapping[str, Any]) -> SpurPair:
     return SpurPair(pair=pair, modification=modification, **machine)
 
 
-def read_helical_pair(config: Mapping[str, Any]) -> HelicalPair:
+def read_helical_pair(config: Configuration) -> HelicalPair:
     """Build a helical pair, or a spur pair in slices, from the boundary keys of a configuration."""
     flanks = read_sliced_pair(config)
     machine = _read_machine(config, flanks.pair)
     bodies = {
-        name: held_axially(machine[name], getattr(flanks.pair, name), section(config, "gear", name)) for name in SIDES
+        name: held_axially(machine[name], getattr(flanks.pair, name), config.section("gear", name)) for name in SIDES
     }
     return HelicalPair(pair=flanks.pair, flanks=flanks, **{**machine, **bodies})
 
 
-def _read_machine(config: Mapping[str, Any], pair: GearPair) -> dict[str, Any]:
+def _read_machine(config: Configuration, pair: GearPair) -> dict[str, Any]:
     """What a pair's machine has whatever its teeth, by the fields of ``PairMachine``."""
     material = read_material(config)
-    sides = {name: section(config, "gear", name) for name in SIDES}
-    machine = section(config, "system")
+    sides = {name: config.section("gear", name) for name in SIDES}
+    machine = config.section("system")
     for key in machine:
         if key not in SYSTEM_KEYS:
             raise ConfigError(f"system: unknown key '{key}'; known: {', '.join(SYSTEM_KEYS)}")
     gears = {"pinion": pair.pinion, "wheel": pair.wheel}
     operating, quality = (
-        read_operating(section(config, "operating")),
-        read(Quality, section(config, "quality"), "quality"),
+        read_operating(config.section("operating")),
+        read(Quality, config.section("quality"), "quality"),
     )
     bodies = {name: _read_body(gears[name], sides[name], material) for name in SIDES}
     held = {name: read_holding(gears[name], sides[name]) for name in SIDES}
@@ -90,19 +91,19 @@ def _read_machine(config: Mapping[str, Any], pair: GearPair) -> dict[str, Any]:
         bodies = {name: put_on_bearings(bodies[name], gears[name], held[name], material, force) for name in SIDES}
     return {
         "material": material,
-        "mesh": read_mesh_options(section(config, "mesh")),
+        "mesh": read_mesh_options(config.section("mesh")),
         "pinion": bodies["pinion"],
         "wheel": bodies["wheel"],
         "operating": operating,
-        "sensing": read_sensing(section(config, "sensing")),
+        "sensing": read_sensing(config.section("sensing")),
         "quality": quality,
-        "solver": read(Solver, section(config, "solver"), "solver"),
+        "solver": read(Solver, config.section("solver"), "solver"),
         "motor": _read_rotor("system.motor", machine.get("motor")),
         "load": _read_rotor("system.load", machine.get("load")),
     }
 
 
-def read_sliced_pair(config: Mapping[str, Any]) -> SlicedPair:
+def read_sliced_pair(config: Configuration) -> SlicedPair:
     """Build a spur or helical pair cut into slices from the boundary keys of a configuration, whatever its system; as
     hot as its ``heat`` makes it."""
     _refuse_line(config)
@@ -110,73 +111,73 @@ def read_sliced_pair(config: Mapping[str, Any]) -> SlicedPair:
     return as_configured(read_duty(config)) if heat.is_any else read_cold_pair(config)
 
 
-def read_duty(config: Mapping[str, Any]) -> Duty:
+def read_duty(config: Configuration) -> Duty:
     """The cold pair of a configuration with what heats and cools it."""
-    speed = _number("operating.speed_rpm", section(config, "operating")["speed_rpm"])
+    speed = _number("operating.speed_rpm", config.section("operating")["speed_rpm"])
     return Duty(system=read_cold_pair(config), heat=read_heat(config), speed=speed)
 
 
-def read_cold_pair(config: Mapping[str, Any]) -> SlicedPair:
+def read_cold_pair(config: Configuration) -> SlicedPair:
     """The same pair as it is drawn."""
-    mesh = section(config, "mesh")
+    mesh = config.section("mesh")
     return SlicedPair(
         pair=read_pair(config),
         material=read_material(config),
         mesh=read_mesh_options(mesh),
         slices=read_slice_options(mesh),
         modification=read_modification(config),
-        torque=_number("operating.torque_nm", section(config, "operating")["torque_nm"]),
+        torque=_number("operating.torque_nm", config.section("operating")["torque_nm"]),
     )
 
 
-def read_pair(config: Mapping[str, Any]) -> GearPair:
+def read_pair(config: Configuration) -> GearPair:
     """The two gears of a configuration; a wheel has the opposite hand unless it says otherwise."""
-    gear = section(config, "gear")
+    gear = config.section("gear")
     helix = _number("gear.helix_angle_deg", gear["helix_angle_deg"])
     pinion, wheel = (_read_gear(name, gear, hand * helix) for name, hand in zip(SIDES, (1.0, -1.0), strict=True))
     return GearPair(pinion=pinion, wheel=wheel, backlash=_number("gear.backlash_um", gear["backlash_um"]))
 
 
-def read_material(config: Mapping[str, Any]) -> Material:
+def read_material(config: Configuration) -> Material:
     """The material of a configuration."""
-    material = read(Material, section(config, "material"), "material")
+    material = read(Material, config.section("material"), "material")
     if material.poisson_ratio >= 0.5:
         raise ConfigError(f"material.poisson_ratio = {material.poisson_ratio:g} must be below 0.5")
     return material
 
 
-def read_heat(config: Mapping[str, Any]) -> Heat:
+def read_heat(config: Configuration) -> Heat:
     """Which effects of heat a configuration has, and what they take."""
-    return read(Heat, section(config, "heat"), "heat")
+    return read(Heat, config.section("heat"), "heat")
 
 
-def read_modification(config: Mapping[str, Any]) -> PairModification:
+def read_modification(config: Configuration) -> PairModification:
     """What is ground off the flanks of a configuration's gears."""
     sides = {}
     for name in SIDES:
         try:
-            sides[name] = read(FlankModification, section(config, "modification", name), f"modification.{name}")
+            sides[name] = read(FlankModification, config.section("modification", name), f"modification.{name}")
         except ConfigError as error:
             text = str(error)
             raise ConfigError(text if text.startswith("modification") else f"modification.{name}.{text}") from None
-    own = {key: value for key, value in section(config, "modification").items() if key not in SIDES}
+    own = {key: value for key, value in config.section("modification").items() if key not in SIDES}
     return read(PairModification, own, "modification", **sides)
 
 
-SYSTEMS: dict[str, Callable[[Mapping[str, Any]], PairMachine]] = {
+SYSTEMS: dict[str, Callable[[Configuration], PairMachine]] = {
     "spur_pair": read_spur_pair,
     SLICED: read_helical_pair,
 }
 
 
-def read_system(config: Mapping[str, Any]) -> PairMachine:
+def read_system(config: Configuration) -> PairMachine:
     """Build the system that ``system.kind`` names.
 
     Raises
     ------
     ConfigError, GeometryError    for keys or values that make no machine
     """
-    kind = section(config, "system").get("kind")
+    kind = config.section("system").get("kind")
     _refuse_line(config)
     if config.get("excitation") is not None:
         raise ConfigError(
@@ -188,9 +189,9 @@ def read_system(config: Mapping[str, Any]) -> PairMachine:
     return SYSTEMS[kind](config)
 
 
-def _refuse_line(config: Mapping[str, Any]) -> None:
+def _refuse_line(config: Configuration) -> None:
     """Raise for a drive line where a single pair is wanted."""
-    machine = section(config, "system")
+    machine = config.section("system")
     if machine.get("kind") == LINE:
         raise ConfigError(
             f"system={machine.get('name')} is a drive line from tables, for gensig modes, forced-response, stiffness, "
@@ -198,24 +199,13 @@ def _refuse_line(config: Mapping[str, Any]) -> None:
         )
 
 
-def section(config: Mapping[str, Any], *path: str) -> Mapping[str, Any]:
-    """A group of keys of the configuration; ConfigError where there is none."""
-    node: Any = config
-    for name in path:
-        node = node.get(name)
-        if not isinstance(node, Mapping):
-            place = ".".join(path)
-            raise ConfigError(f"{place} = {node!r} must be a group of keys; choose an option or leave it alone")
-    return node
-
-
-def _read_gear(name: str, gear: Mapping[str, Any], helix_angle: float) -> Gear:
-    own = {key: value for key, value in section({"gear": gear}, "gear", name).items() if key not in BODY_KEYS}
+def _read_gear(name: str, gear: Section, helix_angle: float) -> Gear:
+    own = gear.section(name).without(*BODY_KEYS)
     given = {} if "helix_angle_deg" in own else {"helix_angle": helix_angle}
     return read(Gear, {**{key: gear[key] for key in COMMON_GEAR_KEYS}, **own}, f"gear.{name}", name=name, **given)
 
 
-def _read_body(gear: Gear, values: Mapping[str, Any], material: Material) -> Body:
+def _read_body(gear: Gear, values: Section, material: Material) -> Body:
     """Mass and inertia as given, or those of a solid disc on the pitch circle less the bore where null."""
     derived = solid_disc(gear.pitch_radius, gear.bore_radius, gear.face_width, material.density_kg_per_m3)
     given = [values["mass_kg"], values["inertia_kg_m2"]]
@@ -226,11 +216,8 @@ def _read_body(gear: Gear, values: Mapping[str, Any], material: Material) -> Bod
     for key, value in (("mass_kg", mass), ("inertia_kg_m2", inertia)):
         if not value > 0.0:
             raise ConfigError(f"gear.{gear.name}.{key} = {value:g} must be positive, or null to derive it")
-    try:
-        given_support = {key: value for key, value in section(values, "support").items() if value is not None}
-        support = read(Support, given_support, "support")
-    except ConfigError as error:
-        raise ConfigError(f"gear.{gear.name}.{error}") from None
+    given_support = {key: value for key, value in values.section("support").items() if value is not None}
+    support = read(Support, given_support, f"gear.{gear.name}.support")
     return Body(mass=mass, inertia=inertia, support=support)
 
 

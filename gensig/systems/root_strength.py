@@ -3,10 +3,8 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Mapping
 from dataclasses import dataclass, replace
 from functools import cached_property
-from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
@@ -25,8 +23,9 @@ from gensig.life.root.root_stress import (
 from gensig.life.root.strength import Safety, Strength, safety
 from gensig.mesh.load_distribution import loaded_pair_table, pair_states, static_mesh
 from gensig.mesh.sliced.slices import loaded_contact
+from gensig.options.configuration import Configuration
 from gensig.sensing.manufacturing import Quality
-from gensig.systems.registry import SLICED, read_sliced_pair, read_system, section
+from gensig.systems.registry import SLICED, read_sliced_pair, read_system
 from gensig.systems.sliced_pair import SlicedPair
 from gensig.units import read
 
@@ -211,20 +210,20 @@ class RootStrength:
         return roll.ravel(), (share / share.sum(axis=1, keepdims=True)).ravel(), stress
 
 
-def read_root_strength(config: Mapping[str, Any]) -> RootStrength:
+def read_root_strength(config: Configuration) -> RootStrength:
     """Pair and strength from the boundary keys of a configuration.
 
     Raises
     ------
     ConfigError, GeometryError    for keys or values that make no machine or no strength
     """
-    sliced = section(config, "system").get("kind") == SLICED
+    sliced = config.section("system").get("kind") == SLICED
     if not sliced:
         read_system(config)  # refuses what a spur pair cannot have
     flanks = read_sliced_pair(config)
     return RootStrength(
         flanks=flanks,
         sliced=sliced or flanks.pair.pinion.helix_angle != 0.0,
-        strength=read(Strength, section(config, "strength"), "strength"),
-        grade=read(Quality, section(config, "quality"), "quality").iso1328_grade,
+        strength=read(Strength, config.section("strength"), "strength"),
+        grade=read(Quality, config.section("quality"), "quality").iso1328_grade,
     )

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Mapping
+from collections.abc import Sequence
 from typing import Any
 
 import numpy as np
@@ -32,36 +32,36 @@ def gear_angle(system: PairMachine, shaft: str, start: Start, shaft_angle: Array
 
 
 def shaft_signals(
-    switches: Mapping[str, Any],
+    names: Sequence[str],
     system: PairMachine,
     start: Start,
     record: CleanRecord | None,
     gearbox_rng: np.random.Generator,
     record_rng: np.random.Generator,
 ) -> dict[str, NDArray[Any]]:
-    """Tachometer, encoder and shaft angle as far as ``dataset`` asks for them; NaN for a record that failed.
+    """Signals of tachometer, encoder and shaft angle; NaN for a record that failed.
 
     Parameters
     ----------
+    names : signals that are stored, of the values of ``SWITCHES``
     gearbox_rng : where mark and disc sit, and the disc's errors
     record_rng : the jitter
     """
     sensing = system.sensing
-    asked = [name for key, name in SWITCHES.items() if switches[key]]
     n_samples = round(system.operating.duration * sensing.sampling_rate)
-    if record is None or not asked:
-        return {name: np.full(n_samples, np.nan).astype(_type(name)) for name in asked}
+    if record is None or not names:
+        return {name: np.full(n_samples, np.nan).astype(_type(name)) for name in names}
     mark = draw_mark(gearbox_rng)  # also where it is not asked for: what is stored moves nothing
     found = {"shaft_angle": record.shaft_angle}
-    if "tacho" in asked:
+    if "tacho" in names:
         angle = gear_angle(system, sensing.tacho.shaft, start, record.shaft_angle)
         found["tacho"] = pulse_train(sensing.tacho, mark, angle, sensing.sampling_rate, record_rng)
-    if "encoder_angle" in asked:
+    if "encoder_angle" in names:
         angle = gear_angle(system, sensing.encoder.shaft, start, record.shaft_angle)
         disc = draw_disc(gearbox_rng, sensing.encoder)
         before = 2.0 * math.pi * math.floor((angle[0] - disc.index) / (2.0 * math.pi))  # turns that nobody counted
         found["encoder_angle"] = disc.read(angle - before, quantised=sensing.encoder.quantised)
-    return {name: found[name].astype(_type(name)) for name in asked}
+    return {name: found[name].astype(_type(name)) for name in names}
 
 
 def _type(name: str) -> type[np.floating[Any]]:

@@ -13,6 +13,7 @@ from gensig.dynamics.pair import Body
 from gensig.errors import ConfigError
 from gensig.geometry.gear import Gear
 from gensig.material import Material
+from gensig.options.configuration import Section
 from gensig.sensing.manufacturing import Gearbox, Quality
 from gensig.units import from_si, read, to_si
 
@@ -35,7 +36,7 @@ class Holding:
     shaft: Shaft | None
 
 
-def read_holding(gear: Gear, values: Mapping[str, Any]) -> Holding:
+def read_holding(gear: Gear, values: Section) -> Holding:
     """Bearing and shaft of the boundary keys of one gear; a shaft whose diameter is null fills the bore.
 
     Raises
@@ -88,7 +89,7 @@ def put_on_bearings(body: Body, gear: Gear, holding: Holding, material: Material
     return replace(body, support=held)
 
 
-def held_axially(body: Body, gear: Gear, values: Mapping[str, Any]) -> Body:
+def held_axially(body: Body, gear: Gear, values: Section) -> Body:
     """A gear that also moves along its axis and tilts; what its source does not say of that follows from the rest.
 
     Tilting is held by half of the mean radial stiffness at either end of ``shaft.span_mm``, k span^2 / 4, the axis by

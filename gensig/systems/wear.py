@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping
 from dataclasses import replace
 from typing import Any
 
@@ -13,14 +12,15 @@ from gensig.errors import ConfigError
 from gensig.faults.registry import read_faults
 from gensig.life.options import read_wear_options
 from gensig.life.wear.wear_case import WearCase, wear_case
-from gensig.systems.registry import SIDES, read_sliced_pair, section
+from gensig.options.configuration import Configuration
+from gensig.systems.registry import SIDES, read_sliced_pair
 
 Array = NDArray[np.float64]
 
 N_PROFILE = 65  # depths along the flank that a fault of kind wear is given
 
 
-def read_wear_case(config: Mapping[str, Any]) -> WearCase:
+def read_wear_case(config: Configuration) -> WearCase:
     """Build the wear of a spur or helical pair from the boundary keys of a configuration.
 
     Raises
@@ -32,7 +32,7 @@ def read_wear_case(config: Mapping[str, Any]) -> WearCase:
     system = read_sliced_pair(config)
     if system.pair.pinion.helix_angle == 0.0 and not system.modification.is_any:  # all slices are alike
         system = replace(system, slices=replace(system.slices, n_slices=1))
-    return wear_case(system.sliced_mesh(), system.material, read_wear_options(section(config, "wear")), system.torque)
+    return wear_case(system.sliced_mesh(), system.material, read_wear_options(config.section("wear")), system.torque)
 
 
 def wear_fault(case: WearCase, depth: Array) -> dict[str, Any]:

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Sequence
 from dataclasses import dataclass
 from typing import Any
 
@@ -10,6 +10,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from gensig.errors import SimulationError
+from gensig.options.configuration import Configuration
 from gensig.plan.make import make_plan
 from gensig.record.simulate import simulate_records
 from gensig.sensing.agreement import third_octave_bands, third_octave_power
@@ -68,7 +69,7 @@ def held_out_duration(held_out: Recording, fitted: Recording) -> float:
     return min(LONGEST, held_out.duration, fitted.duration)
 
 
-def check(config: Mapping[str, Any], held_out: Recording, motion: Motion, fitted: Recording, teeth: Teeth) -> Check:
+def check(config: Configuration, held_out: Recording, motion: Motion, fitted: Recording, teeth: Teeth) -> Check:
     """Simulate healthy records of the twin and compare.
 
     Parameters
@@ -104,16 +105,15 @@ def check(config: Mapping[str, Any], held_out: Recording, motion: Motion, fitted
     )
 
 
-def _healthy_records(config: Mapping[str, Any]) -> tuple[Sequence[Array], Sequence[Array]]:
+def _healthy_records(config: Configuration) -> tuple[Sequence[Array], Sequence[Array]]:
     """Accelerations (sensor, sample) and shaft angles (sample,) of healthy records, each of another set of gears."""
     plan: dict[str, Any] = {
         "n_records": N_RECORDS, "n_units": N_RECORDS, "n_gearboxes": 1, "conditions_per_unit": None, "n_repeats": 1,
         "classes": ["healthy"], "design": "latin_hypercube", "vary": {}, "sham": False,
     }  # fmt: skip
     unused = dict.fromkeys(("store_mesh_state", "store_detectability", "store_healthy_twin"), False)
-    dataset = {**config["dataset"], **unused, "store_shaft_angle": True}
-    whole = {**config, "plan": plan, "dataset": dataset}
-    whole["classes"] = {"healthy": {"kind": "healthy", "vary": {}}}
+    whole = config.with_entries(plan=plan, classes={"healthy": {"kind": "healthy", "vary": {}}})
+    whole = whole.with_keys("dataset", **unused, store_shaft_angle=True)
     drawn = make_plan(whole)
     records = simulate_records(whole, [drawn.record(place) for place in range(N_RECORDS)])
     failed = [record.values["status_reason"] for record in records if record.values.get("status") == "failed"]

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-from copy import deepcopy
 from dataclasses import dataclass, replace
 from functools import lru_cache
 from typing import Any
@@ -20,6 +19,7 @@ from gensig.geometry.gear import Gear
 from gensig.material import Material
 from gensig.mesh.pair_table import PairTable, pair_table
 from gensig.options.compose import compose
+from gensig.options.configuration import Configuration
 from gensig.systems.registry import read_spur_pair
 from gensig.systems.spur_pair import SpurPair
 
@@ -100,7 +100,7 @@ def _read_machine(overrides: tuple[str, ...]) -> SpurPair:
     keys = [word.partition("=")[0] for word in overrides]
     if not all("." in key and not key.startswith("gear.rated_") for key in keys):
         return read_spur_pair(compose("generate", overrides))  # groups, and values that others are made of
-    values = deepcopy(_default_machine())
+    values = _default_machine().plain()
     for key, word in zip(keys, overrides, strict=True):
         *groups, last = key.split(".")
         place: dict[str, Any] = values
@@ -109,11 +109,11 @@ def _read_machine(overrides: tuple[str, ...]) -> SpurPair:
         if last not in place:
             raise ConfigError(f"'{word}': the machine has no key '{key}'")
         place[last] = yaml.safe_load(word.partition("=")[2])
-    return read_spur_pair(values)
+    return read_spur_pair(Configuration(values))
 
 
 @lru_cache(maxsize=1)
-def _default_machine() -> dict[str, Any]:
+def _default_machine() -> Configuration:
     return compose("generate")
 
 
@@ -128,7 +128,7 @@ def _whole_load_table(case: Case) -> PairTable:
 
 @lru_cache(maxsize=8)
 def _fault_option(name: str) -> dict[str, Any]:
-    option: dict[str, Any] = compose("generate", [f"fault={name}"])["fault"]
+    option: dict[str, Any] = compose("generate", [f"fault={name}"])["fault"].plain()
     return {key: value for key, value in option.items() if key != "vary"}
 
 

@@ -105,7 +105,7 @@ def test_leads_are_those_of_the_sliced_pair(config_with, lead, share):
     """Mean deflection of both models of one pair; the spur table is a secant, the slices bear one by one."""
     config = config_with()
     spur = relieved(read_system(config), **lead)
-    sliced = read_system({**config, "system": {**config["system"], "kind": "helical_pair"}})
+    sliced = read_system(config.with_keys("system", kind="helical_pair"))
     sliced = replace(sliced, flanks=replace(sliced.flanks, modification=spur.modification))
     roll = spur.pair.base_pitch * (np.arange(64) + 0.5) / 64
     table, slices = spur.mesh_table(), sliced.mesh_table()

@@ -1,6 +1,5 @@
 """Data sets of whole lives: planned from laws, split by lives, the same whatever their shards."""
 
-import copy
 import json
 
 import numpy as np
@@ -14,6 +13,7 @@ from gensig.dataset.schema import LIFE_COLUMNS
 from gensig.dataset.splitting.protocols import make_splits
 from gensig.dataset.splitting.split_check import split_problems
 from gensig.errors import ConfigError
+from gensig.options.configuration import Configuration
 from gensig.plan.make import make_plan
 from gensig.plan.request import read_request
 from gensig.record.simulate import simulate_records
@@ -181,14 +181,14 @@ def lived():
     ],
 )
 def test_what_makes_no_lives_is_refused_in_one_line(lived, key, value, said):
-    config = copy.deepcopy(lived)
+    config = lived.plain()
     *parents, leaf = key.split(".")
     node = config
     for name in parents:
         node = node[name]
     node[leaf] = value
     with pytest.raises(ConfigError, match=said) as caught:
-        make_plan(config)
+        make_plan(Configuration(config))
     assert "\n" not in str(caught.value)
 
 

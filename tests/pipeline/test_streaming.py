@@ -178,7 +178,7 @@ def test_mistakes_are_one_line(words: tuple[str, ...], message: str) -> None:
 )
 def test_values_that_generate_refuses_are_refused(config_with, changes, message: str) -> None:
     with pytest.raises(ConfigError, match=message):
-        open_stream({**config_with(changes), "classes": {}})
+        open_stream(config_with(changes).with_entries(classes={}))
 
 
 def test_parts_and_epochs_that_do_not_exist_are_refused(stream) -> None:

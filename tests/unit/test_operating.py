@@ -15,7 +15,7 @@ from gensig.errors import ConfigError
 from gensig.operation.courses import MOST_POINTS, Profile
 from gensig.operation.options import read_profile
 from gensig.plan.request import read_request
-from gensig.record.inputs import record_system
+from gensig.record.inputs import InputReader
 from gensig.systems.registry import read_system
 
 POINTS = ((-0.2, 0.5), (0.3, 0.8), (0.7, 1.0), (1.0, 0.25))
@@ -118,7 +118,9 @@ class TestConfiguration:
 
     def test_a_drawn_speed_scales_the_profile(self, config_with):
         config = config_with({"operating.speed_profile": [[0, 0.5], [1, 1]]})
-        slow, fast = (record_system(config, {"operating.speed_rpm": speed}).operating for speed in (600.0, 1200.0))
+        slow, fast = (
+            InputReader(config).machine({"operating.speed_rpm": speed}).operating for speed in (600.0, 1200.0)
+        )
         times = np.array([-0.3, 0.5, 2.0])
         assert_allclose(slow.nominal(times).speed, 20 * math.pi * np.array([0.5, 0.75, 1.0]), rtol=1e-12, atol=0)
         assert_allclose(fast.nominal(times).angle, 2 * slow.nominal(times).angle, rtol=1e-12, atol=0)

@@ -4,7 +4,6 @@ from __future__ import annotations
 
 import sys
 from argparse import Namespace
-from collections.abc import Mapping
 from pathlib import Path
 from typing import Any
 
@@ -13,9 +12,10 @@ import numpy as np
 from gensig.commands.console import one_line_warnings
 from gensig.commands.gears.heat_report import heat_content, heat_report, print_heat
 from gensig.commands.output import check_outputs, highest, write_outputs
-from gensig.commands.request import read_watched
+from gensig.commands.request import read_configuration
 from gensig.errors import ConfigError
 from gensig.faults.registry import read_faults
+from gensig.options.configuration import Configuration
 from gensig.systems.registry import read_sliced_pair
 from gensig.systems.sliced_pair import SlicedPair, TransmissionError
 
@@ -26,7 +26,7 @@ LEAST_SHARE = 0.05  # of the highest stiffness of a pair; less is one slice that
 def transmission_error(arguments: Namespace) -> int:
     """Static transmission error under load over one mesh period: JSON, a figure, or a summary."""
     check_outputs(arguments)
-    config = read_watched(arguments)
+    config = read_configuration(arguments)
     with one_line_warnings("gensig"):
         system, faults = read_sliced_pair(config), read_faults(config["fault"])
         sound = system.transmission_error()
@@ -94,7 +94,7 @@ def transmission_error_content(system: SlicedPair, result: TransmissionError) ->
     }
 
 
-def sliced_stiffness(config: Mapping[str, Any], arguments: Namespace) -> int:
+def sliced_stiffness(config: Configuration, arguments: Namespace) -> int:
     """``gensig stiffness`` of a pair cut into slices: curves to JSON, a figure, or a summary."""
     with one_line_warnings("gensig"):
         system, faults = read_sliced_pair(config), read_faults(config["fault"])
@@ -150,7 +150,7 @@ def sliced_stiffness(config: Mapping[str, Any], arguments: Namespace) -> int:
     return 0
 
 
-def sound_pair(config: Mapping[str, Any]) -> SlicedPair:
+def sound_pair(config: Configuration) -> SlicedPair:
     """The pair of a configuration, for those who look at sound flanks only."""
     if read_faults(config["fault"]):
         raise ConfigError(

@@ -2,12 +2,12 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping
 from dataclasses import dataclass
 from typing import Any
 
 import numpy as np
 
+from gensig.options.configuration import Configuration
 from gensig.systems.hot_pair import (
     APPARENT,
     COLD,
@@ -41,7 +41,7 @@ class HeatReport:
     variants: dict[str, Variant]
 
 
-def heat_report(config: Mapping[str, Any]) -> HeatReport | None:
+def heat_report(config: Configuration) -> HeatReport | None:
     """Temperatures and stiffness of a configuration's pair; None where nothing is hot."""
     duty = read_duty(config)
     if not duty.heat.is_any:

@@ -12,7 +12,7 @@ from typing import Any
 from gensig.commands.console import one_line_warnings
 from gensig.commands.gears.flanks import sound_pair
 from gensig.commands.output import check_outputs, option_file, write_option, write_outputs
-from gensig.commands.request import read_watched
+from gensig.commands.request import read_configuration
 from gensig.errors import ConfigError
 from gensig.mesh.modification import FlankModification, PairModification
 from gensig.systems.flank_optimum import Cases, Optimum, judge, optimise
@@ -28,7 +28,7 @@ def modify_flank(arguments: Namespace) -> int:
         raise ConfigError(f"--points {arguments.points}: give 1 for the least ripple alone, 3 or more for a front")
     check_outputs(arguments)
     target = option_file(arguments.out, GROUP, force=arguments.force)
-    config = read_watched(arguments)
+    config = read_configuration(arguments)
     with one_line_warnings("gensig"):
         system = sound_pair(config)
         given = system.modification.misalignment

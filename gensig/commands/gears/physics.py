@@ -12,10 +12,11 @@ from numpy.typing import NDArray
 
 from gensig.commands.console import replaced_file
 from gensig.commands.output import FIGURE_TYPES, check_file, check_new, check_outputs, highest, write_outputs
-from gensig.commands.request import read_watched
+from gensig.commands.request import read_configuration
 from gensig.errors import ConfigError
 from gensig.faults.registry import read_faults, without_vary
 from gensig.mesh.pair_table import PairTable
+from gensig.options.configuration import Configuration
 from gensig.plan.request import read_request
 from gensig.record.machines import read_machine
 from gensig.systems.pair_machine import PairMachine
@@ -36,7 +37,7 @@ RECORD_TYPES = (".h5", ".hdf5", ".csv")
 def stiffness(arguments: Namespace) -> int:
     """Mesh stiffness of a gear pair: curves to JSON, a figure, or a summary."""
     check_outputs(arguments)
-    config = read_watched(arguments)
+    config = read_configuration(arguments)
     if config["system"].get("kind") == SLICED:
         from gensig.commands.gears.flanks import sliced_stiffness
 
@@ -139,8 +140,8 @@ def simulate(arguments: Namespace) -> int:
     config = request.config
     name = config["fault"]["kind"]
     one: dict[str, Any] = {"n_records": 1, "n_units": 1, "n_gearboxes": 1, "conditions_per_unit": None, "n_repeats": 1}
-    config["plan"] = {**config["plan"], **one, "classes": [name], "design": "latin_hypercube", "vary": {}}
-    config["classes"] = {name: without_vary(config["fault"])}
+    config = config.with_keys("plan", **one, classes=[name], design="latin_hypercube", vary={})
+    config = config.with_entries(classes={name: without_vary(config["fault"])})
     row = make_plan(config).record(0)
     return _show(config, simulate_record(config, row), arguments)
 
@@ -160,7 +161,7 @@ def _simulate_again(arguments: Namespace) -> int:
     return _show(config, record, arguments, name)
 
 
-def _show(config: dict[str, Any], record: Record, arguments: Namespace, name: str | None = None) -> int:
+def _show(config: Configuration, record: Record, arguments: Namespace, name: str | None = None) -> int:
     """Write, plot and describe one record, by its class and severity where it has no other name."""
     if record.values.get("status") == "failed":
         print(f"gensig: {record.values['status_reason']}", file=sys.stderr)
@@ -178,7 +179,7 @@ def _show(config: dict[str, Any], record: Record, arguments: Namespace, name: st
     return 0
 
 
-def _write_record(config: dict[str, Any], system: PairMachine, record: Record, output: str) -> None:
+def _write_record(config: Configuration, system: PairMachine, record: Record, output: str) -> None:
     """One record as a shard of one row, or as a table with time and channels."""
     path = Path(output)
     if path.suffix != ".csv":

@@ -10,7 +10,7 @@ from typing import Any
 import numpy as np
 
 from gensig.commands.output import check_outputs, write_outputs
-from gensig.commands.request import read_watched
+from gensig.commands.request import read_configuration
 from gensig.errors import ConfigError
 from gensig.faults.registry import read_faults
 from gensig.life.root.strength import reliability
@@ -20,7 +20,7 @@ from gensig.systems.root_strength import GearStress, RootHistory, RootStrength, 
 def root_stress(arguments: Namespace) -> int:
     """Root stress over the mesh, at ISO's load point, and safety factors: JSON, a figure, or a summary."""
     check_outputs(arguments)
-    config = read_watched(arguments)
+    config = read_configuration(arguments)
     if read_faults(config["fault"]):
         raise ConfigError(
             f"fault={config['fault']['kind']}: root stress is that of sound teeth here; take fault=healthy, and gensig "

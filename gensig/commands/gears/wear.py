@@ -16,7 +16,7 @@ from numpy.typing import NDArray
 
 from gensig.commands.console import one_line_warnings
 from gensig.commands.output import check_outputs, option_file, write_option, write_outputs
-from gensig.commands.request import read_watched
+from gensig.commands.request import read_configuration
 from gensig.errors import ConfigError, SimulationError
 from gensig.life.life_laws import FittedLaw, LifeMap, fitted_laws, life_map, torque_exponent
 from gensig.life.options import SIDES, WearOptions
@@ -25,7 +25,6 @@ from gensig.life.wear.wear_case import WearCase
 from gensig.life.wear.wear_life import WearLife, hours, wear_life
 from gensig.operation.options import read_operating
 from gensig.record.vibration_limit import WornVibration, limited_by_vibration
-from gensig.systems.registry import section
 from gensig.systems.wear import read_wear_case, wear_fault
 
 Array = NDArray[np.float64]
@@ -39,10 +38,10 @@ def wear_life_verb(arguments: Namespace) -> int:
     """Life and wear to JSON, a figure, an option for records, or a summary."""
     check_outputs(arguments)
     target = None if arguments.out is None else option_file(arguments.out, GROUP, force=arguments.force)
-    config = read_watched(arguments)
+    config = read_configuration(arguments)
     with one_line_warnings("gensig"):
         case = read_wear_case(config)
-        speed = read_operating(section(config, "operating")).speed
+        speed = read_operating(config.section("operating")).speed
         if case.pair.transverse_contact_ratio < 1.0:
             _warn_of_interruption(case)
         case, vibration = limited_by_vibration(case, config)

@@ -16,6 +16,7 @@ from gensig.driveline.sweep import Sweep, SweepWay, sweep_response
 from gensig.driveline.time_root_stress import typical_largest
 from gensig.errors import ConfigError
 from gensig.life.root.strength import RELIABILITY, reliability
+from gensig.options.configuration import Configuration
 from gensig.units import from_si, to_si
 
 LONGEST_TIME = 60.0  # s
@@ -24,7 +25,7 @@ WITHOUT = "_without_dampers"
 
 
 def simulate_time(
-    line: EngineLine, config: Mapping[str, Any], torques: LineTorques, nodes: Sequence[int], duration: float
+    line: EngineLine, config: Configuration, torques: LineTorques, nodes: Sequence[int], duration: float
 ) -> TimeResponse:
     """An operating point integrated in time, its spur meshes by tables of their teeth."""
     if not 0.0 < duration <= LONGEST_TIME:
@@ -36,7 +37,7 @@ def simulate_time(
 
 def simulate_sweep(
     line: EngineLine,
-    config: Mapping[str, Any],
+    config: Configuration,
     nodes: Sequence[int],
     given: Sequence[float],
     torque: float,
@@ -55,9 +56,9 @@ def simulate_sweep(
     return sweep_response(line, low, high, seconds, torque, own=own, nodes=nodes, n_orders=n_orders)
 
 
-def without_dampers(config: Mapping[str, Any]) -> EngineLine:
+def without_dampers(config: Configuration) -> EngineLine:
     """The engine of a configuration without its ``system.dampers``."""
-    return read_engine_line({**config, "system": {**config["system"], "dampers": []}})
+    return read_engine_line(config.with_keys("system", dampers=[]))
 
 
 def time_content(response: TimeResponse) -> dict[str, Any]:

@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 from argparse import Namespace
-from collections.abc import Mapping
 from dataclasses import replace
 from pathlib import Path
 from typing import Any
@@ -23,7 +22,7 @@ from gensig.commands.lines.engine_in_time import (
 )
 from gensig.commands.lines.results import ResponseResult
 from gensig.commands.output import check_outputs, plain, write_outputs
-from gensig.commands.request import read_watched
+from gensig.commands.request import read_configuration
 from gensig.driveline.engine_dampers import (
     DynamicRootStress,
     dynamic_root_stress,
@@ -42,6 +41,7 @@ from gensig.driveline.linear.forced import (
 )
 from gensig.driveline.time_root_stress import root_stress_in_time
 from gensig.errors import ConfigError
+from gensig.options.configuration import Configuration
 from gensig.units import from_si, to_si
 
 CYCLE_POINTS = 5760
@@ -52,7 +52,7 @@ RUN_ORDERS = 80  # half orders of a run: up to order 40
 def forced_response(arguments: Namespace) -> int:
     """Speed fluctuation, spectra and tooth forces: JSON, a figure, or a summary."""
     check_outputs(arguments)
-    config = read_watched(arguments)
+    config = read_configuration(arguments)
     line = read_engine_line(config)
     found = _find(line, arguments, config["seed"])
     if (arguments.time, arguments.sweep) != (None, None) and line.engine.pressure_decides_torque:
@@ -126,7 +126,7 @@ def response_content(line: EngineLine, found: ResponseResult) -> dict[str, Any]:
 
 
 def _roots(
-    line: EngineLine, config: Mapping[str, Any], found: ResponseResult, duration: float | None
+    line: EngineLine, config: Configuration, found: ResponseResult, duration: float | None
 ) -> dict[str, DynamicRootStress]:
     """Root stress of the mesh asked for, without the dampers too where there are any."""
     mesh = found.mesh

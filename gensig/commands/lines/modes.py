@@ -10,12 +10,13 @@ from typing import Any
 import numpy as np
 
 from gensig.commands.output import check_outputs, write_outputs
-from gensig.commands.request import read_watched
+from gensig.commands.request import read_configuration
 from gensig.driveline.drive_line import DriveLine, drive_line_of_pair, read_drive_line
 from gensig.driveline.linear.modal import Modes
 from gensig.errors import ConfigError
 from gensig.faults.registry import read_faults
-from gensig.systems.registry import LINE, read_system, section
+from gensig.options.configuration import Configuration
+from gensig.systems.registry import LINE, read_system
 
 SHOWN = 12  # modes in the summary
 
@@ -23,7 +24,7 @@ SHOWN = 12  # modes in the summary
 def modes(arguments: Namespace) -> int:
     """Natural frequencies, damping ratios, shapes and energy shares: JSON, a figure, or a summary."""
     check_outputs(arguments)
-    config = read_watched(arguments)
+    config = read_configuration(arguments)
     line = read_line(config)
     found = line.modes()
     content = modes_content(line, found)
@@ -38,13 +39,13 @@ def modes(arguments: Namespace) -> int:
     return 0
 
 
-def read_line(config: Mapping[str, Any]) -> DriveLine:
+def read_line(config: Configuration) -> DriveLine:
     """The drive line of a configuration; a single pair is one of two nodes, or more with a motor and a load."""
     if read_faults(config["fault"]):
         raise ConfigError(
             f"fault={config['fault']['kind']}: modes are those of sound teeth at mean stiffness; take fault=healthy"
         )
-    kind = section(config, "system").get("kind")
+    kind = config.section("system").get("kind")
     if kind == LINE:
         return read_drive_line(config)
     return drive_line_of_pair(read_system(config), str(kind))

@@ -15,7 +15,7 @@ from numpy.typing import NDArray
 from gensig.commands.lines.forced_response import MOST_SPEEDS
 from gensig.commands.lines.results import DamperState
 from gensig.commands.output import check_outputs, option_file, write_option, write_outputs
-from gensig.commands.request import read_watched
+from gensig.commands.request import read_configuration
 from gensig.driveline.engine_dampers import (
     dynamic_root_stress,
     mesh_between,
@@ -40,7 +40,7 @@ def tune_damper(arguments: Namespace) -> int:
     """Search, write the line with its dampers as an option of the group ``system``, print both states."""
     check_outputs(arguments)
     target = option_file(arguments.out, GROUP, force=arguments.force)
-    config = read_watched(arguments)
+    config = read_configuration(arguments)
     line = read_engine_line(config)
     if line.engine.pressure_decides_torque:
         raise ConfigError("excitation.pressure.file is of one operating point; tune-damper runs over a range of speeds")

@@ -11,6 +11,7 @@ from gensig.dynamics.bearing_sizes import BearingSize, bearing_for
 from gensig.errors import ConfigError, GensigError
 from gensig.geometry.contact import GearPair
 from gensig.life.root.root_stress import root_factors
+from gensig.options.configuration import Configuration
 from gensig.plan.request import read_request
 from gensig.systems.pair_machine import PairMachine
 from gensig.systems.registry import SIDES, read_pair, read_system
@@ -166,7 +167,7 @@ def gear_option(sheet: DataSheet) -> GearOption:
             "bearing": _bearing(bearings[index]),
             "shaft": {"diameter_mm": None, "span_mm": span},
         }
-    center_distance = read_pair({"gear": gear}).center_distance * 1e3
+    center_distance = read_pair(Configuration({"gear": gear})).center_distance * 1e3
     gear["backlash_um"] = least_backlash(center_distance, sheet.module)
     held = read_system(_config(sheet, gear, on_bearings=sheet.supports is None))
     for index, side in enumerate(SIDES):
@@ -233,19 +234,13 @@ def _bearing(size: BearingSize) -> dict[str, Any]:
     }
 
 
-def _config(sheet: DataSheet, gear: Mapping[str, Any], *, on_bearings: bool) -> dict[str, Any]:
+def _config(sheet: DataSheet, gear: Mapping[str, Any], *, on_bearings: bool) -> Configuration:
     config = read_request(["system=helical_pair"] if sheet.is_helical else []).config
-    return {
-        **config,
-        "gear": gear,
-        "system": {**config["system"], "supports": "bearings" if on_bearings else "as_given"},
-        "operating": {**config["operating"], "speed_rpm": sheet.speed, "torque_nm": sheet.torque},
-        "quality": {
-            **config["quality"],
-            "support_damping_ratio_low": DAMPING_RATIO,
-            "support_damping_ratio_high": DAMPING_RATIO,
-        },
-    }
+    config = config.with_entries(gear=gear)
+    config = config.with_keys("system", supports="bearings" if on_bearings else "as_given")
+    config = config.with_keys("operating", speed_rpm=sheet.speed, torque_nm=sheet.torque)
+    limits = {"support_damping_ratio_low": DAMPING_RATIO, "support_damping_ratio_high": DAMPING_RATIO}
+    return config.with_keys("quality", **limits)
 
 
 def _short(value: float) -> float:

@@ -11,6 +11,7 @@ from typing import Any
 from gensig.commands.new.data_sheet import GearOption
 from gensig.dynamics.decimation import usable_band
 from gensig.errors import ConfigError
+from gensig.options.configuration import Configuration
 from gensig.plan.request import read_request
 
 PLAIN, REALISTIC = "plain", "realistic"
@@ -222,5 +223,5 @@ def _plan(option: GearOption, wishes: Wishes, classes: list[str], n_records: int
     ]
 
 
-def _realistic() -> dict[str, Any]:
+def _realistic() -> Configuration:
     return read_request([f"experiment={REALISTIC}"]).config

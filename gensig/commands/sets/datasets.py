@@ -7,7 +7,7 @@ import time
 from argparse import Namespace
 from collections.abc import Sequence
 from pathlib import Path
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING
 
 import yaml
 
@@ -22,6 +22,7 @@ from gensig.dataset.folder.verify import verify as verify_folder
 from gensig.dataset.storage.atomic import read_text
 from gensig.errors import ConfigError
 from gensig.options.compose import job_folders, override_keys, sweep
+from gensig.options.configuration import Configuration
 from gensig.plan.request import Request, read_request
 
 if TYPE_CHECKING:
@@ -102,7 +103,7 @@ def _generate_share(executor: Executor, arguments: Namespace) -> int:
     return 0
 
 
-def _asked(out: Path, overrides: Sequence[str], config_dir: str | None = None) -> dict[str, Any] | None:
+def _asked(out: Path, overrides: Sequence[str], config_dir: str | None = None) -> Configuration | None:
     """The configuration that a folder's own words and those typed now make; None where they ask for no other bits."""
     words = [word for word in overrides if not _is_free(word)]
     if not words:
@@ -150,7 +151,7 @@ def resume(arguments: Namespace) -> int:
     asked = _asked(out, arguments.overrides)
     if manifest.is_complete:
         if asked is not None:
-            joined_folder(out, asked=asked)
+            joined_folder(out, asked=asked.plain())
         _say_failed(out, manifest.n_failed, manifest.n_records)
         print(f"{out} is complete: {manifest.n_records} records")
         return 1 if manifest.n_failed else 0

@@ -9,6 +9,7 @@ from pathlib import Path
 from typing import Any
 
 from gensig.errors import ConfigError
+from gensig.options.configuration import Configuration
 from gensig.plan.request import read_request
 from gensig.signals.mesh_motion import Teeth
 from gensig.signals.recording import Recording
@@ -117,7 +118,7 @@ def _gear(arguments: Namespace, name: str) -> tuple[dict[str, Any], dict[str, st
             f"gear.{side}.inertia_kg_m2": "null",
         }
     words = [f"{key}={value}" for key, value in own.items() if key not in typed]
-    gear = read_request([*words, *arguments.overrides]).config["gear"]
+    gear = read_request([*words, *arguments.overrides]).config["gear"].plain()
     return gear, _remarks(gear, typed, arguments.module is not None)
 
 
@@ -144,7 +145,7 @@ def _torque(arguments: Namespace, gear: dict[str, Any]) -> tuple[float, str]:
     """Torque as given, or that at which the teeth are loaded as those of the default machine are."""
     if arguments.torque is not None:
         return float(arguments.torque), "given"
-    default = read_request([]).config["gear"]
+    default = read_request([]).config["gear"].plain()
 
     def size(one: dict[str, Any]) -> float:
         return float(one["pinion"]["n_teeth"] * one["normal_module_mm"] ** 2 * one["pinion"]["face_width_mm"])
@@ -153,7 +154,6 @@ def _torque(arguments: Namespace, gear: dict[str, Any]) -> tuple[float, str]:
     return torque, "assumed: tooth load over module and face width as the default machine has it"
 
 
-def _config(gear: dict[str, Any], torque: float, speed: float) -> dict[str, Any]:
-    config = read_request([]).config
-    operating = {**config["operating"], "torque_nm": torque, "speed_rpm": speed}
-    return {**config, "gear": gear, "operating": operating}
+def _config(gear: dict[str, Any], torque: float, speed: float) -> Configuration:
+    config = read_request([]).config.with_entries(gear=gear)
+    return config.with_keys("operating", torque_nm=torque, speed_rpm=speed)

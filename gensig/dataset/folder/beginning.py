@@ -4,7 +4,6 @@ import hashlib
 from collections.abc import Sequence
 from contextlib import suppress
 from pathlib import Path
-from typing import Any
 
 import yaml
 
@@ -16,6 +15,7 @@ from gensig.dataset.folder.layout import (
     PLAN,
     SHARDS,
     SPLITS,
+    ConfigContent,
     Manifest,
     ShardEntry,
     read_manifest,
@@ -32,7 +32,7 @@ from gensig.errors import DatasetError
 def create_folder(
     out: Path,
     *,
-    config: dict[str, Any],
+    config: ConfigContent,
     overrides: Sequence[str],
     plan: Plan,
     identity: str,

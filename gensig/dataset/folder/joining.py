@@ -2,11 +2,9 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping
 from pathlib import Path
-from typing import Any
 
-from gensig.dataset.folder.layout import CONFIG, PLAN, Manifest, read_config, read_manifest
+from gensig.dataset.folder.layout import CONFIG, PLAN, ConfigContent, Manifest, read_config, read_manifest
 from gensig.dataset.folder.manifest import differing_keys, identity_hash
 from gensig.dataset.storage.atomic import sha256_file
 from gensig.dataset.storage.compression import creation_options
@@ -14,7 +12,7 @@ from gensig.errors import DatasetError
 from gensig.version import __version__
 
 
-def joined_folder(out: Path, *, asked: Mapping[str, Any] | None = None) -> tuple[Manifest, dict[str, Any]]:
+def joined_folder(out: Path, *, asked: ConfigContent | None = None) -> tuple[Manifest, ConfigContent]:
     """Manifest and configuration of a folder that this gensig may add shards to.
 
     Parameters

@@ -44,6 +44,11 @@ def shard_path(folder: Path, index: int) -> Path:
     return folder / SHARDS / shard_name(index)
 
 
+# Content of config.yaml: nested mappings, lists, text, numbers, booleans and null. It is a stranger's
+# data until `gensig.options.configuration.Configuration` takes it.
+ConfigContent = dict[str, Any]
+
+
 @dataclass(frozen=True, slots=True, kw_only=True)
 class ShardEntry:
     """One shard in the manifest; `sha256`, `bytes` and `n_failed` mean something once `state` is 'done'."""
@@ -78,7 +83,7 @@ class Manifest:
     state: str = "incomplete"
     shards: tuple[ShardEntry, ...]
     files: dict[str, str]
-    configuration: dict[str, Any] = field(default_factory=dict)
+    configuration: ConfigContent = field(default_factory=dict)
     environment: dict[str, Any] = field(default_factory=dict)
 
     @property
@@ -209,7 +214,7 @@ def shard_entry(index: int, content: Any) -> ShardEntry:
     return entry
 
 
-def read_config(folder: Path) -> dict[str, Any]:
+def read_config(folder: Path) -> ConfigContent:
     """`config.yaml` as plain data: no tags, no interpolation, no aliases; DatasetError when it is anything else."""
     path = Path(folder) / CONFIG
     text = read_text(path, limit=CONFIG_BYTES_LIMIT)

@@ -15,6 +15,7 @@ from gensig.dataset.folder.layout import (
     INDEX,
     SHARDS,
     SPLITS,
+    ConfigContent,
     Manifest,
     ShardEntry,
     manifest_text,
@@ -45,7 +46,7 @@ NOT_IDENTITY = ("out", "executor", "verbosity")
 RECEIPT_SUFFIX = ".done"
 
 
-def identity_hash(config: dict[str, Any], generator_version: str) -> str:
+def identity_hash(config: ConfigContent, generator_version: str) -> str:
     """sha256 over what decides the bits: the configuration less `NOT_IDENTITY`, schema and generator version.
 
     Raises
@@ -61,21 +62,21 @@ def identity_hash(config: dict[str, Any], generator_version: str) -> str:
     return hashlib.sha256(canonical.encode()).hexdigest()
 
 
-def deciding(config: dict[str, Any]) -> dict[str, Any]:
+def deciding(config: ConfigContent) -> dict[str, Any]:
     """The part of a configuration that decides bits, as plain data of its own."""
     return {key: value for key, value in plain_data(config).items() if key not in NOT_IDENTITY}
 
 
-def differing_keys(one: Mapping[str, Any], other: Mapping[str, Any]) -> list[str]:
+def differing_keys(one: ConfigContent, other: ConfigContent) -> list[str]:
     """Dotted keys that decide bits and whose values differ between two configurations, in order."""
     ours, theirs = _leaves(one), _leaves(other)
     absent = object()
     return [key for key in sorted({*ours, *theirs}) if repr(ours.get(key, absent)) != repr(theirs.get(key, absent))]
 
 
-def _leaves(config: Mapping[str, Any], prefix: str = "") -> dict[str, Any]:
+def _leaves(content: Mapping[str, Any], prefix: str = "") -> dict[str, Any]:
     leaves: dict[str, Any] = {}
-    for key, value in config.items():
+    for key, value in content.items():
         if not prefix and key in NOT_IDENTITY:
             continue
         if isinstance(value, Mapping) and value:
@@ -181,7 +182,7 @@ def file_digests(folder: Path, manifest: Manifest) -> Iterator[tuple[str, str, s
         yield name, recorded, sha256_file(path) if inside else ""
 
 
-def plain_data(config: dict[str, Any]) -> dict[str, Any]:
+def plain_data(config: ConfigContent) -> dict[str, Any]:
     """A copy made of JSON's types only, sharing nothing with the original."""
     try:
         return json.loads(json.dumps(config))

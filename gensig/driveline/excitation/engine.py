@@ -13,6 +13,7 @@ from gensig.driveline.excitation.injection_pump import Plunger
 from gensig.driveline.excitation.line_torques import Load, Reference
 from gensig.driveline.excitation.pressure import PressureFile, WiebeCycle
 from gensig.errors import ConfigError
+from gensig.options.configuration import Section
 from gensig.sensing.toothed_wheel import ToothedWheel
 from gensig.units import read, to_si
 
@@ -35,7 +36,7 @@ KEYS = (
 )
 
 
-def read_engine(values: Mapping[str, Any]) -> Engine:
+def read_engine(values: Section) -> Engine:
     """An engine of the boundary keys of the group ``excitation``.
 
     Raises
@@ -78,7 +79,7 @@ def read_engine(values: Mapping[str, Any]) -> Engine:
     )
 
 
-def read_wheels(values: Mapping[str, Any]) -> dict[str, ToothedWheel]:
+def read_wheels(values: Section) -> dict[str, ToothedWheel]:
     """The toothed wheels of the group ``excitation``, by their names; none where it is null."""
     check_group(PLACE, values)
     return {
@@ -146,7 +147,7 @@ def _whole_numbers(key: str, values: Any) -> tuple[int, ...]:
     return tuple(values)
 
 
-def _number(key: str, values: Mapping[str, Any]) -> float:
+def _number(key: str, values: Section) -> float:
     value = values[key]
     if isinstance(value, bool) or not isinstance(value, int | float):
         raise ConfigError(f"{PLACE}.{key} = {value!r} is not a number")

@@ -2,9 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping
 from dataclasses import dataclass
-from typing import Any
 
 from gensig.driveline.drive_line import DriveLine
 from gensig.driveline.excitation.engine import KEYS as ENGINE_KEYS
@@ -12,6 +10,7 @@ from gensig.driveline.excitation.engine import PLACE, check_group, named_groups,
 from gensig.driveline.excitation.line_torques import Load, Reference
 from gensig.driveline.excitation.motor_torques import MotorDrive, TorqueRipple
 from gensig.errors import ConfigError
+from gensig.options.configuration import Section
 from gensig.units import read
 
 KIND = "motor_and_load"
@@ -34,7 +33,7 @@ class _Load:
     law: str
 
 
-def read_motor(values: Mapping[str, Any], drive: DriveLine) -> MotorDrive:
+def read_motor(values: Section, drive: DriveLine) -> MotorDrive:
     """A motor and its load on the nodes that ``system.motor_node`` and ``system.load_node`` name.
 
     Raises

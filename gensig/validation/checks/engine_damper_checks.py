@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Callable, Mapping
+from collections.abc import Callable
 from dataclasses import dataclass
 from functools import cached_property, lru_cache
 from typing import Any
@@ -26,6 +26,7 @@ from gensig.driveline.linear.forced import (
     run_of_speeds,
 )
 from gensig.options.compose import compose
+from gensig.options.configuration import Configuration
 
 DamperCheck = Callable[["DamperCase", str], float]
 
@@ -46,7 +47,7 @@ def read_damper_case(overrides: tuple[str, ...]) -> DamperCase:
 class DamperCase:
     """An engine on its line with what dampers it has, at the reference point of its excitation."""
 
-    config: Mapping[str, Any]
+    config: Configuration
     line: EngineLine
     overrides: tuple[str, ...]
 

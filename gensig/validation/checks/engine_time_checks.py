@@ -7,7 +7,7 @@ cent. So all are medians over the cycles or shares of the time, and ``docs/valid
 from __future__ import annotations
 
 import math
-from collections.abc import Callable, Mapping
+from collections.abc import Callable
 from dataclasses import dataclass
 from functools import cached_property, lru_cache
 from typing import Any
@@ -26,6 +26,7 @@ from gensig.driveline.engine_line import EngineLine, read_engine_line
 from gensig.driveline.in_time import TimeResponse, own_meshes, time_response
 from gensig.driveline.time_root_stress import root_stress_in_time, typical_largest
 from gensig.options.compose import compose
+from gensig.options.configuration import Configuration
 
 Array = NDArray[np.float64]
 TimeCheck = Callable[["TimeCase", str], float]
@@ -46,7 +47,7 @@ def read_time_case(overrides: tuple[str, ...]) -> TimeCase:
 class TimeCase:
     """An engine on its line in time at the reference point of its excitation."""
 
-    config: Mapping[str, Any]
+    config: Configuration
     line: EngineLine
     overrides: tuple[str, ...]
 

@@ -33,7 +33,7 @@ def train(config, tmp_path):
         for name, lines in (("line.csv", rows), ("gears.csv", gears)):
             (tmp_path / name).write_text("\n".join(lines), encoding="utf-8")
         files = {"shafting_csv": str(tmp_path / "line.csv"), "gears_csv": str(tmp_path / "gears.csv")}
-        return read_drive_line({**config, "system": {**config["system"], **files}})
+        return read_drive_line(config.with_keys("system", **files))
 
     return make
 

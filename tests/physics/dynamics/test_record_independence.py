@@ -1,7 +1,5 @@
 """A record depends on its own row only; noise depends on the healthy twin, and leaves the physics alone."""
 
-import copy
-
 import numpy as np
 import pytest
 from numpy.testing import assert_allclose
@@ -9,6 +7,7 @@ from numpy.testing import assert_allclose
 from gensig.plan.make import make_plan
 from gensig.plan.request import read_request
 from gensig.record import simulate as records
+from gensig.record.inputs import InputReader
 from gensig.record.simulate import simulate_record, simulate_records
 
 ORDER = (5, 0, 3, 6, 1, 7, 2, 4)
@@ -17,9 +16,7 @@ ORDER = (5, 0, 3, 6, 1, 7, 2, 4)
 @pytest.fixture(scope="module")
 def config():
     request = read_request(["experiment=quickstart", "plan.n_records=8", "plan.n_units=2", "operating.duration_s=0.05"])
-    values = copy.deepcopy(request.config)
-    values["dataset"]["store_clean"] = True
-    return values
+    return request.config.with_keys("dataset", store_clean=True)
 
 
 @pytest.fixture(scope="module")
@@ -92,14 +89,12 @@ class TestNoise:
         assert np.abs(floors[0] / floors[1] - 1).max() > 0.01
 
     def test_a_floor_that_follows_the_record_would_tell_the_class(self, config, plan):
-        own = copy.deepcopy(config)
-        own["sensing"]["snr_reference"] = "record"
+        own = config.with_keys("sensing", snr_reference="record")
         floors = np.array([found.signals["noise_power"] for found in simulated(own, plan, range(4)).values()])
         assert np.abs(floors / floors[0] - 1).max() > 0.05
 
     def test_achieved_signal_to_noise_ratio(self, config, plan):
-        own = copy.deepcopy(config)
-        own["operating"]["duration_s"] = 0.5
+        own = config.with_keys("operating", duration_s=0.5)
         row = {**plan.record(0), "params/sensing.snr_db": 12.0, "snr_db": 12.0, "label": 0, "faults_json": "[]"}
         found = simulate_record(own, row)
         noise = found.signals["acceleration"].astype(float) - found.signals["acceleration_clean"]
@@ -109,16 +104,14 @@ class TestNoise:
         assert_allclose(10 * np.log10(ratio).mean(), 12.0, rtol=0, atol=0.1)
 
     def test_no_noise_is_the_clean_signal(self, config, plan):
-        own = copy.deepcopy(config)
-        own["sensing"]["snr_db"] = None
+        own = config.with_keys("sensing", snr_db=None)
         row = {key: value for key, value in plan.record(1).items() if key != "params/sensing.snr_db"}
         found = simulate_record(own, row)
         assert found.signals["acceleration"].tobytes() == found.signals["acceleration_clean"].tobytes()
 
 
 def test_a_sham_record_is_healthy_under_its_label(config, plan, in_order):
-    sham = copy.deepcopy(config)
-    sham["plan"]["sham"] = True
+    sham = config.with_keys("plan", sham=True)
     index = next(k for k in range(8) if plan.record(k)["label_name"] == "missing_tooth")
     found, real = simulate_record(sham, plan.record(index)), in_order[index]
     assert found.signals["fault_multihot"].tolist() == real.signals["fault_multihot"].tolist()
@@ -133,8 +126,7 @@ def test_values_of_a_record(config, plan, in_order):
 
 
 def test_a_run_that_cannot_be_is_a_failed_record(config, plan):
-    coarse = copy.deepcopy(config)
-    coarse["solver"]["oversampling"], coarse["sensing"]["sampling_rate_hz"] = 2, 6_000
+    coarse = config.with_keys("solver", oversampling=2).with_keys("sensing", sampling_rate_hz=6_000)
     found = simulate_record(coarse, plan.record(0))
     assert found.values["status"] == "failed"
     assert "solver.oversampling" in found.values["status_reason"]
@@ -145,7 +137,7 @@ def test_a_specimen_is_the_same_whatever_its_record_is_told_to_have(config, plan
     """Gears of a unit have one set of deviations: sound or faulty, and of the healthy twin."""
     drawn = {}
     for row in (plan.record(index) for index in range(8)):
-        run = records.row_run(config, records.record_system(config, records.row_values(row)), row)
+        run = InputReader(config).inputs(row).run
         assert len(run.specimen.forms) == 2
         drawn.setdefault(row["specimen_id"], set()).add(repr(run.specimen))
     assert all(len(some) == 1 for some in drawn.values())

@@ -8,14 +8,14 @@ import pytest
 from numpy.testing import assert_allclose
 
 import gensig
-import gensig.production.fault_pairs
+import gensig.record.inputs
 from diagnose.cli import main
 from diagnose.detectability.figure import detectability_figure, fault_text
 from diagnose.detectability.maps import best_and_worst, make_maps, read_bandwidths
 from gensig.errors import GensigError, SimulationError
 from gensig.plan.request import read_request
 from gensig.production.fault_pairs import make_pairs
-from gensig.record.inputs import record_system, row_values, twin_start
+from gensig.record.inputs import InputReader
 from gensig.record.simulate import simulate_record
 
 SMALL = ("operating.duration_s=0.1", "sensing.channels=[pinion_y]")
@@ -74,8 +74,8 @@ def test_it_grows_with_the_root_of_the_duration() -> None:
 def test_it_is_what_a_data_set_stores() -> None:
     pairs = gensig.fault_pairs(*SMALL, "fault=crack", speeds_rpm=[900, 1800], torques_nm=[20], n_units=4)
     row = pairs.rows[4 + 2]
-    config = {**pairs.config, "dataset": {**pairs.config["dataset"], "store_detectability": True}}
-    start = twin_start(config, record_system(config, row_values(row)), row)
+    config = pairs.config.with_keys("dataset", store_detectability=True)
+    start = InputReader(config).inputs(row).healthy_twin().run.start
     begin = {"start_tooth_pinion": start.tooth_pinion, "start_tooth_wheel": start.tooth_wheel}
     record = simulate_record(config, {**row, **begin, "start_phase": start.phase})
     cell = pairs.cell(1)
@@ -143,14 +143,14 @@ def test_without_numbers_the_map_is_about_the_set_point() -> None:
 
 
 def test_a_motion_that_does_not_stay_finite_is_left_out_and_counted(monkeypatch: pytest.MonkeyPatch) -> None:
-    simulate = gensig.production.fault_pairs.simulate_with_lead_in
+    simulate = gensig.record.inputs.simulate_with_lead_in
 
     def one_fails(runs):
         results = simulate(runs)
         results[len(runs) // 2 + 1] = SimulationError("it did not stay finite")  # the second machine with its fault
         return results
 
-    monkeypatch.setattr(gensig.production.fault_pairs, "simulate_with_lead_in", one_fails)
+    monkeypatch.setattr(gensig.record.inputs, "simulate_with_lead_in", one_fails)
     pairs = gensig.fault_pairs(*SMALL, "fault=crack", speeds_rpm=[1800], torques_nm=[20], n_units=5)
     cell = pairs.cell(0)
     assert np.isnan(cell.residual).all(axis=(1, 2)).tolist() == [False, True, False, False, False]

@@ -32,8 +32,8 @@ def recorded_rms(depth, case):
     """RMS of the noiseless record that a data set holds of flanks worn so far."""
     config = config_of("dataset.store_clean=true", "sensing.snr_db=null")
     fault = wear_fault(case, depth)
-    config["plan"] = {**config["plan"], "n_records": 1, "n_units": 1, "n_gearboxes": 1, "classes": ["worn"]}
-    config["classes"] = {"worn": fault}
+    config = config.with_keys("plan", n_records=1, n_units=1, n_gearboxes=1, classes=["worn"])
+    config = config.with_entries(classes={"worn": fault})
     row = {**make_plan(config).record(0), **{key: value for key, value in ROW.items() if key.startswith("start")}}
     clean = simulate_record(config, row).signals["acceleration_clean"]
     return np.std(clean.astype(np.float64), axis=1)
@@ -107,7 +107,7 @@ def test_lives_of_a_data_set_end_at_the_depth_found():
         "operating.duration_s=0.1", "life.horizon_h=5000", "wear.vibration_rise_db=4",
     )  # fmt: skip
     config = read_request(words).config
-    _, vibration = limited_by_vibration(read_wear_case({**config, "fault": {"kind": "healthy"}}), config)
+    _, vibration = limited_by_vibration(read_wear_case(config.with_entries(fault={"kind": "healthy"})), config)
     assert 0.0 < vibration.limit_depth < 99e-6
     plan = make_plan(config)
     assert plan.columns["life_failed"].tolist() == [1] * 6

@@ -71,7 +71,7 @@ def test_a_record_depends_on_its_row_alone_and_a_sham_has_no_fault(folder):
     with h5py.File(folder / "shards" / "shard-00000.h5") as file:
         stored = file["acceleration"][int(faulty["row"])]
     np.testing.assert_array_equal(simulate_record(config, faulty).signals["acceleration"], stored)
-    sham = simulate_record({**config, "plan": {**config["plan"], "sham": True}}, faulty)
+    sham = simulate_record(config.with_keys("plan", sham=True), faulty)
     assert not np.array_equal(sham.signals["acceleration"], stored)
 
 

@@ -1,6 +1,5 @@
 """The healthy twin of every record: nothing in it depends on the fault, and its noise is its own."""
 
-import copy
 from pathlib import Path
 
 import numpy as np
@@ -12,8 +11,8 @@ import gensig
 from gensig.cli import main
 from gensig.plan.make import make_plan
 from gensig.plan.request import read_request
-from gensig.record.inputs import stream
 from gensig.record.simulate import forget_twins, simulate_records
+from gensig.record.streams import Stream, stream
 
 SWITCH = "dataset.store_healthy_twin=true"
 SMALL = (
@@ -27,9 +26,9 @@ REALISTIC = (
 
 
 def records(*overrides: str, sham: bool = False) -> list:
-    config = copy.deepcopy(read_request(list(overrides)).config)
+    config = read_request(list(overrides)).config
     plan = make_plan(config)
-    config["plan"]["sham"] = sham
+    config = config.with_keys("plan", sham=sham)
     forget_twins()
     return simulate_records(config, [plan.record(index) for index in range(plan.n_records)])
 
@@ -96,7 +95,7 @@ def test_a_record_has_the_same_twin_alone_and_among_others(found: list) -> None:
 
 def test_a_twin_that_does_not_stay_finite_fails_its_record(monkeypatch: pytest.MonkeyPatch) -> None:
     from gensig.errors import SimulationError
-    from gensig.record import simulate as module
+    from gensig.record import inputs as module
 
     whole = module.simulate_with_lead_in
 
@@ -152,7 +151,6 @@ def test_a_switch_that_is_none_is_refused(tmp_path: Path, capsys: pytest.Capture
 
 
 def test_its_draws_have_a_stream_of_their_own() -> None:
-    from gensig.record.inputs import Stream
 
     values = [stream(0, cause, 3).random() for cause in Stream]
     assert len(set(values)) == len(Stream) == len(set(Stream))

@@ -1,6 +1,6 @@
 """Nuisances in records: the same for every class of a unit, whatever they are made beside; none changes no bit."""
 
-import copy
+from dataclasses import replace
 
 import numpy as np
 import pytest
@@ -9,7 +9,8 @@ from gensig.errors import ConfigError
 from gensig.plan.make import make_plan
 from gensig.plan.request import read_request
 from gensig.production.reproduction import simulate_twin
-from gensig.record.inputs import record_system, row_run, row_values, shaken
+from gensig.record.inputs import InputReader
+from gensig.record.machines import read_machine
 from gensig.record.simulate import forget_twins, simulate_record, simulate_records
 from gensig.systems.nuisances import with_nuisances
 from gensig.systems.pair_machine import CleanRecord
@@ -24,15 +25,12 @@ def shaking():
     """A machine's nuisances on ideal bearing sensors."""
     listed = read_request(["sensing=machine"]).config["sensing"]["nuisances"]
     config = read_request([*BASE, "sensing=bearing", "dataset.store_detectability=true"]).config
-    config["sensing"]["nuisances"] = listed
-    return config
+    return config.with_keys("sensing", nuisances=listed)
 
 
 @pytest.fixture(scope="module")
 def still(shaking):
-    config = copy.deepcopy(shaking)
-    config["sensing"]["nuisances"] = []
-    return config
+    return shaking.with_keys("sensing", nuisances=[])
 
 
 def rows_of(config):
@@ -56,7 +54,7 @@ def added(one, other):
 
 def test_without_any_a_record_is_the_same_object(still):
     row = rows_of(still)[0]
-    run = row_run(still, record_system(still, row_values(row)), row)
+    run = InputReader(still).inputs(row).run
     record = run.system.simulate(start=run.start, gearbox=run.gearbox)
     rng = np.random.default_rng(0)
     assert with_nuisances(run, record, {"gearbox": rng, "specimen": rng}, rng) is record
@@ -73,24 +71,27 @@ def test_every_record_has_them_before_path_and_sensor(both):
         np.testing.assert_allclose(clean, difference, rtol=0, atol=1e-4 * own.max())
 
 
+def with_nuisances_of(inputs, motion):
+    return with_nuisances(inputs.run, motion, *inputs.nuisance_streams()).acceleration
+
+
 def test_no_class_has_others(shaking):
     """At the same angle of the shaft a faulty machine and a sound one are shaken by the same bits."""
     faulty = next(row for row in rows_of(shaking) if row["label_name"] == "missing_tooth")
-    system = record_system(shaking, row_values(faulty))
+    reader = InputReader(shaking)
+    system = reader.inputs(faulty).machine
     angle = system.operating.speed * np.arange(5120) / system.sensing.sampling_rate
     motion = CleanRecord(acceleration=np.zeros((4, 5120)), shaft_angle=angle, mean_speed=system.operating.speed,
                          contact_loss_fraction=0.0, integration_error=0.0, integration_check="none")  # fmt: skip
     found = []
     for row in (faulty, {**faulty, "faults_json": "[]", "label_name": "healthy"}):
-        run = row_run(shaking, system, row)
-        found.append((bool(run.faults), shaken(shaking, row, run, motion).acceleration))
+        inputs = reader.inputs(row)
+        found.append((bool(inputs.run.faults), with_nuisances_of(inputs, motion)))
     assert [faults for faults, _ in found] == [True, False]
     np.testing.assert_array_equal(found[0][1], found[1][1])
     assert np.all(found[0][1].std(axis=1) > 0.0)
-    other = {**faulty, "gearbox_id": "gearbox-0007"}
-    assert not np.array_equal(
-        shaken(shaking, other, row_run(shaking, system, faulty), motion).acceleration, found[0][1]
-    )
+    other = replace(reader.inputs(faulty), numbers=replace(reader.inputs(faulty).numbers, gearbox=7))
+    assert not np.array_equal(with_nuisances_of(other, motion), found[0][1])
 
 
 def test_bits_do_not_depend_on_what_a_record_is_made_beside(shaking, both):
@@ -124,9 +125,8 @@ def test_what_a_fault_adds_is_told_from_what_the_machine_has_anyway(both):
 
 
 def test_a_part_more_leaves_the_others_alone(shaking, still):
-    fewer, last = copy.deepcopy(shaking), copy.deepcopy(shaking)
-    fewer["sensing"]["nuisances"].pop()
-    last["sensing"]["nuisances"] = last["sensing"]["nuisances"][-1:]
+    nuisances = shaking["sensing"]["nuisances"]
+    fewer = shaking.with_keys("sensing", nuisances=nuisances[:-1])
     row = rows_of(shaking)[0]
     rest = added(made(fewer, [row])[0], made(still, [row])[0])
     whole = added(made(shaking, [row])[0], made(still, [row])[0])
@@ -137,8 +137,7 @@ def test_a_part_more_leaves_the_others_alone(shaking, still):
 
 def test_a_twin_made_later_has_the_nuisances_of_its_record(shaking):
     """Also where its noise is that of the original, not its own."""
-    config = copy.deepcopy(shaking)
-    config["sensing"]["snr_reference"] = "record"
+    config = shaking.with_keys("sensing", snr_reference="record")
     row = rows_of(config)[1]
     twin, original = simulate_twin(config, row), simulate_record(config, row)
     noise = twin.signals["acceleration"].astype(float) - twin.signals["acceleration_clean"]
@@ -158,6 +157,6 @@ def test_the_option_makes_records_through_path_and_sensor():
 
 def test_a_configuration_without_the_key_is_told(config_with):
     config = config_with()
-    del config["sensing"]["nuisances"]
+    config = config.with_entries(sensing=config["sensing"].without("nuisances"))
     with pytest.raises(ConfigError, match="sensing: missing nuisances"):
-        record_system(config, {})
+        read_machine(config)

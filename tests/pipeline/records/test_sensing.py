@@ -9,7 +9,7 @@ from gensig.dataset.reader import open_dataset
 from gensig.plan.make import make_plan
 from gensig.plan.request import read_request
 from gensig.production.streaming import open_stream
-from gensig.record.inputs import record_system, row_instrument, row_values
+from gensig.record.inputs import InputReader
 from gensig.record.simulate import forget_twins, simulate_records
 
 SET = ("sensing=housing", "sensing.channels=[pinion_x,pinion_y,wheel_x,wheel_y]", "operating.duration_s=0.05")
@@ -75,7 +75,7 @@ def test_the_floor_is_the_same_for_all_classes_and_at_the_ratio_asked_for():
         assert {row["label_name"] for row, _ in own} == {"healthy", "missing_tooth"}
         floors, healthy = [], None
         for row, record in own:
-            instrument = row_instrument(config, record_system(config, row_values(row)), row)
+            instrument = InputReader(config).inputs(row).instrument
             noise = record.signals["acceleration"].astype(float) - record.signals["acceleration_clean"]
             floors.append(instrument.power(noise))
             if row["label_name"] == "healthy":

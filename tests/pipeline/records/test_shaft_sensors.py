@@ -11,9 +11,10 @@ from small_sets import make
 from gensig.cli import main
 from gensig.dataset.reader import open_dataset
 from gensig.errors import ConfigError
-from gensig.plan.make import check_switches, make_plan
+from gensig.plan.make import make_plan
 from gensig.plan.request import read_request
-from gensig.record.inputs import record_system, row_values
+from gensig.record.inputs import InputReader
+from gensig.record.options import read_dataset_options
 from gensig.record.simulate import forget_twins, simulate_records
 from gensig.signals.averaging import time_synchronous_average
 from gensig.signals.tacho import pulse_times, resample_by_pulses, speed_of_pulses
@@ -222,7 +223,7 @@ def test_a_file_has_them_and_says_what_they_are(tmp_path, capsys):
 )
 def test_mistakes(word, text):
     with pytest.raises(ConfigError, match=text):
-        check_switches(read_request([word]).config)
+        read_dataset_options(read_request([word]).config)
 
 
 @pytest.mark.parametrize("key", ["sensing.tacho.pulses_per_turn", "sensing.encoder.lines_per_turn"])
@@ -236,7 +237,8 @@ def test_drift_and_loss_can_vary_by_condition():
     vary = "{sensing.sensor.drift_scatter: {distribution: uniform, low: 0.0, high: 0.1}}"
     config = read_request([f"plan.vary={vary}", "plan.n_records=2"]).config
     plan = make_plan(config)
-    scatters = [record_system(config, row_values(plan.record(k))).sensing.sensor.drift_scatter for k in range(2)]
+    inputs = [InputReader(config).inputs(plan.record(k)) for k in range(2)]
+    scatters = [each.machine.sensing.sensor.drift_scatter for each in inputs]
     assert len({*scatters, 0.0}) == 3
 
 

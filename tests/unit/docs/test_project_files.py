@@ -46,7 +46,7 @@ def test_every_package_that_is_needed_has_its_licence_told() -> None:
 
 def test_card_of_the_first_data_set_is_that_of_this_version() -> None:
     """Its identity names all that decides bits: a new key changes it, and the card has to follow."""
-    identity = identity_hash({**read_request(["experiment=quickstart"]).config, "out": None}, __version__)
+    identity = identity_hash(read_request(["experiment=quickstart"]).config.with_entries(out=None).plain(), __version__)
     card = text("data_cards/quickstart.md")
     assert f"| identity | {identity} |" in card
     assert f"by gensig {__version__}." in card

@@ -37,7 +37,7 @@ def line_of(config, tmp_path):
         (tmp_path / "line.csv").write_text(shafting, encoding="utf-8")
         (tmp_path / "gears.csv").write_text(gears, encoding="utf-8")
         files = {"shafting_csv": str(tmp_path / "line.csv"), "gears_csv": str(tmp_path / "gears.csv")}
-        return read_drive_line({**config, "system": {**config["system"], **files, **keys}})
+        return read_drive_line(config.with_keys("system", **{**files, **keys}))
 
     return make
 

@@ -1,6 +1,5 @@
 """Grids, repeats and counts of a plan: nested by unit, condition, fault and repeat, and balanced at every level."""
 
-import copy
 import itertools
 import re
 from collections import Counter, defaultdict
@@ -16,10 +15,11 @@ from gensig.dataset.plan import plan_text
 from gensig.dataset.schema import COLUMNS
 from gensig.dataset.splitting.protocols import make_splits
 from gensig.errors import ConfigError
+from gensig.options.configuration import FIXED_KEYS, Configuration
 from gensig.plan.make import MOST_IN_GRID, describe_design, make_plan
 from gensig.plan.request import read_request
-from gensig.record.inputs import FIXED_KEYS, Stream, stream
 from gensig.record.simulate import simulate_records
+from gensig.record.streams import Stream, stream
 from gensig.units import split_unit
 
 CLASSES = ("healthy", "crack", "pitting", "missing_tooth")
@@ -43,11 +43,10 @@ def configured(quickstart):
     """The quickstart with keys of its plan and of the ``vary`` of its faults replaced."""
 
     def make(faults=None, **plan):
-        config = copy.deepcopy(quickstart)
-        config["plan"].update(plan)
+        config = quickstart.with_keys("plan", **plan).plain()
         for name, vary in (faults or {}).items():
             config["classes"][name]["vary"].update(vary)
-        return config
+        return Configuration(config)
 
     return make
 
@@ -128,7 +127,7 @@ class TestGrid:
 
     def test_the_same_configuration_gives_the_same_plan(self, configured):
         one, two = (make_plan(configured(**GRID, vary=VARY)) for _ in range(2))
-        other = make_plan({**configured(**GRID, vary=VARY), "seed": 1})
+        other = make_plan(configured(**GRID, vary=VARY).with_entries(seed=1))
         assert plan_text(one) == plan_text(two)
         assert plan_text(one) != plan_text(other)
         assert_array_equal(one.columns["speed_set_rpm"][::4], other.columns["speed_set_rpm"][::4])
@@ -251,11 +250,9 @@ class TestRepeats:
             assert {subset for subsets in side.values() for subset in subsets} == {"train", "validation", "test"}
 
     def test_they_are_told_apart_by_start_and_noise_alone(self, quickstart):
-        config = copy.deepcopy(quickstart)
-        config["plan"].update(n_records=4, n_repeats=2, classes=["healthy", "crack"])
-        config["classes"] = {name: config["classes"][name] for name in config["plan"]["classes"]}
-        config["operating"]["duration_s"] = 0.02
-        config["dataset"]["store_clean"] = True
+        config = quickstart.with_keys("plan", n_records=4, n_repeats=2, classes=["healthy", "crack"])
+        config = config.with_entries(classes={name: config["classes"][name] for name in ("healthy", "crack")})
+        config = config.with_keys("operating", duration_s=0.02).with_keys("dataset", store_clean=True)
         plan = make_plan(config)
         records = simulate_records(config, [plan.record(index) for index in range(4)])
         one, two = (r.signals for r, name in zip(records, plan.columns["label_name"], strict=True) if name == "crack")
@@ -289,14 +286,14 @@ class TestStartOfTheSound:
 
     def test_of_two_sound_classes_one_is_the_twin(self, configured):
         config = configured(n_records=24, classes=["healthy", "again", "crack"])
-        config["classes"] = {**config["classes"], "again": config["classes"]["healthy"]}
+        config = config.with_keys("classes", again=config["classes"]["healthy"])
         plan = make_plan(config)
         starts = [row[2:] for row in rows(plan, "label_name", "condition_id", *self.START) if row[0] != "crack"]
         assert len(set(starts)) == len(starts) == 16
 
     def test_without_a_sound_class_nothing_changes(self, configured):
         config = configured(n_records=12, classes=["crack", "pitting"])
-        config["classes"] = {name: config["classes"][name] for name in ("crack", "pitting")}
+        config = config.with_entries(classes={name: config["classes"][name] for name in ("crack", "pitting")})
         plan = make_plan(config)
         for index, start in enumerate(rows(plan, *self.START)):
             assert start == self.drawn(Stream.START, index)
@@ -373,7 +370,9 @@ def has_unit(key):
 
 def test_whatever_can_be_drawn_carries_its_unit():
     keys = [
-        key for key in numbers_in(read_request([]).config) if not key.startswith((*FIXED_KEYS, "classes.", "fault."))
+        key
+        for key in numbers_in(read_request([]).config.plain())
+        if not key.startswith((*FIXED_KEYS, "classes.", "fault."))
     ]
     assert len(keys) > 15
     assert {key.rpartition(".")[2] for key in keys if not has_unit(key)} <= NUMBERS

@@ -7,7 +7,7 @@ from gensig.dataset.plan import Plan
 from gensig.dataset.splitting.protocols import PROTOCOLS, make_splits, why_left_out
 from gensig.plan.make import make_plan
 from gensig.plan.request import read_request
-from gensig.record.inputs import Stream, stream
+from gensig.record.streams import Stream, stream
 
 CLEAN = [name for name in PROTOCOLS if name != "random_window_leaky"]
 DESIGNS = {

@@ -1,6 +1,5 @@
 """The plan: balanced, reproducible, and nothing in it tells the class but the label."""
 
-import copy
 import json
 import re
 from collections import Counter
@@ -13,7 +12,7 @@ from gensig.dataset.plan import plan_text
 from gensig.errors import ConfigError, ExtrapolationError, FaultError, GeometryError
 from gensig.plan.make import make_plan, record_bytes, records_per_shard
 from gensig.plan.request import read_request
-from gensig.record.inputs import stream
+from gensig.record.streams import stream
 
 CLASSES = ("healthy", "crack", "pitting", "missing_tooth")
 SHARED = ("unit_id", "gearbox_id", "specimen_id", "condition_id", "speed_set_rpm", "torque_nm", "snr_db")
@@ -27,10 +26,12 @@ def quickstart():
 @pytest.fixture(scope="module")
 def planned(quickstart):
     def make(**changes):
-        config = copy.deepcopy(quickstart)
-        config["plan"].update(changes.pop("plan", {}))
+        config = quickstart.with_keys("plan", **changes.pop("plan", {}))
         for key, value in changes.items():
-            config[key] = {**config[key], **value} if isinstance(value, dict) else value
+            if isinstance(value, dict):
+                config = config.with_keys(key, **value)
+            else:
+                config = config.with_entries(**{key: value})
         return make_plan(config)
 
     return make
@@ -194,9 +195,9 @@ class TestRefusals:
             planned(plan={"n_records": 8, **changes})
 
     def test_an_option_of_ones_own_that_lacks_a_key(self, quickstart):
-        plan = {key: value for key, value in quickstart["plan"].items() if key != "n_repeats"}
+        plan = quickstart["plan"].without("n_repeats")
         with pytest.raises(ConfigError, match="plan: missing key 'n_repeats'; it has n_records, n_units"):
-            make_plan({**quickstart, "plan": plan})
+            make_plan(quickstart.with_entries(plan=plan))
 
     def test_values_are_checked_before_anything_runs(self, planned):
         vary = {"operating.torque_nm": {"distribution": "uniform", "low": -20, "high": -10}}
@@ -208,19 +209,19 @@ class TestRefusals:
             planned(plan={"n_records": 8}, sensing={"channels": ["housing"]})
 
     def test_bodies_outside_the_fit_are_refused_before_anything_runs(self, planned, quickstart):
-        gear = copy.deepcopy(quickstart["gear"])
+        gear = quickstart["gear"].plain()
         gear["wheel"]["bore_radius_mm"] = 1
         with pytest.raises(ExtrapolationError, match="bore_radius_mm"):
             planned(plan={"n_records": 8}, gear=gear)
 
     def test_a_gear_that_is_none(self, planned, quickstart):
-        classes = copy.deepcopy(quickstart["classes"])
+        classes = quickstart["classes"].plain()
         classes["crack"]["gear"] = "ring"
         with pytest.raises(FaultError, match=r"fault.gear = 'ring'; allowed: pinion, wheel"):
             planned(plan={"n_records": 8}, classes=classes)
 
     def test_interrupted_drive(self, planned, quickstart):
-        gear = copy.deepcopy(quickstart["gear"])
+        gear = quickstart["gear"].plain()
         gear["addendum_coefficient"] = 0.5
         with pytest.raises(GeometryError, match="below 1"):
             planned(plan={"n_records": 8}, gear=gear)

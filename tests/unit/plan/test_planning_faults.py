@@ -1,6 +1,5 @@
 """Plans of faults on one tooth, on all of them, and of several at once: what is recorded, and what is refused."""
 
-import copy
 import json
 import re
 
@@ -108,7 +107,7 @@ class TestManyKindsOfFaults:
         assert all(0 < record["severity"] <= 1 for name in MIXED[1:] for record in self.of(mixed, name))
 
     def test_a_sham_keeps_the_faults_on_paper(self, config, mixed):
-        sham = make_plan({**config, "plan": {**config["plan"], "sham": True}})
+        sham = make_plan(config.with_keys("plan", sham=True))
         assert_allclose(sham.columns["severity"], 0.0, rtol=0, atol=0)
         for key in ("label", "faults_json", "fault_tooth", "params/fault.parts.1.pit_length_mm"):
             assert_array_equal(sham.columns[key], mixed.columns[key])
@@ -117,11 +116,10 @@ class TestManyKindsOfFaults:
     @classmethod
     def hot(cls, config):
         """Names of the classes that ``fault_multihot`` has for a row of the plan."""
-        short = copy.deepcopy(config)
-        short["operating"]["duration_s"], short["sensing"]["snr_db"] = 0.01, None
+        short = config.with_keys("operating", duration_s=0.01).with_keys("sensing", snr_db=None)
 
         def of_row(row, **classes):
-            record = simulate_record({**short, "classes": {**short["classes"], **classes}}, row)
+            record = simulate_record(short.with_keys("classes", **classes), row)
             assert record.values.get("status", "ok") == "ok"
             return {MIXED[k] for k in np.flatnonzero(record.signals["fault_multihot"])}
 

@@ -9,7 +9,7 @@ import gensig
 from gensig.errors import SimulationError
 from gensig.plan.request import read_request
 from gensig.production.prediction import FailedRecordsWarning, predict
-from gensig.record import simulate as records
+from gensig.record import inputs as records
 
 CLASSES = "plan.classes=[healthy,crack,pitting,missing_tooth]"
 SPEEDS = "plan.vary={operating.speed_rpm: {distribution: choice, values: [1200, 1800, 2400]}}"

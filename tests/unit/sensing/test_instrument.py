@@ -18,7 +18,7 @@ BEARING = read_request([]).config["sensing"]
 
 
 def changed(values, **changes):
-    own = copy.deepcopy(values)
+    own = copy.deepcopy(dict(values))
     for name, value in changes.items():
         *parents, leaf = name.split("__")
         node = own

@@ -14,8 +14,9 @@ from gensig.dynamics.integrator import settling_time
 from gensig.errors import ConfigError
 from gensig.plan.make import make_plan
 from gensig.plan.request import read_request
-from gensig.record.inputs import Stream, record_system, row_run, row_values, stream
+from gensig.record.inputs import InputReader
 from gensig.record.simulate import simulate_record
+from gensig.record.streams import Stream, stream
 from gensig.sensing.manufacturing import draw_gearbox, nominal_gearbox, with_damping_ratio
 from gensig.systems.pair_machine import Run
 from gensig.systems.registry import read_system
@@ -56,7 +57,7 @@ def rows(realistic):
 
 
 def run_of(config, row):
-    return row_run(config, record_system(config, row_values(row)), row)
+    return InputReader(config).inputs(row).run
 
 
 class TestStiffness:
@@ -171,7 +172,7 @@ class TestRecords:
             assert all(np.array_equal(one, found[0]) for one in found)
 
     def test_a_record_of_the_realistic_machine(self, realistic, rows):
-        short = {**realistic, "operating": {**realistic["operating"], "duration_s": 0.1}}
+        short = realistic.with_keys("operating", duration_s=0.1)
         row = next(row for row in rows if row["label_name"] == "missing_tooth")
         record = simulate_record(short, row)
         assert record.signals["acceleration"].shape == (3, 5120)

@@ -46,13 +46,13 @@ def measured(*, duration=2.4, seed=5, profile=None, snr=SNR, grade=GRADE, path=T
         "plan.n_records=1", "plan.n_units=1",
     ]  # fmt: skip
     config = read_request(words).config
-    config["operating"]["speed_profile"] = profile
+    config = config.with_keys("operating", speed_profile=profile)
     if path:
-        config["sensing"]["path"] = {
+        modal = {
             "kind": "modal", "n_modes": [6, 6], "natural_frequency_hz": [600.0, 8000.0], "damping_ratio": [0.05, 0.1],
             "transmissibility": 0.5,
         }  # fmt: skip
-        config["sensing"]["sensors"] = ["case", "lid"]
+        config = config.with_keys("sensing", path=modal, sensors=["case", "lid"])
     record = simulate_record(config, make_plan(config).record(0))
     assert record.values.get("status") != "failed"
     angle = record.signals["shaft_angle"]
