@@ -20,8 +20,6 @@ from gensig.driveline.running import OwnMesh, named_by_side, reference_force
 from gensig.driveline.time.line_mesh import mesh_start, tooth_angle
 from gensig.errors import ConfigError, GeometryError
 from gensig.faults.base import Fault, faulty_teeth
-from gensig.faults.flank_form import Misalignment
-from gensig.faults.other_flank import on_other_flank
 from gensig.geometry.contact import GearPair
 from gensig.material import Material
 from gensig.mesh.load_distribution import loaded_pair_table
@@ -128,17 +126,17 @@ def neighbour_meshes(
 
     A gear that drives in both meshes, or is driven in both, is met on the same flanks: its faults and errors come
     along, but for misalignment, which is a pair's. Else its other flanks are met, which are without errors, and feel of
-    the faults what ``on_other_flank`` says. Mates are perfect.
+    the faults what ``Fault.on_other_flank`` says. Mates are perfect.
     """
     found = {}
     for other, (here, there) in neighbours(machine.drive, place).items():
         seen = [one for one in (*specimen.forms, *faults) if one.gear == SIDES[here]]
-        seen = [one for one in seen if not isinstance(one, Misalignment)]
+        seen = [one for one in seen if not one.of_mounting]
         errors = [np.zeros(gear.n_teeth) for gear in _gears(machine.drive.pairs[other])]
         if here == there:
             errors[there] = specimen.wheel_error if here else specimen.pinion_error
         else:
-            seen = [felt for one in seen if (felt := on_other_flank(one)) is not None]
+            seen = [felt for one in seen if (felt := one.on_other_flank()) is not None]
         carried = tuple(replace(one, gear=SIDES[there]) for one in seen)
         teeth = [0, 0]
         teeth[there] = tooth_there(machine.drive, (place, here), (other, there), start, turned)

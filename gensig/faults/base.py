@@ -1,10 +1,11 @@
-"""What every fault is: parameters, and a pure function from tooth to tooth."""
+"""Interface of a fault: parameters, severity, growth, and a pure function from tooth to tooth."""
 
 from __future__ import annotations
 
 from abc import ABC, abstractmethod
 from collections.abc import Iterable, Mapping
 from dataclasses import dataclass, field
+from enum import Enum
 from typing import ClassVar
 
 from gensig.errors import FaultError
@@ -16,16 +17,31 @@ from gensig.units import from_si, split_unit
 ALL = "all"
 
 
+class Growth(Enum):
+    """Laws by which faults grow over a life; ``gensig.plan.growth_table`` builds them."""
+
+    NONE = "none"  # the fault stays as it is
+    PARIS = "paris"  # a root crack deepens with the range of its stress intensity
+    PITS = "pits"  # contact stress damages a flank until pits come, more and larger ones
+    ARCHARD = "archard"  # sliding under pressure takes material off a flank
+
+
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Fault(ABC):
     """A fault of one gear's teeth.
 
-    ``gear`` is ``"pinion"`` or ``"wheel"``; ``tooth`` counts from 0: one number, several, or ``"all"``.
+    ``gear`` is ``"pinion"`` or ``"wheel"``; ``tooth`` counts from 0: one number, several, or
+    ``"all"``.
     """
 
+    # name in configurations
     kind: ClassVar[str]
-    # whether the fault does the same to every tooth that it is on
+    # law by which the fault grows over a life
+    growth: ClassVar[Growth]
+    # the fault does the same to every tooth that it is on
     alike: ClassVar[bool] = True
+    # the fault comes from how two gears are mounted: other meshes of its gear are free of it
+    of_mounting: ClassVar[bool] = False
     gear: str = field()
     tooth: int | str | tuple[int, ...] = field()
 
@@ -64,6 +80,13 @@ class Fault(ABC):
     @abstractmethod
     def severity(self, gear: Gear) -> float:
         """Severity from 0 (healthy) to 1."""
+
+    @abstractmethod
+    def on_other_flank(self) -> Fault | None:
+        """The fault for loads on the teeth's other flank, None where those loads do not feel it.
+
+        An idler is driven on one flank and drives with the other.
+        """
 
 
 def require(fault: Fault, key: str, holds: bool, rule: str) -> None:

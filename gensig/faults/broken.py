@@ -9,7 +9,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from gensig.errors import FaultError
-from gensig.faults.base import Fault, require, require_not_negative
+from gensig.faults.base import Fault, Growth, require, require_not_negative
 from gensig.geometry.gear import Gear
 from gensig.geometry.tooth import Tooth
 from gensig.geometry.tooth_profile import root_curve
@@ -26,10 +26,15 @@ class MissingTooth(Fault):
     """The whole tooth is gone: its pair never touches."""
 
     kind: ClassVar[str] = "missing_tooth"
+    growth: ClassVar[Growth] = Growth.NONE
 
     def severity(self, gear: Gear) -> float:
         """Always 1."""
         return 1.0
+
+    def on_other_flank(self) -> MissingTooth:
+        """The same: the tooth is gone from both flanks."""
+        return self
 
     def apply(self, tooth: Tooth, number: int) -> Tooth:
         """Mark the tooth as absent."""
@@ -41,6 +46,7 @@ class BrokenTooth(Fault):
     """The tooth is broken off ``broken_height`` below its tip, over the whole face; at full height it is missing."""
 
     kind: ClassVar[str] = "broken"
+    growth: ClassVar[Growth] = Growth.NONE
     broken_height: float = unit("mm")
 
     def __post_init__(self) -> None:
@@ -50,6 +56,10 @@ class BrokenTooth(Fault):
     def severity(self, gear: Gear) -> float:
         """Broken share of the tooth's height above the root chord."""
         return self.broken_height / tooth_height(gear)
+
+    def on_other_flank(self) -> BrokenTooth:
+        """The same: the tip is gone from both flanks."""
+        return self
 
     def apply(self, tooth: Tooth, number: int) -> Tooth:
         """Take off what is broken; without any involute left nothing can touch."""
@@ -65,6 +75,7 @@ class ChippedTooth(Fault):
     """
 
     kind: ClassVar[str] = "chipped"
+    growth: ClassVar[Growth] = Growth.NONE
     chip_height: float = unit("mm")
     chip_width: float = unit("mm")
     chip_shape: str = "triangular"
@@ -78,6 +89,10 @@ class ChippedTooth(Fault):
         """Broken share of height times width."""
         share = 0.5 if self.chip_shape == "triangular" else 1.0
         return share * self.chip_height * self.chip_width / (tooth_height(gear) * gear.face_width)
+
+    def on_other_flank(self) -> ChippedTooth:
+        """The same: the chip is gone from both flanks."""
+        return self
 
     def apply(self, tooth: Tooth, number: int) -> Tooth:
         """Take the chip off."""

@@ -10,7 +10,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from gensig.errors import FaultError
-from gensig.faults.base import Fault, require, require_not_negative
+from gensig.faults.base import Fault, Growth, require, require_not_negative
 from gensig.geometry.gear import Gear
 from gensig.geometry.tooth import RootCrack, Tooth
 from gensig.geometry.tooth_profile import root_curve_point, root_curve_slope
@@ -21,6 +21,7 @@ Array = NDArray[np.float64]
 CRACK_STARTS = ("arc_mid", "gamma_mid")
 CRACK_FRONTS = ("straight", "parabolic", "linear")
 CRACK_SIDES = ("tension", "compression")
+OTHER_SIDE = {"tension": "compression", "compression": "tension"}
 CRACK_FACES = ("open", "breathing")
 N_STRIPS = 64  # across the face; a front ends within one of them
 
@@ -35,6 +36,7 @@ class Crack(Fault):
     """
 
     kind: ClassVar[str] = "crack"
+    growth: ClassVar[Growth] = Growth.PARIS
     crack_depth: float = unit("mm")
     crack_angle: float = unit("deg")
     crack_start: str
@@ -61,9 +63,24 @@ class Crack(Fault):
         """Thickness of the sound tooth where the crack starts, m."""
         return 2.0 * root_curve_point(gear, self.crack_start)[1]
 
+    def seed(self) -> Crack:
+        """The crack without depth, width and tooth: these do not change the law of its growth."""
+        return Crack(
+            gear=self.gear,
+            tooth=0,
+            crack_depth=0.0,
+            crack_angle=self.crack_angle,
+            crack_start=self.crack_start,
+            crack_side=self.crack_side,
+        )
+
     def severity(self, gear: Gear) -> float:
         """Crack depth over root chord, averaged over the face."""
         return float(self._depth(gear).mean()) / self.root_chord(gear)
+
+    def on_other_flank(self) -> Crack:
+        """The crack on its other side: loads that open it on one flank close it on the other."""
+        return replace(self, crack_side=OTHER_SIDE[self.crack_side])
 
     def apply(self, tooth: Tooth, number: int) -> Tooth:
         """Cut the root."""

@@ -12,7 +12,7 @@ from typing import ClassVar
 import numpy as np
 from numpy.typing import NDArray
 
-from gensig.faults.base import Fault, require, require_not_negative
+from gensig.faults.base import Fault, Growth, require, require_not_negative
 from gensig.geometry.gear import Gear
 from gensig.geometry.tooth import Tooth
 from gensig.units import unit
@@ -41,12 +41,17 @@ class FlankForm(Fault):
         """Share of the declared limit."""
         return self.size() / self.limit
 
+    def on_other_flank(self) -> None:
+        """None: what was ground, worn or measured on a flank stays with it."""
+        return None
+
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class PitchError(FlankForm):
     """One tooth stands back by ``pitch_error`` along the line of action (negative: proud)."""
 
     kind: ClassVar[str] = "pitch_error"
+    growth: ClassVar[Growth] = Growth.NONE
     pitch_error: float = unit("um")
 
     def size(self) -> float:
@@ -67,6 +72,7 @@ class ProfileError(FlankForm):
     """
 
     kind: ClassVar[str] = "profile_error"
+    growth: ClassVar[Growth] = Growth.NONE
     profile_slope: float = unit("um")
     profile_form: float = unit("um")
     profile_waves: float
@@ -95,6 +101,7 @@ class Runout(FlankForm):
     """
 
     kind: ClassVar[str] = "runout"
+    growth: ClassVar[Growth] = Growth.NONE
     alike: ClassVar[bool] = False
     eccentricity: float = unit("um")
 
@@ -132,6 +139,8 @@ class Misalignment(FlankForm):
     """The flanks stand back by ``misalignment`` more at one end of the face than at the other (its sign says which)."""
 
     kind: ClassVar[str] = "misalignment"
+    growth: ClassVar[Growth] = Growth.NONE
+    of_mounting: ClassVar[bool] = True
     misalignment: float = unit("um")
 
     def size(self) -> float:
@@ -158,6 +167,7 @@ class Wear(FlankForm):
     """
 
     kind: ClassVar[str] = "wear"
+    growth: ClassVar[Growth] = Growth.ARCHARD
     wear_depth: float = unit("um")
     wear_profile: tuple[float, ...] | None = None
 
@@ -186,6 +196,7 @@ class TipRelief(FlankForm):
     """The tip stands back by ``relief``, falling off to nothing ``relief_length`` below it on the line of action."""
 
     kind: ClassVar[str] = "tip_relief"
+    growth: ClassVar[Growth] = Growth.NONE
     relief: float = unit("um")
     relief_length: float = unit("mm")
     relief_curve: str = "linear"

@@ -10,7 +10,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from gensig.errors import FaultError
-from gensig.faults.base import Fault, require, require_not_negative
+from gensig.faults.base import Fault, Growth, require, require_not_negative
 from gensig.faults.flank_loss import (
     SHAPES,
     Patch,
@@ -39,6 +39,7 @@ class Pitting(Fault):
     """
 
     kind: ClassVar[str] = "pitting"
+    growth: ClassVar[Growth] = Growth.NONE
     pit_length: float = unit("mm")
     pit_width: float = unit("mm")
     pit_depth: float = unit("mm")
@@ -53,6 +54,10 @@ class Pitting(Fault):
     def severity(self, gear: Gear) -> float:
         """Pitted share of the flank (involute height on the tooth axis times face width)."""
         return 0.0 if self.pit_depth == 0.0 else self.pit_length * self.pit_width / flank_area(gear)
+
+    def on_other_flank(self) -> None:
+        """None: a pit is in one flank."""
+        return None
 
     def apply(self, tooth: Tooth, number: int) -> Tooth:
         """Remove the pit."""
@@ -71,6 +76,7 @@ class Spalling(Fault):
     """A spall: a larger hole, ``spall_shape`` rectangular or elliptic; places as in ``Pitting``."""
 
     kind: ClassVar[str] = "spalling"
+    growth: ClassVar[Growth] = Growth.NONE
     spall_length: float = unit("mm")
     spall_width: float = unit("mm")
     spall_depth: float = unit("mm")
@@ -87,6 +93,10 @@ class Spalling(Fault):
         """Spalled share of the flank."""
         share = 0.25 * math.pi if self.spall_shape == "elliptic" else 1.0
         return 0.0 if self.spall_depth == 0.0 else share * self.spall_length * self.spall_width / flank_area(gear)
+
+    def on_other_flank(self) -> None:
+        """None: a spall is in one flank."""
+        return None
 
     def apply(self, tooth: Tooth, number: int) -> Tooth:
         """Remove the spall."""
@@ -128,6 +138,7 @@ class DistributedPitting(Fault):
     """
 
     kind: ClassVar[str] = "distributed_pitting"
+    growth: ClassVar[Growth] = Growth.PITS
     alike: ClassVar[bool] = False
     pitted_share: float
     pit_diameter: float = unit("mm")
@@ -154,6 +165,10 @@ class DistributedPitting(Fault):
     def severity(self, gear: Gear) -> float:
         """Pitted share of the flank."""
         return self.pitted_share
+
+    def on_other_flank(self) -> None:
+        """None: pits come in the loaded flank."""
+        return None
 
     def apply(self, tooth: Tooth, number: int) -> Tooth:
         """Draw pits until the share is reached."""

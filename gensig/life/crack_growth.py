@@ -13,7 +13,7 @@ from gensig.errors import ConfigError
 from gensig.faults.crack import N_STRIPS, Crack
 from gensig.geometry.contact import GearPair
 from gensig.geometry.tooth import healthy_tooth
-from gensig.life.growth import GrowthLaw
+from gensig.life.growth import GrowthLaw, GrowthOptions
 from gensig.life.spread import Spread
 from gensig.material import Material
 from gensig.mesh.root_crack import DEEPEST, crack_compliance
@@ -28,7 +28,7 @@ LEAST_DEPTH = 0.005  # of the root chord: below it a crack is a notch of the sur
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
-class CrackGrowthOptions:
+class CrackGrowthOptions(GrowthOptions):
     """Paris law da/dN = C dK^m with a threshold, first and last depth of a crack, and how units differ.
 
     ``coefficient`` C is in m a cycle at 1 MPa sqrt(m), ``threshold`` in Pa sqrt(m); the shares are of the root chord,
@@ -112,7 +112,7 @@ class CrackGrowth(GrowthLaw):
             keys["crack_width_mm"] = round(min(width, self.face_width) * 1e3, 9)
         return keys
 
-    def told(self, size: float, torque: float) -> dict[str, float]:
+    def measures(self, size: float, torque: float) -> dict[str, float]:
         """The stress-intensity range at the record's load."""
         value = float(np.interp(size, self.sizes, self._intensity(torque))) * torque
         return {"stress_intensity_range_mpa_sqrt_m": value / 1e6}

@@ -12,12 +12,27 @@ import numpy as np
 from numpy.typing import NDArray
 
 from gensig.life.load_history import History
+from gensig.life.spread import Spread
 
 Array = NDArray[np.float64]
 
 
+class GrowthOptions(ABC):
+    """Parameters of a growth law, as ``life`` gives them for one kind of fault."""
+
+    __slots__ = ()
+
+    @property
+    @abstractmethod
+    def spread(self) -> Spread:
+        """Differences between units."""
+
+
 class GrowthLaw(ABC):
-    """How one kind of damage grows; ``sizes`` (node,) are where its rate is looked at, from the least to the end."""
+    """Growth of one kind of damage.
+
+    ``sizes`` (node,) are where its rate is evaluated, from the least to the end.
+    """
 
     sizes: Array
 
@@ -30,9 +45,9 @@ class GrowthLaw(ABC):
         """Boundary keys of the class's fault at a size, over those of its option; with ``kind`` it is a fault of its
         own."""
 
-    def told(self, size: float, torque: float) -> dict[str, float]:
-        """What a record may tell of its size besides the fault itself, by name with its unit."""
-        return {}
+    @abstractmethod
+    def measures(self, size: float, torque: float) -> dict[str, float]:
+        """Measures of the damage besides the fault itself, by name with unit."""
 
     def turns(self, torque: Array | Sequence[Array]) -> Array:
         """Turns of the pinion that each cell between two sizes takes, (setpoint, cell); inf where nothing grows.

@@ -1,4 +1,4 @@
-"""What a configuration says of lives: history, looks, end, drift and the laws of growth."""
+"""Options of lives: history, snapshots, end, drift and the parameters of growth laws."""
 
 from __future__ import annotations
 
@@ -7,14 +7,17 @@ from dataclasses import dataclass
 from typing import Any
 
 from gensig.errors import ConfigError
+from gensig.faults.base import Growth
+from gensig.faults.registry import FAULTS
 from gensig.life.crack_growth import CrackGrowthOptions
 from gensig.life.drift import Drift
+from gensig.life.growth import GrowthOptions
 from gensig.life.load_history import DrawnBlocks
 from gensig.life.pit_growth import PitGrowthOptions
 from gensig.life.snapshots import SPACINGS
 from gensig.life.spread import Spread
 from gensig.options.configuration import Configuration
-from gensig.units import from_si, read, to_si, unit
+from gensig.units import read, to_si, unit
 
 RUN_TO_FAILURE = "run_to_failure"
 NO_LIFE = "none"
@@ -22,8 +25,8 @@ BLOCK_COLUMNS = ("begin_h", "end_h", "speed_rpm", "torque_nm")
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
-class WearGrowthOptions:
-    """How units differ in wear, whose law and end are those of the group ``wear``."""
+class WearGrowthOptions(GrowthOptions):
+    """Differences between units in wear, whose law and end are those of the group ``wear``."""
 
     rate_scatter: float
 
@@ -36,10 +39,10 @@ class WearGrowthOptions:
         return Spread(rate_scatter=self.rate_scatter, start_scatter=0.0)
 
 
-LAWS: dict[str, type[CrackGrowthOptions] | type[PitGrowthOptions] | type[WearGrowthOptions]] = {
-    "crack": CrackGrowthOptions,
-    "distributed_pitting": PitGrowthOptions,
-    "wear": WearGrowthOptions,
+OPTIONS: Mapping[Growth, type[GrowthOptions]] = {
+    Growth.PARIS: CrackGrowthOptions,
+    Growth.PITS: PitGrowthOptions,
+    Growth.ARCHARD: WearGrowthOptions,
 }
 
 
@@ -66,7 +69,7 @@ class LifeOptions:
     drawn: DrawnBlocks
     blocks: tuple[tuple[float, ...], ...] | None
     drift: Mapping[str, Drift]
-    laws: Mapping[str, CrackGrowthOptions | PitGrowthOptions | WearGrowthOptions]
+    laws: Mapping[str, GrowthOptions]
 
     def __post_init__(self) -> None:
         if self.n_setpoints < 1:
@@ -99,9 +102,13 @@ def read_life(life: Mapping[str, Any]) -> LifeOptions:
     if life.get("kind") != RUN_TO_FAILURE:
         raise ConfigError(f"life.kind = {life.get('kind')!r}; allowed: {NO_LIFE}, {RUN_TO_FAILURE}")
     own = {key: value for key, value in life.items() if key != "kind"}
-    laws = {kind: read(cls, own.pop(kind), f"life.{kind}") for kind, cls in LAWS.items() if own.get(kind) is not None}
-    for kind in LAWS:
-        own.pop(kind, None)
+    laws: dict[str, GrowthOptions] = {}
+    for kind, fault in FAULTS.items():
+        if fault.growth is Growth.NONE:
+            continue
+        values = own.pop(kind, None)
+        if values is not None:
+            laws[kind] = read(OPTIONS[fault.growth], values, f"life.{kind}")
     drift = own.pop("drift", None) or {}
     if not isinstance(drift, Mapping):
         raise ConfigError(
@@ -149,8 +156,3 @@ def _blocks(rows: Any) -> tuple[tuple[float, ...], ...] | None:
         numbers = zip(BLOCK_COLUMNS, row, strict=True)
         found.append(tuple(to_si(key, _number(f"life.blocks.{place}.{key}", value)) for key, value in numbers))
     return tuple(found)
-
-
-def told_hours(seconds: float) -> float:
-    """Seconds as hours of a column."""
-    return from_si("time_h", seconds)

@@ -13,7 +13,7 @@ from gensig.errors import ConfigError
 from gensig.faults.flank_loss import flank_area
 from gensig.faults.pitting import DistributedPitting
 from gensig.geometry.contact import GearPair
-from gensig.life.growth import GrowthLaw
+from gensig.life.growth import GrowthLaw, GrowthOptions
 from gensig.life.spread import Spread
 from gensig.material import Material
 from gensig.units import unit
@@ -24,7 +24,7 @@ N_SIZES = 121
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
-class PitGrowthOptions:
+class PitGrowthOptions(GrowthOptions):
     """Pitting S-N line, what comes after its end, and how units differ.
 
     ``cycles`` at the contact stress ``strength`` end a flank's life without pits; at another stress s they are
@@ -102,7 +102,7 @@ class PitGrowth(GrowthLaw):
         """Pitted share and size of the pits."""
         return {"pitted_share": round(self.share(size), 12), "pit_diameter_mm": round(self.diameter(size) * 1e3, 9)}
 
-    def told(self, size: float, torque: float) -> dict[str, float]:
+    def measures(self, size: float, torque: float) -> dict[str, float]:
         """Damage and mean number of pits."""
         return {"pitting_damage": size, "n_pits": self.n_pits(size)}
 

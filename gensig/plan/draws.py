@@ -63,7 +63,7 @@ def fault_specs(config: Configuration, fault: Mapping[str, Any]) -> tuple[dict[s
             if key not in part or key == "vary":
                 raise ConfigError(f"fault.vary: '{key}' is no key of fault={part['kind']}")
             name = f"parts.{place}.{key}" if fault["kind"] == COMPOUND else key
-            specs[name], places[name] = _for_gear(config, part["gear"], key, spec), (place, key)
+            specs[name], places[name] = _for_gear(config, part, key, spec), (place, key)
     return specs, places
 
 
@@ -101,12 +101,16 @@ def _root_chord(config: Configuration, gear: str) -> float:
     return 2.0 * root_curve_point(getattr(pair, gear), "arc_mid")[1]
 
 
-def _for_gear(config: Configuration, gear: str, key: str, spec: Any) -> Any:
-    """A distribution for the faulted gear: ``distribution: tooth`` over its teeth, ``of`` as shares of a size of it."""
+def _for_gear(config: Configuration, part: Mapping[str, Any], key: str, spec: Any) -> Any:
+    """A distribution of a fault's key in the sizes of its gear.
+
+    ``distribution: tooth`` becomes one over the gear's teeth, shares ``of`` a size become lengths.
+    """
     if not isinstance(spec, Mapping):
         return spec
     if spec.get("distribution") != "tooth" and "of" not in spec:
         return spec
+    gear = part["gear"]
     n_teeth, sizes = _gear_sizes(config, gear)
     if spec.get("distribution") == "tooth":
         return {**spec, "distribution": "integers", "low": 0, "high": n_teeth - 1}

@@ -1,8 +1,8 @@
-"""The lives of the units of a data set: each under its own history, looked at until it fails or the horizon comes."""
+"""Lives of a data set's units: each under a history of loads, until it fails or time is over."""
 
 from __future__ import annotations
 
-from collections.abc import Iterator, Mapping
+from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass, replace
 from typing import Any
 
@@ -11,31 +11,23 @@ from numpy.typing import NDArray
 
 from gensig.dataset.distributions import GRID
 from gensig.errors import ConfigError
-from gensig.faults.crack import Crack
-from gensig.faults.pitting import DistributedPitting
-from gensig.faults.registry import fault_parts, read_faults
-from gensig.life.crack_growth import CrackGrowth, CrackGrowthOptions
+from gensig.faults.registry import FAULTS, fault_parts, read_faults
 from gensig.life.growth import Course, GrowthLaw, grow
-from gensig.life.life_options import LifeOptions, WearGrowthOptions, read_life
+from gensig.life.life_options import LifeOptions, read_life
 from gensig.life.load_history import History, draw_history, given_history
-from gensig.life.pit_growth import PitGrowthOptions
 from gensig.life.snapshots import snapshot_times
-from gensig.life.wear.wear_growth import WearGrowth, WearTable, wear_table
 from gensig.options.configuration import Configuration, whole_number
 from gensig.plan.draws import draw_faults, draw_values
+from gensig.plan.growth_table import PAIRS_ONLY, LifeGears, unit_growth
 from gensig.record.machines import read_machine
 from gensig.record.streams import Stream, stream
-from gensig.record.vibration_limit import limited_by_vibration
-from gensig.systems.growth_laws import crack_law, pit_law
 from gensig.systems.pair_machine import PairMachine
 from gensig.systems.registry import LINE
-from gensig.systems.wear import read_wear_case, wear_fault
 from gensig.units import from_si
 
 Array = NDArray[np.float64]
 
 SPEED, TORQUE = "operating.speed_rpm", "operating.torque_nm"
-HEALTHY = {"kind": "healthy"}
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -76,121 +68,110 @@ def snapshots(config: Configuration) -> Iterator[Snapshot]:
     machine = read_machine(config)
     points = _setpoints(config, options, n_units)
     n_setpoints = len(points) // n_units
-    torque = np.array([one.get(TORQUE, machine.operating.torque) for one in points]).reshape(n_units, n_setpoints)
-    set_speed = from_si("speed_rpm", machine.operating.speed / machine.ratio)
-    speed = np.array([one.get(SPEED, set_speed) for one in points])
-    speed = speed.reshape(torque.shape) * (2.0 * np.pi / 60.0)
+    speed, torque = _speed_and_torque(machine, points, n_units)
     faults = {
         name: draw_faults(config, config["classes"][name], np.arange(n_units), stream(seed, Stream.FAULT, index))
         for index, name in enumerate(names)
     }
-    laws = _Laws(config, options, machine, float(torque.min()), float(torque.max()))
+    gears = LifeGears(config, machine, (float(torque.min()), float(torque.max())))
     number = 0
     for unit in range(n_units):
-        label = int(stream(seed, Stream.ORDER, unit // len(names)).permutation(len(names))[unit % len(names)])
+        order = stream(seed, Stream.ORDER, unit // len(names)).permutation(len(names))
+        label = int(order[unit % len(names)])
         fault, rng = faults[names[label]][unit], stream(seed, Stream.LIFE, unit)
         past = stream(seed, Stream.LIFE_HISTORY, unit)
         history = _history(options, speed[unit], torque[unit], past)
         history = replace(history, speed=history.speed * machine.ratio)
-        law, loads, course = laws.live(fault, history, rng)
-        drifts = {key: float(np.exp(one.scatter * rng.standard_normal())) for key, one in options.drift.items()}
-        times = snapshot_times(course, options.snapshot_spacing, options.snapshot_count, options.snapshot_every)
+        life = _life(gears, options, fault, history, rng)
+        factors = _drift_factors(options, rng)
+        times = snapshot_times(
+            life.course,
+            options.snapshot_spacing,
+            options.snapshot_count,
+            options.snapshot_every,
+        )
         for k, running in enumerate(times.tolist()):
-            place = course.at(running)
-            setpoint, size = int(course.setpoint[place[0]]), course.value("size", place)
-            values = dict(points[unit * n_setpoints + setpoint])
+            place = life.course.at(running)
+            setpoint = int(life.course.setpoint[place[0]])
+            point = unit * n_setpoints + setpoint
+            values = dict(points[point])
             for key, drift in options.drift.items():
-                values[key] = _number(config, key, values) * drift.factor(running, drifts[key])
-            told = {} if law is None else law.told(size, float(loads[setpoint].max()))
-            grown = {} if law is None else law.fault(size)
-            clock = course.value("clock", place)
+                values[key] = _number(config, key, values) * drift.factor(running, factors[key])
             yield Snapshot(
                 unit=unit,
                 label=label,
-                condition=number if options.drift else unit * n_setpoints + setpoint,
+                condition=number if options.drift else point,
                 values=values,
-                fault=grown if "kind" in grown else {**fault, **grown},
-                columns={
-                    "life_id": f"life-{unit:04d}",
-                    "life_time_h": from_si("time_h", clock),
-                    "life_cycles": course.value("turns", place),
-                    "remaining_life_h": from_si("time_h", max(float(course.clock[-1]) - clock, 0.0)),
-                    "life_failed": int(course.has_failed),
-                    "life_growing": int(course.growing[place[0]]),
-                    **{f"params/fault.{key}": value for key, value in told.items()},
-                },
+                fault=life.fault_at(place),
+                columns={"life_id": f"life-{unit:04d}", **life.columns_at(place)},
                 is_last=k == len(times) - 1,
             )
             number += 1
 
 
-class _Laws:
-    """The laws of a plan, each worked out once for the gears and shapes that it depends on."""
+@dataclass(frozen=True, slots=True, kw_only=True)
+class _Life:
+    """Course of one unit with its fault; without a law the unit is sound all its life.
 
-    def __init__(
-        self, config: Configuration, options: LifeOptions, machine: PairMachine, least: float, greatest: float
-    ) -> None:
-        self.options, self.machine = options, machine
-        self._cracks: dict[Crack, CrackGrowth] = {}
-        self._table: WearTable | None = None
-        self._config, self._torques = config, (least, greatest)
-        self._loads: dict[tuple[float, float], Array] = {}
+    Parameters
+    ----------
+    fault : boundary keys
+    loads : of a tooth at every set-point, (mesh,) N m each
+    """
 
-    def live(
-        self, fault: Mapping[str, Any], history: History, rng: np.random.Generator
-    ) -> tuple[GrowthLaw | None, list[Array], Course]:
-        """Law, loads of a tooth at every set-point in N m, and course of one unit; without a law the unit is sound all
-        its life."""
-        own = self.options.laws.get(fault["kind"])
-        if own is None:  # the same draws for every class
-            rng.standard_normal(2)
-            return None, [], grow(np.array([0.0, 1.0]), np.full((len(history.torque), 1), np.inf), history, 0.0)
-        rate, first = own.spread.draw(rng)
-        law, start = self._law(fault, history, first)
-        loads = [self._met(*point) for point in zip(history.speed.tolist(), history.torque.tolist(), strict=True)]
-        return law, loads, grow(law.sizes, law.turns(loads) / rate, history, start)
+    fault: Mapping[str, Any]
+    law: GrowthLaw | None
+    loads: tuple[Array, ...]
+    course: Course
 
-    def _met(self, speed: float, torque: float) -> Array:
-        """Loads that a tooth meets at a set-point, (mesh,) N m."""
-        if (speed, torque) not in self._loads:
-            self._loads[speed, torque] = self.machine.mesh_torques(speed, torque)
-        return self._loads[speed, torque]
+    def fault_at(self, place: tuple[int, float]) -> dict[str, Any]:
+        """Boundary keys of the fault at a place of the course."""
+        if self.law is None:
+            return dict(self.fault)
+        grown = self.law.fault(self.course.value("size", place))
+        return grown if "kind" in grown else {**self.fault, **grown}
 
-    def _law(self, fault: Mapping[str, Any], history: History, first: float) -> tuple[GrowthLaw, float]:
-        """The law of a fault and the size at which it begins."""
-        own, (made,) = self.options.laws[fault["kind"]], read_faults(fault)
-        pair = self.machine.pair
-        if isinstance(own, CrackGrowthOptions):
-            assert isinstance(made, Crack)
-            shape = _like(made)
-            if shape not in self._cracks:
-                self._cracks[shape] = crack_law(self.machine, shape, own, self._torques)
-            law = self._cracks[shape]
-            gear = {"pinion": pair.pinion, "wheel": pair.wheel}[made.gear]
-            return law, own.start_share * first * made.root_chord(gear)
-        if isinstance(own, PitGrowthOptions):
-            assert isinstance(made, DistributedPitting)
-            return pit_law(self.machine, made, own, first, self._torques), 0.0
-        assert isinstance(own, WearGrowthOptions)
-        if self._table is None:
-            sound = self._config.with_entries(fault=HEALTHY)
-            limited, _ = limited_by_vibration(read_wear_case(sound), sound)
-            self._table = wear_table(limited, *self._torques)
-        case = self._table.lives[0].case
-        mean = float(np.exp(np.log(history.torque).mean()))
-        return WearGrowth(table=self._table, torque=mean, as_fault=lambda depth: wear_fault(case, depth)), 0.0
+    def columns_at(self, place: tuple[int, float]) -> dict[str, Any]:
+        """Columns of the plan at a place of the course."""
+        course = self.course
+        clock = course.value("clock", place)
+        return {
+            "life_time_h": from_si("time_h", clock),
+            "life_cycles": course.value("turns", place),
+            "remaining_life_h": from_si("time_h", max(float(course.clock[-1]) - clock, 0.0)),
+            "life_failed": int(course.has_failed),
+            "life_growing": int(course.growing[place[0]]),
+            **{f"params/fault.{key}": value for key, value in self._measures(place).items()},
+        }
+
+    def _measures(self, place: tuple[int, float]) -> dict[str, float]:
+        if self.law is None:
+            return {}
+        torque = float(self.loads[int(self.course.setpoint[place[0]])].max())
+        return self.law.measures(self.course.value("size", place), torque)
 
 
-def _like(crack: Crack) -> Crack:
-    """What its law depends on: neither tooth nor size."""
-    return Crack(
-        gear=crack.gear,
-        tooth=0,
-        crack_depth=0.0,
-        crack_angle=crack.crack_angle,
-        crack_start=crack.crack_start,
-        crack_side=crack.crack_side,
-    )
+def _life(
+    gears: LifeGears,
+    options: LifeOptions,
+    fault: Mapping[str, Any],
+    history: History,
+    rng: np.random.Generator,
+) -> _Life:
+    """Life of one unit with a fault given by its boundary keys."""
+    growth = options.laws.get(fault["kind"])
+    if growth is None:
+        rng.standard_normal(2)  # the same draws for every class
+        never = np.full((len(history.torque), 1), np.inf)
+        course = grow(np.array([0.0, 1.0]), never, history, 0.0)
+        return _Life(fault=fault, law=None, loads=(), course=course)
+    rate, first = growth.spread.draw(rng)
+    (defect,) = read_faults(fault)
+    unit = unit_growth(gears, defect, growth, history, first)
+    points = zip(history.speed.tolist(), history.torque.tolist(), strict=True)
+    loads = tuple(gears.tooth_loads(*point) for point in points)
+    course = grow(unit.law.sizes, unit.law.turns(loads) / rate, history, unit.start)
+    return _Life(fault=fault, law=unit.law, loads=loads, course=course)
 
 
 def _checked_units(config: Configuration, options: LifeOptions) -> int:
@@ -210,9 +191,11 @@ def _checked_units(config: Configuration, options: LifeOptions) -> int:
             raise ConfigError(
                 f"plan.classes: nothing makes {name} grow; this life has {grown}: take life=mixed, or other classes"
             )
-        if config["system"]["kind"] == LINE and "wear" in kinds:
+        unfollowed = sorted(kind for kind in kinds if FAULTS[kind].growth in PAIRS_ONLY)
+        if config["system"]["kind"] == LINE and unfollowed:
             raise ConfigError(
-                f"plan.classes: {name}: wear is not followed on a drive line; take life=crack_growth or life=pit_growth"
+                f"plan.classes: {name}: {unfollowed[0]} is not followed on a drive line; "
+                f"take life=crack_growth or life=pit_growth"
             )
     for key in options.drift:
         config.with_values({key: 0.0})  # refuses keys that cannot drift
@@ -239,6 +222,24 @@ def _setpoints(config: Configuration, options: LifeOptions, n_units: int) -> lis
             values[SPEED] = from_si("speed_rpm", float(given.speed[k % n_setpoints]))
             values[TORQUE] = float(given.torque[k % n_setpoints])
     return found
+
+
+def _speed_and_torque(
+    machine: PairMachine,
+    points: Sequence[Mapping[str, float]],
+    n_units: int,
+) -> tuple[Array, Array]:
+    """Set speeds in rad/s and torques in N m, (unit, setpoint) each."""
+    set_speed = from_si("speed_rpm", machine.operating.speed / machine.ratio)
+    speed = np.array([values.get(SPEED, set_speed) for values in points])
+    torque = np.array([values.get(TORQUE, machine.operating.torque) for values in points])
+    shape = (n_units, len(points) // n_units)
+    return speed.reshape(shape) * (2.0 * np.pi / 60.0), torque.reshape(shape)
+
+
+def _drift_factors(options: LifeOptions, rng: np.random.Generator) -> dict[str, float]:
+    """Factors of one unit on the rates of its drifts, by configuration key."""
+    return {key: float(np.exp(drift.scatter * rng.standard_normal())) for key, drift in options.drift.items()}
 
 
 def _history(options: LifeOptions, speed: Array, torque: Array, rng: np.random.Generator) -> History:

@@ -10,10 +10,12 @@ from numpy.typing import NDArray
 
 from gensig.faults.crack import Crack
 from gensig.faults.pitting import DistributedPitting
+from gensig.geometry.contact import GearPair
 from gensig.life.crack_growth import CrackGrowth, CrackGrowthOptions, crack_growth
 from gensig.life.pit_growth import PitGrowth, PitGrowthOptions, pit_growth
 from gensig.life.sliced_crack import sliced_crack_growth
 from gensig.life.sliced_stress import sliced_contact_stress
+from gensig.material import Material
 from gensig.systems.helical_pair import HelicalPair
 from gensig.systems.pair_machine import PairMachine
 from gensig.systems.sliced_pair import SlicedPair
@@ -28,9 +30,8 @@ def crack_law(
 ) -> CrackGrowth:
     """The law of a crack like ``crack``; ``torques`` in N m are the least and the greatest that it meets."""
     if not isinstance(machine, HelicalPair):
-        return crack_growth(machine.pair, machine.material, crack, options)
-    flanks = _for_lives(machine.flanks)
-    return sliced_crack_growth(flanks.pair, flanks.material, flanks.sliced_mesh, crack, options, _between(torques))
+        return _spur_crack_law(machine.pair, machine.material, crack, options)
+    return _sliced_crack_law(_for_lives(machine.flanks), crack, options, torques)
 
 
 def pit_law(
@@ -57,6 +58,25 @@ def _for_lives(flanks: SlicedPair) -> SlicedPair:
 def _between(torques: tuple[float, float]) -> Array:
     least, greatest = torques
     return np.array([least]) if least == greatest else np.geomspace(least, greatest, N_TORQUES)
+
+
+@lru_cache(maxsize=32)
+def _spur_crack_law(
+    pair: GearPair,
+    material: Material,
+    crack: Crack,
+    options: CrackGrowthOptions,
+) -> CrackGrowth:
+    return crack_growth(pair, material, crack, options)
+
+
+@lru_cache(maxsize=32)
+def _sliced_crack_law(
+    flanks: SlicedPair, crack: Crack, options: CrackGrowthOptions, torques: tuple[float, float]
+) -> CrackGrowth:
+    mesh_of = flanks.sliced_mesh
+    looked = _between(torques)
+    return sliced_crack_growth(flanks.pair, flanks.material, mesh_of, crack, options, looked)
 
 
 @lru_cache(maxsize=8)

@@ -87,6 +87,10 @@ class WearGrowth(GrowthLaw):
         """Both flanks."""
         return self.as_fault(self.table.worn(size, self.torque))
 
+    def measures(self, size: float, torque: float) -> dict[str, float]:
+        """Nothing: the fault has the depths."""
+        return {}
+
 
 def _between(torques: Array, values: Array, torque: float) -> Array:
     """Values (torque, ...) at one torque, linear over its logarithm."""

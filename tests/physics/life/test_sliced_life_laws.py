@@ -86,7 +86,7 @@ def test_the_release_rate_is_the_change_of_the_energy_at_constant_load(helical):
     )
     release = 0.5 * force * (high - low).max() / (0.01 * depth * flanks.pair.pinion.face_width)
     expected = math.sqrt(release * flanks.material.in_plane("plane_strain").youngs_modulus) / 1e6
-    assert_allclose(law.told(depth, 90.0)["stress_intensity_range_mpa_sqrt_m"], expected, rtol=2e-3)
+    assert_allclose(law.measures(depth, 90.0)["stress_intensity_range_mpa_sqrt_m"], expected, rtol=2e-3)
 
 
 def test_below_the_threshold_a_crack_of_a_helical_pair_does_not_grow(helical):

@@ -1,0 +1,54 @@
+"""Every fault says whether it grows; a law and its parameters stand ready for each that does."""
+
+from typing import get_type_hints
+
+import pytest
+from fault_cases import KINDS, one
+
+from gensig.faults.base import Growth
+from gensig.faults.registry import FAULTS
+from gensig.life.life_options import OPTIONS
+from gensig.plan.growth_table import LAWS, PAIRS_ONLY
+
+GROWING = [kind for kind in KINDS if FAULTS[kind].growth is not Growth.NONE]
+
+
+@pytest.mark.parametrize("kind", KINDS)
+def test_every_fault_says_it_itself(kind):
+    assert isinstance(vars(FAULTS[kind])["growth"], Growth)
+
+
+def test_three_kinds_grow():
+    assert GROWING == ["crack", "distributed_pitting", "wear"]
+
+
+def test_every_law_has_parameters_and_a_builder():
+    laws = set(Growth) - {Growth.NONE}
+    assert set(LAWS) == set(OPTIONS) == laws
+    assert set(PAIRS_ONLY) <= laws
+
+
+@pytest.mark.parametrize("kind", GROWING)
+def test_the_builder_takes_the_fault_and_its_parameters(kind):
+    fault = FAULTS[kind]
+    hints = get_type_hints(LAWS[fault.growth])
+    assert issubclass(fault, hints["fault"])
+    assert issubclass(OPTIONS[fault.growth], hints["options"])
+
+
+def test_the_seed_of_a_crack_keeps_what_its_law_depends_on():
+    crack = one(
+        "crack",
+        gear="wheel",
+        tooth=5,
+        crack_width_mm=3,
+        crack_front="linear",
+        crack_start="gamma_mid",
+        crack_side="compression",
+        crack_angle_deg=60,
+    )
+    seed = crack.seed()
+    kept = {"gear", "crack_angle", "crack_start", "crack_side"}
+    assert all(getattr(seed, name) == getattr(crack, name) for name in kept)
+    assert (seed.tooth, seed.crack_depth, seed.crack_width) == (0, 0.0, None)
+    assert one("crack", tooth=9).seed() == one("crack", tooth=2, crack_depth_mm=2.0).seed()
