@@ -254,7 +254,7 @@ def test_a_killed_beginning_says_what_to_do_and_is_begun_anew(
     out = tmp_path / "data"
     code = (
         "import os, signal, sys\n"
-        "from gensig.dataset import beginning\n"
+        "from gensig.dataset.folder import beginning\n"
         "beginning.write_manifest = lambda *_: os.kill(os.getpid(), signal.SIGKILL)\n"
         "from gensig.cli import main\n"
         "main(sys.argv[1:])"

@@ -98,7 +98,7 @@ def test_configuration_keys_that_the_pages_name_exist() -> None:
         group = file.relative_to(ROOT / "configs").parts[0] if file.parent.name != "configs" else ""
         known |= _keys(yaml.safe_load(text), "" if not group or "@package _global_" in text else f"{group}.")
     for life in ("crack_growth", "pit_growth", "wear", "mixed"):  # put together from several files
-        known |= _keys(compose("generate", ["experiment=run_to_failure", f"life={life}"]), "")
+        known |= _keys(compose("generate", ["experiment=run_to_failure", f"life={life}"]).plain(), "")
     sections = {key.partition(".")[0] for key in known if "." in key}
     named = re.compile(rf"(?<![\w./{{$])((?:{'|'.join(sorted(sections))})(?:\.[a-z][a-z0-9_]*)+)(?![\w/(*.|])")
     unknown = set()

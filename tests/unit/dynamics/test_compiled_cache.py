@@ -6,11 +6,11 @@ import subprocess
 import sys
 from pathlib import Path
 
-import gensig.dynamics as dynamics
+import gensig
 from gensig.driveline.time import _line_mesh_kernels, _newmark_kernels
 from gensig.dynamics._vector import source_stamp
 
-FOLDER = Path(dynamics.__file__).parent
+PACKAGE = Path(gensig.__file__).parent
 CALLED = """
 from gensig.dynamics._vector import compiled
 @compiled
@@ -32,7 +32,7 @@ def test_all_functions_know_all_files() -> None:
         function._cache._cache_file._source_stamp
         for function in (_newmark_kernels.advance, _newmark_kernels.rest, _line_mesh_kernels.gather)
     }
-    assert stamps == {source_stamp(FOLDER)}
+    assert stamps == {source_stamp(PACKAGE)}
 
 
 def test_a_change_of_what_is_called_is_noticed(tmp_path: Path) -> None:
@@ -40,7 +40,7 @@ def test_a_change_of_what_is_called_is_noticed(tmp_path: Path) -> None:
     package.mkdir(parents=True)
     for place in (package, package.parent):
         (place / "__init__.py").write_text("")
-    shutil.copy(FOLDER / "_vector.py", package)
+    shutil.copy(PACKAGE / "dynamics" / "_vector.py", package)
     (package / "_calling.py").write_text(CALLING)
 
     def asked(called: str) -> list[str]:

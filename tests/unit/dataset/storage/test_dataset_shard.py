@@ -280,7 +280,7 @@ except DatasetError as error:
 @pytest.mark.parametrize(("limit", "fits"), [(20_000, False), (10_000_000, True)])
 def test_full_disk_is_one_line_and_leaves_nothing(tmp_path: Path, limit: int, fits: bool) -> None:
     command = [sys.executable, "-c", FULL_DISK, str(tmp_path), str(limit)]
-    run = subprocess.run(command, capture_output=True, text=True, cwd=Path(__file__).parent, check=False)
+    run = subprocess.run(command, capture_output=True, text=True, cwd=Path(__file__).parents[1], check=False)
     assert run.returncode == (0 if fits else 1)
     assert [path.name for path in tmp_path.iterdir()] == (["a.h5"] if fits else [])
     assert len(run.stderr.splitlines()) == (0 if fits else 1)
