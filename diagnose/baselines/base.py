@@ -1,4 +1,4 @@
-"""Interface of baselines: fit, probabilities, the input that they read, and their words on the page."""
+"""Interface of baselines: fit, probabilities, the input they read, and their words on the page."""
 
 from __future__ import annotations
 
@@ -21,7 +21,7 @@ FloatArray = NDArray[np.floating]
 
 
 class Role(Enum):
-    """Purpose of a method in a study; it decides when a baseline runs and in which table it stands."""
+    """Purpose of a baseline; it decides when it runs and in which table of the page it is."""
 
     RIVAL = "the network must beat it"  # runs where the key `baselines` names it
     AT_CHANCE = "it must be at chance, else something leaks"  # runs with metadata_probe=true
@@ -38,14 +38,12 @@ class MethodText:
     name : key in ``metrics.json`` and in the setting `baselines`
     label : short name on the page
     meaning : sentence of the report
-    role : purpose in the study
     card_label : short name on the cards of the page; None for a method that they do not mention
     """
 
     name: str
     label: str
     meaning: str
-    role: Role
     card_label: str | None
 
 
@@ -121,6 +119,7 @@ class Baseline(ABC):
     """
 
     text: ClassVar[MethodText]
+    role: ClassVar[Role]
     reads: ClassVar[Input]
 
     @abstractmethod

@@ -37,11 +37,11 @@ class IndicatorModel(Baseline):
         name="indicators",
         label="indicators",
         card_label="indicators",
-        role=Role.RIVAL,
         meaning="logistic regression or gradient boosting (chosen on validation units) on RMS, "
         "kurtosis, crest factor, FM4 and sideband ratio of every channel over the whole stretch "
         "of signal; it knows the speed and the tooth counts.",
     )
+    role = Role.RIVAL
     reads = INDICATOR_INPUT
     _model: ChosenModel
 
@@ -63,9 +63,9 @@ class IndicatorModelWithoutLevel(Baseline):
         name="indicators_without_level",
         label="indicators without RMS",
         card_label=None,
-        role=Role.RIVAL,
-        meaning="the same models without the RMS, as a network that sees windows without their level.",
+        meaning="the same models without the RMS, for networks on windows without their level.",
     )
+    role = Role.RIVAL
     reads = INDICATOR_INPUT
     _model: ChosenModel
 

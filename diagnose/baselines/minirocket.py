@@ -181,10 +181,10 @@ class MiniRocket(Baseline):
         name="minirocket",
         label="MiniRocket",
         card_label="MiniRocket",
-        role=Role.RIVAL,
         meaning="ridge regression on the shares of positive values of fixed convolutions (Dempster "
         "et al. 2021), mean over the windows; the penalty is chosen on validation units.",
     )
+    role = Role.RIVAL
     reads = ROCKET_INPUT
     _model: Any
     _n_classes: int
@@ -202,7 +202,7 @@ class MiniRocket(Baseline):
         return f"ridge, penalty {best_penalty:g}"
 
     def predict_proba(self, table: FeatureTable) -> FloatArray:
-        """Softmax (row, class) of the scores: it ranks as they do, and regression has no probabilities."""
+        """Softmax (row, class) of the scores, which ranks as they do."""
         from scipy.special import softmax
 
         score = self._model.decision_function(table.values)

@@ -61,9 +61,9 @@ class NearestSpectrum(Baseline):
         name="nearest_spectrum",
         label="1-NN on spectra",
         card_label="1-NN on spectra",
-        role=Role.RIVAL,
         meaning="the class of the training signal with the nearest log-magnitude spectrum, mean over the windows.",
     )
+    role = Role.RIVAL
     reads = SPECTRUM_INPUT
     _model: KNeighborsClassifier
     _n_classes: int

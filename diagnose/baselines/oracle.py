@@ -67,7 +67,8 @@ def oracle_table(task: Task, segments: Segments, cache: Cache) -> FeatureTable:
     for key in keys:
         if key in cache:
             continue
-        signal, twin = (read_signal(task, *key[1:], name=name).astype(float) for name in ("acceleration", TWIN))
+        signal = read_signal(task, *key[1:]).astype(float)
+        twin = read_signal(task, *key[1:], name=TWIN).astype(float)
         three = (signal, twin, signal - twin)
         rotation = {gear: values[key[1]] for gear, values in speed.items()}
         rate = task.dataset.sampling_rate
@@ -106,10 +107,10 @@ class OracleIndicators(Baseline):
         name="oracle_indicators",
         label="indicators",
         card_label=None,
-        role=Role.BOUND,
         meaning="logistic regression or gradient boosting (chosen on validation units) on "
         "indicators and band levels of the record, its healthy twin and their difference.",
     )
+    role = Role.BOUND
     reads = TWIN_INPUT
     _model: ChosenModel
 

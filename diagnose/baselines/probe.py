@@ -34,7 +34,8 @@ EXCLUDED = {
     "acceleration_clean_scale": "the peak of the signal itself",
     "healthy_twin_scale": "the peak of a signal",
 }
-# Results that a user reads off the machine; all others only the simulation knows, and only `ResultProbe` sees them.
+# Results that a user reads off the machine. All others only the simulation knows: they are read by
+# `ResultProbe` alone.
 READ_OFF = ("speed_rpm", "mesh_frequency_hz")
 
 
@@ -103,11 +104,11 @@ class MetadataProbe(Baseline):
         name="metadata_probe",
         label="metadata probe",
         card_label="metadata",
-        role=Role.AT_CHANCE,
         meaning="gradient boosting on what row and place of a record tell without its signal: set "
         "speed and torque, actual speed, noise, unit, start, order in the file. Above chance: "
         "something leaks.",
     )
+    role = Role.AT_CHANCE
     reads = METADATA_INPUT
     _model: ChosenModel
 
@@ -132,11 +133,11 @@ class ResultProbe(Baseline):
         name="result_probe",
         label="result probe",
         card_label=None,
-        role=Role.FOLLOWER,
         meaning="the same with what only the simulation knows of a record, such as its integration "
         "error. A fault changes the motion and may so change these: they are no input of a "
         "classifier.",
     )
+    role = Role.FOLLOWER
     reads = RESULT_INPUT
     _model: ChosenModel
 

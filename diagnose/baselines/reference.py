@@ -112,11 +112,11 @@ class Reference(Baseline):
         name="reference",
         label="against a sound record",
         card_label=None,
-        role=Role.RIVAL,
         meaning="logistic regression or gradient boosting (chosen on validation units) on which "
         "tooth is louder or quieter than in a sound record of the same machine; it is given that "
         "record, which the others are not.",
     )
+    role = Role.RIVAL
     reads = TOOTH_INPUT
     _model: ChosenModel
 

@@ -29,4 +29,4 @@ BASELINES: dict[str, type[Baseline]] = {
 
 def baseline_names(*roles: Role) -> tuple[str, ...]:
     """Names of the baselines of these roles."""
-    return tuple(name for name, baseline in BASELINES.items() if baseline.text.role in roles)
+    return tuple(name for name, baseline in BASELINES.items() if baseline.role in roles)

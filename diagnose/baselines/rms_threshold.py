@@ -27,9 +27,9 @@ class RmsThreshold(Baseline):
         name="rms_threshold",
         label="RMS threshold",
         card_label="RMS threshold",
-        role=Role.RIVAL,
         meaning="thresholds on the level alone.",
     )
+    role = Role.RIVAL
     reads = INDICATOR_INPUT
     _tree: DecisionTreeClassifier
     _n_classes: int

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from typing import Any
 
 from diagnose.baselines.base import Role
@@ -37,8 +37,8 @@ def controls_section(metrics: Mapping[str, Any]) -> Section:
     if not rows:
         return Section(title="Controls")
     labels = [row[1] for row in rows]
-    notes = [(name, text) for name, text in control_notes().items() if any(label.startswith(name) for label in labels)]
-    if not any(label.startswith("oracle") for label in labels) and metrics["settings"]["oracle"] == "auto":
+    notes = [(name, text) for name, text in control_notes().items() if _explains(name, labels)]
+    if not _explains("oracle", labels) and metrics["settings"]["oracle"] == "auto":
         notes.append(("oracle", "none: the data set holds no healthy twins (dataset.store_healthy_twin=true)."))
     return Section(
         title="Controls",
@@ -47,6 +47,11 @@ def controls_section(metrics: Mapping[str, Any]) -> Section:
         notes=notes,
         folded=True,
     )
+
+
+def _explains(name: str, labels: Sequence[str]) -> bool:
+    """Whether a note is of one of the rows with these labels."""
+    return any(label.startswith(name) for label in labels)
 
 
 def _rows(result: Mapping[str, Any], model: str) -> list[list[str]]:
@@ -61,7 +66,8 @@ def _rows(result: Mapping[str, Any], model: str) -> list[list[str]]:
         if text.name in methods:
             probe = methods[text.name]
             above = is_above(probe["balanced_accuracy"], chance)
-            rows.append([text.label, score_cell(probe), "follows the fault" if above else "at chance"])
+            found = "follows the fault" if above else "at chance"
+            rows.append([text.label, score_cell(probe), found])
     if "oracle" in methods:
         chosen = oracle_labels(model)
         rows.append(["oracle", score_cell(methods["oracle"]), f"of {chosen[methods['oracle']['chosen']]}"])

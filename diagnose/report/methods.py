@@ -1,4 +1,4 @@
-"""Methods of a study as the page names them: the baselines of the registry and the trained controls."""
+"""Methods of a study as the page names them: baselines of the registry and trained controls."""
 
 from __future__ import annotations
 
@@ -15,28 +15,24 @@ LEVEL_TEXT = MethodText(
     name=LEVEL_KEPT,
     label="network with RMS",
     card_label=None,
-    role=Role.RIVAL,
     meaning="the same network on windows in m/s^2, their level not removed.",
 )
 ORACLE_TEXT = MethodText(
     name=ORACLE,
     label="oracle",
     card_label=None,
-    role=Role.BOUND,
     meaning="the better of two models that are given each record's healthy twin; see Controls.",
 )
 SHAM_TEXT = MethodText(
     name=SHAM,
     label="sham",
     card_label="sham",
-    role=Role.AT_CHANCE,
     meaning="the same training on a data set of severity zero whose labels were kept; see Controls.",
 )
 SHUFFLE_TEXT = MethodText(
     name=LABEL_SHUFFLE,
     label="label shuffle",
     card_label="label shuffle",
-    role=Role.AT_CHANCE,
     meaning="the same training on shuffled labels. Chance must lie in its interval, which covers "
     "the units and the luck of the shuffle; if it lies below, something leaks.",
 )
@@ -55,8 +51,7 @@ ORACLE_NOTE = (
 
 def baseline_texts(*roles: Role) -> list[MethodText]:
     """Texts of the baselines of these roles, in the order of the registry."""
-    texts = [baseline.text for baseline in BASELINES.values()]
-    return [text for text in texts if text.role in roles]
+    return [baseline.text for baseline in BASELINES.values() if baseline.role in roles]
 
 
 def score_columns(model: str) -> dict[str, str]:
@@ -85,7 +80,8 @@ def controls_on_cards() -> dict[str, str]:
 
 def controls_at_chance() -> dict[str, str]:
     """Labels of every control that must be at chance, a rival's counterpart on the sham set too."""
-    shams = {sham_method(text.name, ""): f"{SHAM}, {text.label}" for text in baseline_texts(Role.RIVAL)}
+    rivals = baseline_texts(Role.RIVAL)
+    shams = {sham_method(text.name, ""): f"{SHAM}, {text.label}" for text in rivals}
     return {
         SHUFFLE_TEXT.name: SHUFFLE_TEXT.label,
         **{text.name: text.label for text in baseline_texts(Role.AT_CHANCE)},

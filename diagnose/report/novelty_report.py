@@ -102,13 +102,13 @@ def _table(result: Mapping[str, Any]) -> Table:
     rate = ["fpr95"] if "known" in result else []
     keys = ["auroc", *rate, "false_alarms"]
     heads = {"auroc": "AUROC", "fpr95": "FPR95", "false_alarms": "false alarms"}
-    return Table(
-        head=["score", *(heads[key] for key in keys), *(f"{name} found" for name in novel)],
-        rows=[
-            [SCORE_LABELS[name], *(_cell(method.get(key)) for key in keys), *(_cell(method["found"][c]) for c in novel)]
-            for name, method in result["methods"].items()
-        ],
-    )
+    rows = []
+    for name, method in result["methods"].items():
+        scores = [_cell(method.get(key)) for key in keys]
+        found = [_cell(method["found"][label]) for label in novel]
+        rows.append([SCORE_LABELS[name], *scores, *found])
+    head = ["score", *(heads[key] for key in keys), *(f"{name} found" for name in novel)]
+    return Table(head=head, rows=rows)
 
 
 def _cell(score: Mapping[str, Any] | None) -> str:

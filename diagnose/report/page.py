@@ -148,10 +148,16 @@ def _meaning_section(metrics: Mapping[str, Any], clean: Mapping[str, Any]) -> Se
             ),
             *[(name, f"{MEANING[name]}{_sensors(result)}.") for name, result in clean.items()],
             ("LEAKY", f"{LEAKY_MEANING}."),
-            *((text.label, text.meaning) for text in explained_methods() if _has(metrics, text.name)),
+            *_explanations(metrics),
         ],
         folded=True,
     )
+
+
+def _explanations(metrics: Mapping[str, Any]) -> list[tuple[str, str]]:
+    """Label and meaning of every method beside the network that ran."""
+    shown = [text for text in explained_methods() if _has(metrics, text.name)]
+    return [(text.label, text.meaning) for text in shown]
 
 
 def _fault_section(folder: Path, clean: Mapping[str, Any], metrics: Mapping[str, Any]) -> Section:

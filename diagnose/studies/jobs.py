@@ -125,7 +125,8 @@ def _run_training(
         rng = np.random.default_rng([seed, 2])
         train = with_shuffled_labels(train, n_classes, rng)
         validation = with_shuffled_labels(validation, n_classes, rng)
-    run = "-".join(word for word in (protocol, LABEL_SHUFFLE if shuffled else control, f"seed{seed}") if word)
+    variant = LABEL_SHUFFLE if shuffled else control
+    run = "-".join(word for word in (protocol, variant, f"seed{seed}") if word)
     with epoch_log(settings.out, run, wanted=settings.tensorboard) as on_epoch:
         training = train_network(
             train,

@@ -271,7 +271,8 @@ def _protocol_result(
     for method in dict.fromkeys(prediction.method for prediction in mine):
         runs = [prediction for prediction in mine if prediction.method == method]
         pairs = [(run.record, run.predicted) for run in runs]
-        scores = score_predictions(task, pairs, settings.n_bootstrap, shuffled=method == LABEL_SHUFFLE)
+        shuffled = method == LABEL_SHUFFLE
+        scores = score_predictions(task, pairs, settings.n_bootstrap, shuffled=shuffled)
         methods[method] = {**scores, "seeds": [run.seed for run in runs], "detail": [run.detail for run in runs]}
     network = [run for run in mine if run.method == str(settings.model.get("name", "network"))]
     test = np.unique(network[0].record)

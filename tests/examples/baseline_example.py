@@ -27,9 +27,9 @@ class NearestCrest(Baseline):
         name="nearest_crest",
         label="nearest crest factor",
         card_label="nearest crest factor",
-        role=Role.RIVAL,
         meaning="the class whose mean crest factor over the training signals is nearest.",
     )
+    role = Role.RIVAL  # the network must beat it
     reads = INDICATOR_INPUT  # stretches of signal with their condition indicators
 
     def fit(self, train: FeatureTable, validation: FeatureTable, n_classes: int) -> str:

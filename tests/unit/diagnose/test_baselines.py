@@ -42,7 +42,8 @@ def one_thread():
 def source_of(dataset):
     """Everything that a baseline may read of a data set."""
     task = task_of(dataset, window_samples=1200, stride_samples=1200, normalise="none")
-    sets = {subset: load_windows(task, subset_segments(task, "by_unit", subset)) for subset in SUBSETS}
+    segments = {subset: subset_segments(task, "by_unit", subset) for subset in SUBSETS}
+    sets = {subset: load_windows(task, stretches) for subset, stretches in segments.items()}
     return Source(
         task=task,
         protocol="by_unit",
@@ -115,7 +116,7 @@ def check_text(baseline):
     assert text.label.strip()
     assert text.meaning.strip().endswith(".")
     assert text.card_label is None or text.card_label.strip()
-    assert isinstance(text.role, Role)
+    assert isinstance(baseline.role, Role)
 
 
 def rows_of(table, rows):
@@ -150,8 +151,7 @@ def test_it_has_its_words(name):
 
 
 def test_no_name_and_no_label_of_a_role_is_there_twice():
-    texts = [baseline.text for baseline in BASELINES.values()]
-    pairs = [(text.role, text.label) for text in texts]
+    pairs = [(baseline.role, baseline.text.label) for baseline in BASELINES.values()]
     assert len(set(pairs)) == len(pairs)
     assert sorted(baseline_names(*Role)) == sorted(BASELINES)
 
@@ -159,7 +159,8 @@ def test_no_name_and_no_label_of_a_role_is_there_twice():
 class Careless(Baseline):
     """Breaks every law: random, not normalised, tied to the order of rows, without words."""
 
-    text = MethodText(name="not a name", label=" ", meaning="", role=Role.RIVAL, card_label="")
+    text = MethodText(name="not a name", label=" ", meaning="", card_label="")
+    role = Role.RIVAL
     reads = INDICATOR_INPUT
 
     def fit(self, train, validation, n_classes):
@@ -211,7 +212,7 @@ def missing_on_page(page, baseline):
     """Words of a baseline that a page lacks, those of its sham counterpart too."""
     text = baseline.text
     words = [text.label, text.meaning]
-    if text.role is Role.RIVAL:
+    if baseline.role is Role.RIVAL:
         words.append(f">sham, {text.label}<")
     return [word for word in words if word not in unescape(page)]
 
@@ -232,7 +233,8 @@ def test_a_baseline_that_is_not_registered_is_not_on_the_page(study, tmp_path, m
 
 
 def test_what_runs_by_default_is_registered():
-    assert set(compose("train", ["data=x", "out=y"])["baselines"]) <= set(baseline_names(Role.RIVAL))
+    config = compose("train", ["data=x", "out=y"])
+    assert set(config["baselines"]) <= set(baseline_names(Role.RIVAL))
 
 
 def test_settings_are_refused_without_loading_torch():

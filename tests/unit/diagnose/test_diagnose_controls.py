@@ -165,7 +165,14 @@ def test_a_leak_is_found_and_where_there_is_none_the_probe_is_at_chance():
     dataset = FakeDataset(**{**SMALL, "n_units": 24, "records_per_unit": 8})
     task = make_task(dataset)
 
-    source = Source(task=task, protocol="by_unit", features="basic", minirocket_features=84, windows=dict, caches={})
+    source = Source(
+        task=task,
+        protocol="by_unit",
+        features="basic",
+        minirocket_features=84,
+        windows=dict,
+        caches={},
+    )
 
     def share(name):
         (found,) = baseline_predictions(source, [name])
