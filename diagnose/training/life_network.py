@@ -12,11 +12,11 @@ import torch
 from numpy.typing import NDArray
 from torch import nn
 
-from diagnose.data.windows import WindowSet, input_scale
+from diagnose.data.windows import WindowSet
 from diagnose.networks.registry import build_model
 from diagnose.scoring.metrics import over_records
 from diagnose.settings import TrainSettings
-from diagnose.training.train import device_of, windows_an_epoch
+from diagnose.training.train import device_of, input_scale, windows_an_epoch
 from gensig.errors import SimulationError
 
 FloatArray = NDArray[np.floating]
