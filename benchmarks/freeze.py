@@ -14,14 +14,22 @@ from pathlib import Path
 
 import numpy as np
 
+from diagnose.baselines.base import Role
+from diagnose.baselines.registry import baseline_names
 from diagnose.studies.benchmark import Benchmark, sha256, signal_rms
+from diagnose.studies.jobs import LABEL_SHUFFLE, ORACLE_NETWORK, SHAM
 from diagnose.studies.study import is_leaky
 from gensig.dataset.reader import open_dataset
 
 FOLDER = Path(__file__).parents[1] / "diagnose" / "frozen"
 N_RECORDS = 20  # whose RMS is kept
 DIGITS = 9
-CONTROLS = ("label_shuffle", "sham", "metadata_probe", "result_probe", "oracle_network", "oracle_indicators")
+CONTROLS = {
+    LABEL_SHUFFLE,
+    SHAM,
+    ORACLE_NETWORK,
+    *baseline_names(Role.AT_CHANCE, Role.FOLLOWER, Role.BOUND),
+}
 
 
 def freeze(name: str, data: Path, reports: Sequence[Path]) -> Benchmark:

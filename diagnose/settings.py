@@ -3,19 +3,21 @@
 from __future__ import annotations
 
 import dataclasses
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from typing import Any
 
+from diagnose.baselines.base import Role
+from diagnose.baselines.features import FEATURES
+from diagnose.baselines.minirocket import KERNELS
+from diagnose.baselines.registry import baseline_names
 from gensig.errors import ConfigError
 from gensig.options.configuration import Configuration
 
-BASELINES = ("indicators", "indicators_without_level", "rms_threshold", "nearest_spectrum", "minirocket", "reference")
 DEVICES = ("auto", "cpu", "cuda")
 HEADS = ("severity", "gear")
 TASKS = ("classes", "remaining_life")
 BOTH = "both"  # of normalise: without the level, and beside it a second training with it
-LEAST_ROCKET_FEATURES = 84  # one for each of the kernels
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -83,7 +85,7 @@ class TrainSettings:
             if getattr(self, name) is not None:
                 _check_whole(name, getattr(self, name), least=1)
         _check_whole("batch_size", self.batch_size, least=2)
-        _check_whole("minirocket_features", self.minirocket_features, least=LEAST_ROCKET_FEATURES)
+        _check_whole("minirocket_features", self.minirocket_features, least=len(KERNELS))
         if self.n_threads is not None:
             _check_whole("n_threads", self.n_threads, least=1)
         if self.sampling_rate_hz is not None:
@@ -103,20 +105,21 @@ class TrainSettings:
             raise ConfigError(f"oracle must be auto or false, not {self.oracle!r}")
         if self.sham is not None and (not isinstance(self.sham, str) or not self.sham):
             raise ConfigError(f"sham must be the folder of a data set made with plan.sham=true, not {self.sham!r}")
-        if len(set(self.baselines)) < len(self.baselines) or not set(self.baselines) <= set(BASELINES):
-            raise ConfigError(
-                f"baselines must be false or a list of different names out of {', '.join(BASELINES)}, "
-                f"not {', '.join(str(name) for name in self.baselines)}"
-            )
-        if len(set(self.heads)) < len(self.heads) or not set(self.heads) <= set(HEADS):
-            raise ConfigError(
-                f"heads must be false or a list of different names out of {', '.join(HEADS)}, "
-                f"not {', '.join(str(name) for name in self.heads)}"
-            )
-        if self.features not in ("basic", "all"):
-            raise ConfigError(f"features must be basic or all, not {self.features!r}")
+        self._check_list("baselines", baseline_names(Role.RIVAL))
+        self._check_list("heads", HEADS)
+        if self.features not in tuple(FEATURES):
+            raise ConfigError(f"features must be {' or '.join(FEATURES)}, not {self.features!r}")
         if self.device not in DEVICES:
             raise ConfigError(f"device must be one of {', '.join(DEVICES)}, not {self.device!r}")
+
+    def _check_list(self, key: str, allowed: Sequence[str]) -> None:
+        """Refuse a list with a name twice or one that is not allowed."""
+        names = getattr(self, key)
+        if len(set(names)) < len(names) or not set(names) <= set(allowed):
+            raise ConfigError(
+                f"{key} must be false or a list of different names out of {', '.join(allowed)}, "
+                f"not {', '.join(str(name) for name in names)}"
+            )
 
 
 def settings_from(config: Configuration) -> TrainSettings:

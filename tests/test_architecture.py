@@ -87,11 +87,11 @@ GENSIG = {
 DIAGNOSE = {
     "baselines": "data networks scoring",
     "commands": "data detectability progress recordings report settings studies training",
-    "data": "settings",
     "networks": "data",
     "recordings": "data networks report scoring studies training",
-    "report": "data scoring studies training",
+    "report": "baselines data scoring studies training",
     "scoring": "data networks",
+    "settings": "baselines",
     "studies": "baselines data networks scoring settings training",
     "training": "data networks scoring settings",
 }

@@ -33,8 +33,9 @@ from gensig.signals.spectral_kurtosis import spectral_kurtosis
 FloatArray = NDArray[np.floating]
 IntArray = NDArray[np.integer]
 GEARS = ("pinion", "wheel")
+LEVEL = "log_rms"  # at the end of the names of columns
 INDICATORS = (
-    "log_rms",
+    LEVEL,
     "kurtosis",
     "crest_factor",
     *(f"{name}_{gear}" for gear in GEARS for name in ("fm4", "sideband_ratio")),

@@ -1,16 +1,26 @@
-"""MiniRocket: shares of positive values of fixed convolutions, features that need no training.
+"""MiniRocket: ridge regression on shares of positive values of fixed convolutions.
 
-Written here because the libraries that hold it bring a whole toolbox along (sktime, aeon) or have no second release.
+The transform is written here. The libraries that hold it bring a whole toolbox along (sktime,
+aeon) or have no second release.
 """
 
 from __future__ import annotations
 
 import itertools
 from dataclasses import dataclass
+from typing import TYPE_CHECKING, Any, final
 
 import numpy as np
-import torch
 from numpy.typing import NDArray
+
+from diagnose.baselines.base import Baseline, Input, MethodText, Parts, Role, Source
+from diagnose.baselines.estimators import record_accuracy
+from diagnose.baselines.features import FeatureTable
+from diagnose.baselines.window_features import over_stretches
+from diagnose.data.windows import WindowSet
+
+if TYPE_CHECKING:
+    import torch
 
 FloatArray = NDArray[np.floating]
 KERNEL_LENGTH = 9
@@ -23,6 +33,8 @@ KERNELS = np.array(
 )
 MAX_DILATIONS = 32
 GOLDEN_RATIO = (1 + np.sqrt(5)) / 2
+N_EXAMPLES = 512  # windows that thresholds may be taken from
+PENALTIES = np.logspace(5, -1, 7)
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -56,6 +68,8 @@ def fit_minirocket(windows: FloatArray, *, n_features: int, rng: np.random.Gener
     classification", KDD; several channels as in the authors' later code: each kernel sees a drawn set of channels, the
     logarithm of whose number is uniform.
     """
+    import torch
+
     n_windows, n_channels, n_samples = windows.shape
     per_kernel = max(n_features // len(KERNELS), 1)
     quantile = np.arange(1, per_kernel * len(KERNELS) + 1) * GOLDEN_RATIO % 1
@@ -85,12 +99,16 @@ def minirocket_features(windows: FloatArray, banks: list[Bank]) -> FloatArray:
 
     Two windows at a time stay in the cache of a processor; sums of bytes are ten times as fast in numpy as in torch.
     """
+    import torch
+
     blocks = torch.from_numpy(windows).split(2)
     return np.concatenate([np.concatenate([_shares(block, bank) for bank in banks], axis=1) for block in blocks])
 
 
 def _shares(windows: torch.Tensor, bank: Bank) -> FloatArray:
     """(window, feature) of one dilation, kernel by kernel."""
+    import torch
+
     n_samples, margin = windows.shape[-1], 4 * bank.dilation
     padded = torch.nn.functional.pad(windows, (margin, margin))
     taps = [padded[..., tap * bank.dilation :][..., :n_samples] for tap in range(KERNEL_LENGTH)]
@@ -118,7 +136,86 @@ def _dilations(n_samples: int, per_kernel: int) -> list[tuple[int, int]]:
 
 def _kernels_on_channels(n_channels: int, rng: np.random.Generator) -> torch.Tensor:
     """(84, channel, 9) the kernels, each on its drawn channels."""
+    import torch
+
     most = min(n_channels, KERNEL_LENGTH)
     n_seen = np.floor(2 ** rng.uniform(0, np.log2(most + 1), len(KERNELS))).astype(int)
     seen = np.stack([rng.permutation(n_channels) < n for n in n_seen])
     return torch.from_numpy((KERNELS[:, None, :] * seen[:, :, None]).astype(np.float32))
+
+
+def rocket_tables(
+    train: WindowSet,
+    validation: WindowSet,
+    test: WindowSet,
+    *,
+    n_features: int,
+) -> Parts:
+    """Features of the stretches of three subsets, means over their windows.
+
+    Everything is chosen on the training windows. The draws are those of seed 0: the features
+    hardly depend on them.
+    """
+    rng = np.random.default_rng(0)
+    examples = np.sort(rng.permutation(len(train))[:N_EXAMPLES])
+    banks = fit_minirocket(train.cut(examples), n_features=n_features, rng=rng)
+
+    def table(windows: WindowSet) -> FeatureTable:
+        return over_stretches(windows, lambda block: minirocket_features(block, banks), "rocket")
+
+    return Parts(train=table(train), validation=table(validation), test=table(test))
+
+
+def _make(source: Source) -> Parts:
+    return rocket_tables(**source.windows(), n_features=source.minirocket_features)
+
+
+ROCKET_INPUT = Input(name="rockets", make=_make)
+
+
+@final
+class MiniRocket(Baseline):
+    """Ridge regression on class membership, features standardised."""
+
+    text = MethodText(
+        name="minirocket",
+        label="MiniRocket",
+        card_label="MiniRocket",
+        meaning="ridge regression on the shares of positive values of fixed convolutions (Dempster "
+        "et al. 2021), mean over the windows; the penalty is chosen on validation units.",
+    )
+    role = Role.RIVAL
+    reads = ROCKET_INPUT
+    _model: Any
+    _n_classes: int
+
+    def fit(self, train: FeatureTable, validation: FeatureTable, n_classes: int) -> str:
+        """Fit with each penalty and keep the best one; the largest wins ties."""
+        self._n_classes = n_classes
+        best, best_penalty, best_accuracy = None, 0.0, -1.0
+        for penalty in PENALTIES:
+            self._model = _ridge(penalty).fit(train.values, train.label)
+            accuracy = record_accuracy(self.predict_proba(validation), validation)
+            if accuracy > best_accuracy:
+                best, best_penalty, best_accuracy = self._model, penalty, accuracy
+        self._model = best
+        return f"ridge, penalty {best_penalty:g}"
+
+    def predict_proba(self, table: FeatureTable) -> FloatArray:
+        """Softmax (row, class) of the scores, which ranks as they do."""
+        from scipy.special import softmax
+
+        score = self._model.decision_function(table.values)
+        if score.ndim == 1:  # two classes: one score, positive for the second
+            score = np.stack([-score, score], axis=1)
+        probability = np.zeros((len(table.values), self._n_classes))
+        probability[:, self._model.classes_] = softmax(score, axis=1)
+        return probability
+
+
+def _ridge(penalty: float) -> Any:
+    from sklearn.linear_model import RidgeClassifier
+    from sklearn.pipeline import make_pipeline
+    from sklearn.preprocessing import StandardScaler
+
+    return make_pipeline(StandardScaler(), RidgeClassifier(alpha=penalty, class_weight="balanced"))

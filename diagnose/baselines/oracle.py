@@ -2,28 +2,24 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Mapping
 from dataclasses import replace
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING, Any, final
 
 import numpy as np
 from numpy.typing import NDArray
 
-from diagnose.baselines.classic import best_candidate, judged
-from diagnose.baselines.features import INDICATORS, FeatureTable, indicators, known_rotation
-from diagnose.data.turns import load_inputs
-from diagnose.data.windows import SUBSETS, Segments, Task, WindowSet, read_signal, subset_segments
+from diagnose.baselines.base import Baseline, Input, MethodText, Parts, Role, Source
+from diagnose.baselines.estimators import ChosenModel, choose_model
+from diagnose.baselines.features import INDICATORS, Cache, FeatureTable, indicators, known_rotation
+from diagnose.data.windows import Segments, Task, WindowSet, read_signal
 from diagnose.networks.domain import band_levels
-from diagnose.scoring.metrics import balanced_accuracy, confusion_by_unit
-from diagnose.scoring.predictions import Prediction, Rows
 
 if TYPE_CHECKING:
     from gensig.dataset.reader import Dataset
 
 FloatArray = NDArray[np.floating]
 TWIN = "healthy_twin"  # of the data set, dataset.store_healthy_twin=true
-NETWORK, ON_INDICATORS = "oracle_network", "oracle_indicators"
-Cache = dict[tuple[int, int, int], FloatArray]
 
 
 def has_twin(dataset: Dataset) -> bool:
@@ -39,6 +35,8 @@ def oracle_windows(
     Under ``normalise=rms`` that is the twin's RMS over the stretch, channel by channel. Record and difference say what
     record and twin say; no kernel has to learn to subtract.
     """
+    from diagnose.data.turns import load_inputs
+
     windows = load_inputs(task, segments, model_config, training=training, read=_record_and_difference)
     return replace(windows, normalise="none")
 
@@ -59,15 +57,24 @@ def oracle_table(task: Task, segments: Segments, cache: Cache) -> FeatureTable:
     the record over the twin's. ``cache`` is filled and used, so that protocols share what they have in common.
     """
     speed, n_teeth = known_rotation(task)
-    keys = list(zip(segments.record.tolist(), segments.start.tolist(), segments.stop.tolist(), strict=True))
+    stretches = zip(
+        segments.record.tolist(),
+        segments.start.tolist(),
+        segments.stop.tolist(),
+        strict=True,
+    )
+    keys = [(task.channel_names, *stretch) for stretch in stretches]
     for key in keys:
-        if key not in cache:
-            signal, twin = (read_signal(task, *key, name=name).astype(float) for name in ("acceleration", TWIN))
-            three = (signal, twin, signal - twin)
-            rotation = {gear: values[key[0]] for gear, values in speed.items()}
-            of_each = [indicators(one, task.dataset.sampling_rate, rotation, n_teeth) for one in three]
-            own, sound, rest = (band_levels(one) for one in three)
-            cache[key] = np.concatenate([*of_each, rest, own - sound], axis=1).ravel()
+        if key in cache:
+            continue
+        signal = read_signal(task, *key[1:]).astype(float)
+        twin = read_signal(task, *key[1:], name=TWIN).astype(float)
+        three = (signal, twin, signal - twin)
+        rotation = {gear: values[key[1]] for gear, values in speed.items()}
+        rate = task.dataset.sampling_rate
+        columns = [indicators(part, rate, rotation, n_teeth) for part in three]
+        faulty, sound, rest = (band_levels(part) for part in three)
+        cache[key] = np.concatenate([*columns, rest, faulty - sound], axis=1).ravel()
     n_bands = cache[keys[0]].size // len(task.channel_names) - 3 * len(INDICATORS)
     of_channel = [f"{part}/{name}" for part in ("record", "twin", "difference") for name in INDICATORS]
     of_channel += [f"{part}/band_{band}" for part in ("difference", "ratio") for band in range(n_bands // 2)]
@@ -79,31 +86,39 @@ def oracle_table(task: Task, segments: Segments, cache: Cache) -> FeatureTable:
     )
 
 
-def fit_oracle_indicators(task: Task, protocol: str, cache: Cache) -> Prediction:
-    """Logistic regression or gradient boosting on `oracle_table`, the better one on the validation units."""
-    n_classes = len(task.class_names)
-    train, validation, test = (oracle_table(task, subset_segments(task, protocol, subset), cache) for subset in SUBSETS)
-    name, model = best_candidate(train, validation, n_classes=n_classes)
-    record, log_probability = judged(model, test, n_classes)
-    held_out, held_out_scores = judged(model, validation, n_classes)
-    return Prediction(
-        protocol=protocol,
-        method=ON_INDICATORS,
-        seed=0,
-        record=record,
-        log_probability=log_probability,
-        detail=name,
-        validation=Rows(record=held_out, log_probability=held_out_scores),
+def twin_tables(source: Source) -> Parts:
+    """Tables of records and twins in every subset."""
+    cache = source.caches.setdefault(TWIN_INPUT.name, {})
+
+    def table(subset: str) -> FeatureTable:
+        return oracle_table(source.part(subset), source.segments(subset), cache)
+
+    return Parts(train=table("train"), validation=table("validation"), test=table("test"))
+
+
+TWIN_INPUT = Input(name="with_twins", make=twin_tables)
+
+
+@final
+class OracleIndicators(Baseline):
+    """Logistic regression or gradient boosting on `oracle_table`."""
+
+    text = MethodText(
+        name="oracle_indicators",
+        label="indicators",
+        card_label=None,
+        meaning="logistic regression or gradient boosting (chosen on validation units) on "
+        "indicators and band levels of the record, its healthy twin and their difference.",
     )
+    role = Role.BOUND
+    reads = TWIN_INPUT
+    _model: ChosenModel
 
+    def fit(self, train: FeatureTable, validation: FeatureTable, n_classes: int) -> str:
+        """Fit all candidates and keep the best one."""
+        self._model = choose_model(train, validation, n_classes)
+        return self._model.name
 
-def chosen_oracle(task: Task, runs: Sequence[Prediction]) -> str | None:
-    """Name of the better of the two on the validation units, mean over its seeds; None where neither ran."""
-    labels, n_classes = task.labels(), len(task.class_names)
-    scores: dict[str, list[float]] = {}
-    for run in runs:
-        if run.method in (NETWORK, ON_INDICATORS) and run.validation is not None:
-            label, guess = labels[run.validation.record], run.validation.log_probability.argmax(axis=1)
-            confusion = confusion_by_unit(label, guess, np.zeros_like(label), n_classes)[0]
-            scores.setdefault(run.method, []).append(float(balanced_accuracy(confusion)))
-    return max(scores, key=lambda name: float(np.mean(scores[name])), default=None)
+    def predict_proba(self, table: FeatureTable) -> FloatArray:
+        """Probabilities (row, class) of the chosen model."""
+        return self._model.probability(table)

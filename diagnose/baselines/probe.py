@@ -2,22 +2,21 @@
 
 from __future__ import annotations
 
-from typing import TYPE_CHECKING
+from functools import partial
+from typing import TYPE_CHECKING, final
 
 import numpy as np
 from numpy.typing import NDArray
 
-from diagnose.baselines.classic import gradient_boosting, judged
+from diagnose.baselines.base import Baseline, Input, MethodText, Parts, Role, Source
+from diagnose.baselines.estimators import ChosenModel, boosted_trees
 from diagnose.baselines.features import FeatureTable
-from diagnose.data.windows import Task, subset_segments
-from diagnose.scoring.predictions import Prediction
 from gensig.dataset.schema import COLUMNS, SIGNALS
 
 if TYPE_CHECKING:
     from gensig.dataset.reader import Dataset
 
 FloatArray = NDArray[np.floating]
-METADATA, RESULTS = "metadata_probe", "result_probe"
 # Never probed, and why. By the role that the schema gives a column ...
 LABELS = {
     "label": "it is the class",
@@ -35,7 +34,8 @@ EXCLUDED = {
     "acceleration_clean_scale": "the peak of the signal itself",
     "healthy_twin_scale": "the peak of a signal",
 }
-# Results that a user reads off the machine; all others only the simulation knows, and only `RESULTS` sees them.
+# Results that a user reads off the machine. All others only the simulation knows: they are read by
+# `ResultProbe` alone.
 READ_OFF = ("speed_rpm", "mesh_frequency_hz")
 
 
@@ -78,31 +78,74 @@ def _count_before(names: NDArray) -> NDArray[np.integer]:
     return count
 
 
-def fit_probe(task: Task, protocol: str, *, results: bool) -> Prediction:
-    """Gradient boosting on the rows of the training records, judged on those of the test.
-
-    With ``results`` it also sees what only the simulation knows of a record, such as its integration error. A fault
-    changes the motion, and may so change these: such a column is no input of a classifier.
-    """
+def _probe_tables(source: Source, *, results: bool) -> Parts:
+    """Rows of the records of every subset."""
+    task = source.task
     n_classes = len(task.class_names)
     values, names = probe_values(task.dataset, n_classes, results=results)
-    records = [np.unique(subset_segments(task, protocol, subset).record) for subset in ("train", "test")]
-    known = np.asarray(np.isfinite(values[records[0]]).any(axis=0))  # the boosting's bins need a value
-    train, test = (
-        FeatureTable(
-            values=values[record][:, known],
-            names=tuple(name for name, is_known in zip(names, known, strict=True) if is_known),
-            label=task.labels()[record],
-            record=record,
-        )
-        for record in records
+
+    def table(subset: str) -> FeatureTable:
+        record = np.unique(source.segments(subset).record)
+        label = task.labels()[record]
+        return FeatureTable(values=values[record], names=names, label=label, record=record)
+
+    return Parts(train=table("train"), validation=table("validation"), test=table("test"))
+
+
+METADATA_INPUT = Input(name="metadata", make=partial(_probe_tables, results=False))
+RESULT_INPUT = Input(name="results", make=partial(_probe_tables, results=True))
+
+
+@final
+class MetadataProbe(Baseline):
+    """Gradient boosting on the rows of the training records."""
+
+    text = MethodText(
+        name="metadata_probe",
+        label="metadata probe",
+        card_label="metadata",
+        meaning="gradient boosting on what row and place of a record tell without its signal: set "
+        "speed and torque, actual speed, noise, unit, start, order in the file. Above chance: "
+        "something leaks.",
     )
-    record, log_probability = judged(gradient_boosting(train), test, n_classes)
-    return Prediction(
-        protocol=protocol,
-        method=RESULTS if results else METADATA,
-        seed=0,
-        record=record,
-        log_probability=log_probability,
-        detail=f"gradient boosting on {len(train.names)} columns",
+    role = Role.AT_CHANCE
+    reads = METADATA_INPUT
+    _model: ChosenModel
+
+    def fit(self, train: FeatureTable, validation: FeatureTable, n_classes: int) -> str:
+        """Fit to the training rows; there is no choice."""
+        self._model = boosted_trees(train, n_classes)
+        return f"gradient boosting on {len(self._model.columns)} columns"
+
+    def predict_proba(self, table: FeatureTable) -> FloatArray:
+        """Probabilities (row, class) of the boosted trees."""
+        return self._model.probability(table)
+
+
+@final
+class ResultProbe(Baseline):
+    """The same with results that only the simulation knows, such as the integration error.
+
+    A fault changes the motion, and may so change these: such a column is no input of a classifier.
+    """
+
+    text = MethodText(
+        name="result_probe",
+        label="result probe",
+        card_label=None,
+        meaning="the same with what only the simulation knows of a record, such as its integration "
+        "error. A fault changes the motion and may so change these: they are no input of a "
+        "classifier.",
     )
+    role = Role.FOLLOWER
+    reads = RESULT_INPUT
+    _model: ChosenModel
+
+    def fit(self, train: FeatureTable, validation: FeatureTable, n_classes: int) -> str:
+        """Fit to the training rows; there is no choice."""
+        self._model = boosted_trees(train, n_classes)
+        return f"gradient boosting on {len(self._model.columns)} columns"
+
+    def predict_proba(self, table: FeatureTable) -> FloatArray:
+        """Probabilities (row, class) of the boosted trees."""
+        return self._model.probability(table)

@@ -5,9 +5,13 @@ A model that is given what a monitored machine has and a new one has not. ``docs
 
 from __future__ import annotations
 
+from typing import final
+
 import numpy as np
 from numpy.typing import NDArray
 
+from diagnose.baselines.base import Baseline, Input, MethodText, Parts, Role, Source
+from diagnose.baselines.estimators import ChosenModel, choose_model
 from diagnose.baselines.features import GEARS, FeatureTable, known_rotation
 from diagnose.data.windows import Segments, Task, read_signal
 from gensig.errors import ConfigError
@@ -85,6 +89,45 @@ def reference_table(task: Task, segments: Segments, known: Levels) -> FeatureTab
         label=task.labels()[segments.record],
         record=segments.record,
     )
+
+
+def reference_tables(source: Source) -> Parts:
+    """Changes of the teeth in every subset."""
+    known: Levels = {}
+
+    def table(subset: str) -> FeatureTable:
+        return reference_table(source.part(subset), source.segments(subset), known)
+
+    return Parts(train=table("train"), validation=table("validation"), test=table("test"))
+
+
+TOOTH_INPUT = Input(name="tooth_changes", make=reference_tables)
+
+
+@final
+class Reference(Baseline):
+    """Logistic regression or gradient boosting on changes of teeth against a sound record."""
+
+    text = MethodText(
+        name="reference",
+        label="against a sound record",
+        card_label=None,
+        meaning="logistic regression or gradient boosting (chosen on validation units) on which "
+        "tooth is louder or quieter than in a sound record of the same machine; it is given that "
+        "record, which the others are not.",
+    )
+    role = Role.RIVAL
+    reads = TOOTH_INPUT
+    _model: ChosenModel
+
+    def fit(self, train: FeatureTable, validation: FeatureTable, n_classes: int) -> str:
+        """Fit all candidates and keep the best one."""
+        self._model = choose_model(train, validation, n_classes)
+        return self._model.name
+
+    def predict_proba(self, table: FeatureTable) -> FloatArray:
+        """Probabilities (row, class) of the chosen model."""
+        return self._model.probability(table)
 
 
 def _names(task: Task) -> tuple[str, ...]:

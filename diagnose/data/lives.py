@@ -2,8 +2,9 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from dataclasses import dataclass
-from typing import TYPE_CHECKING, Any
+from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
@@ -11,9 +12,6 @@ from numpy.typing import NDArray
 from diagnose.data.protocols import OPEN_PROTOCOLS, choose_protocols
 from diagnose.data.windows import CROSS_SENSOR, SUBSETS, Segments, Task, subset_segments
 from gensig.errors import ConfigError, DatasetError
-
-if TYPE_CHECKING:
-    from diagnose.settings import LifeSettings, TrainSettings
 
 FloatArray = NDArray[np.floating]
 IntArray = NDArray[np.integer]
@@ -85,16 +83,20 @@ def life_segments(task: Task, lives: Lives, protocol: str, subset: str) -> Segme
     return Segments(record=found.record[kept], start=found.start[kept], stop=found.stop[kept])
 
 
-def choose_life_protocols(task: Task, lives: Lives, settings: TrainSettings) -> tuple[tuple[str, ...], dict[str, str]]:
+def choose_life_protocols(
+    task: Task,
+    lives: Lives,
+    wanted: Sequence[str] | None,
+) -> tuple[tuple[str, ...], dict[str, str]]:
     """Protocols that keep every life whole on one side, and of the others wanted, why they are left out.
 
     Raises
     ------
     ConfigError    for a name that is no protocol, and where none is left
     """
-    wanted, left_out = choose_protocols(task, settings.protocols)
+    offered, left_out = choose_protocols(task, wanted)
     kept = []
-    for protocol in wanted:
+    for protocol in offered:
         reason = _why_not(task, lives, protocol)
         if reason is None:
             kept.append(protocol)
@@ -120,14 +122,15 @@ def _why_not(task: Task, lives: Lives, protocol: str) -> str | None:
     return None
 
 
-def early_level(lives: Lives, record: IntArray, settings: LifeSettings) -> float:
+def early_level(lives: Lives, record: IntArray, *, level_h: float | None, share: float) -> float:
     """Level in h at which the remaining life is cut: long before its failure a machine shows nothing of it.
 
     Parameters
     ----------
     lives : of the data set
     record : of the training part
-    settings : ``early_life_h``, or ``early_life_share`` of the median length of the training lives that failed
+    level_h : the level; None for the share below
+    share : of the median length of the training lives that failed
 
     Raises
     ------
@@ -136,11 +139,11 @@ def early_level(lives: Lives, record: IntArray, settings: LifeSettings) -> float
     Source: the piecewise linear target of Heimes (2008), "Recurrent neural networks for remaining useful life
     estimation", International Conference on Prognostics and Health Management.
     """
-    if settings.early_life_h is not None:
-        return float(settings.early_life_h)
+    if level_h is not None:
+        return float(level_h)
     chosen = record[lives.failed[record]]
     _, first = np.unique(lives.name[chosen], return_index=True)
-    level = settings.early_life_share * float(np.median((lives.age + lives.remaining)[chosen[first]]))
+    level = share * float(np.median((lives.age + lives.remaining)[chosen[first]]))
     if level <= 0:
         raise DatasetError("the training lives have no length; give remaining_life.early_life_h")
     return level

@@ -255,6 +255,14 @@ def normalised(windows: NDArray[np.float32], how: str) -> NDArray[np.float32]:
     return centered
 
 
+def input_scale(windows: WindowSet) -> list[float]:
+    """RMS of each channel over the signals; 1 if windows are divided by theirs, or it is silent."""
+    if windows.normalise == "rms":
+        return [1.0] * windows.signals[0].shape[0]
+    power = np.mean([np.var(signal, axis=-1) for signal in windows.signals], axis=0)
+    return [float(value) for value in np.where(power > 0, np.sqrt(power), 1.0)]
+
+
 def n_samples(dataset: Dataset) -> int:
     """Samples a record, the same for all."""
     return int(dataset.n_samples)

@@ -2,36 +2,20 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from typing import Any
 
-from diagnose.report.text import METHODS, score_cell
+from diagnose.baselines.base import Role
+from diagnose.report.methods import (
+    baseline_texts,
+    control_notes,
+    controls_at_chance,
+    oracle_labels,
+)
+from diagnose.report.text import score_cell
 from diagnose.scoring.judged import interval_text
 from diagnose.scoring.metrics import is_above
 from gensig.text.page import Section, Table
-
-# In the order of the rows; of these chance must lie in the interval.
-AT_CHANCE = {
-    "label_shuffle": "label shuffle",
-    "metadata_probe": "metadata probe",
-    "sham": "sham, network",
-    "sham_indicators": "sham, indicators",
-    "sham_indicators_without_level": "sham, indicators without RMS",
-    "sham_rms_threshold": "sham, RMS threshold",
-    "sham_nearest_spectrum": "sham, 1-NN on spectra",
-    "sham_minirocket": "sham, MiniRocket",
-}
-MEANING = {
-    "metadata probe": "gradient boosting on what row and place of a record tell without its signal: set speed and "
-    "torque, actual speed, noise, unit, start, order in the file. Above chance: something leaks.",
-    "result probe": "the same with what only the simulation knows of a record, such as its integration error. A fault "
-    "changes the motion and may so change these: they are no input of a classifier.",
-    "sham": "the same trainings on a data set of severity zero whose labels were kept. Above chance: something other "
-    "than the fault tells the class.",
-    "oracle": "the better, on validation units, of the same network and of a model on indicators, both given the "
-    "record's healthy twin in as much noise. What it finds is in the signal; it is a bound for those who do not know "
-    "how this machine sounds when healthy, as far as these two can learn, not of what any detector could find.",
-}
 
 
 def verdict(method: Mapping[str, Any], chance: float) -> str:
@@ -52,8 +36,9 @@ def controls_section(metrics: Mapping[str, Any]) -> Section:
             rows += [[protocol, *row] for row in _rows(result, metrics["model"])]
     if not rows:
         return Section(title="Controls")
-    notes = [(name, text) for name, text in MEANING.items() if any(row[1].startswith(name) for row in rows)]
-    if not any(row[1].startswith("oracle") for row in rows) and metrics["settings"]["oracle"] == "auto":
+    labels = [row[1] for row in rows]
+    notes = [(name, text) for name, text in control_notes().items() if _explains(name, labels)]
+    if not _explains("oracle", labels) and metrics["settings"]["oracle"] == "auto":
         notes.append(("oracle", "none: the data set holds no healthy twins (dataset.store_healthy_twin=true)."))
     return Section(
         title="Controls",
@@ -64,20 +49,27 @@ def controls_section(metrics: Mapping[str, Any]) -> Section:
     )
 
 
+def _explains(name: str, labels: Sequence[str]) -> bool:
+    """Whether a note is of one of the rows with these labels."""
+    return any(label.startswith(name) for label in labels)
+
+
 def _rows(result: Mapping[str, Any], model: str) -> list[list[str]]:
     methods = result["methods"]
     chance = methods["chance"]["balanced_accuracy"]
     rows = [
         [name, score_cell(methods[key]), verdict(methods[key], chance)]
-        for key, name in AT_CHANCE.items()
+        for key, name in controls_at_chance().items()
         if key in methods
     ]
-    if "result_probe" in methods:
-        probe = methods["result_probe"]
-        found = "follows the fault" if is_above(probe["balanced_accuracy"], chance) else "at chance"
-        rows.append(["result probe", score_cell(probe), found])
+    for text in baseline_texts(Role.FOLLOWER):
+        if text.name in methods:
+            probe = methods[text.name]
+            above = is_above(probe["balanced_accuracy"], chance)
+            found = "follows the fault" if above else "at chance"
+            rows.append([text.label, score_cell(probe), found])
     if "oracle" in methods:
-        chosen = {"oracle_network": model, "oracle_indicators": METHODS["indicators"]}
+        chosen = oracle_labels(model)
         rows.append(["oracle", score_cell(methods["oracle"]), f"of {chosen[methods['oracle']['chosen']]}"])
         rows += [[f"oracle, {name}", score_cell(methods[key]), ""] for key, name in chosen.items() if key in methods]
         rows.append([f"{model} over oracle", oracle_share(result), oracle_verdict(result)])

@@ -6,20 +6,10 @@ from collections.abc import Mapping
 from typing import Any
 
 from diagnose.scoring.judged import interval_text
+from diagnose.studies.novelty import SCORE_LABELS
 from diagnose.studies.novelty_metrics import FALSE_ALARMS, LEAST_VALIDATION, TRUE_POSITIVES
 from gensig.text.page import Section, Table
 
-METHODS = {
-    "nearest_indicators": "5th neighbour, indicators",
-    "nearest_indicators_without_level": "5th neighbour, indicators without RMS",
-    "forest_indicators": "isolation forest, indicators",
-    "forest_indicators_without_level": "isolation forest, indicators without RMS",
-    "nearest_band_levels": "5th neighbour, band levels",
-    "autoencoder": "autoencoder",
-    "largest_probability": "1 - largest probability",
-    "energy": "energy",
-    "nearest_features": "5th neighbour, network's features",
-}
 QUESTIONS = {
     "healthy_only": "Is a fault noticed by who knows health alone",
     "open_set": "Is a fault noticed that was never trained on",
@@ -96,7 +86,7 @@ def _notes(result: Mapping[str, Any]) -> list[tuple[str, str]]:
     if "known" in result:
         for name, method in result["methods"].items():
             areas = [f"against {known} {_cell(area)}" for known, area in method["auroc_by_known_class"].items()]
-            notes.append((f"AUROC of {METHODS[name]}", ", ".join(areas) + "."))
+            notes.append((f"AUROC of {SCORE_LABELS[name]}", ", ".join(areas) + "."))
         notes.append(
             (
                 "FPR95",
@@ -112,13 +102,13 @@ def _table(result: Mapping[str, Any]) -> Table:
     rate = ["fpr95"] if "known" in result else []
     keys = ["auroc", *rate, "false_alarms"]
     heads = {"auroc": "AUROC", "fpr95": "FPR95", "false_alarms": "false alarms"}
-    return Table(
-        head=["score", *(heads[key] for key in keys), *(f"{name} found" for name in novel)],
-        rows=[
-            [METHODS[name], *(_cell(method.get(key)) for key in keys), *(_cell(method["found"][c]) for c in novel)]
-            for name, method in result["methods"].items()
-        ],
-    )
+    rows = []
+    for name, method in result["methods"].items():
+        scores = [_cell(method.get(key)) for key in keys]
+        found = [_cell(method["found"][label]) for label in novel]
+        rows.append([SCORE_LABELS[name], *scores, *found])
+    head = ["score", *(heads[key] for key in keys), *(f"{name} found" for name in novel)]
+    return Table(head=head, rows=rows)
 
 
 def _cell(score: Mapping[str, Any] | None) -> str:

@@ -12,10 +12,9 @@ from diagnose.report.answer_sections import answer_sections
 from diagnose.report.answer_tables import write_tables
 from diagnose.report.control_sections import controls_section
 from diagnose.report.figures import confusion_figure, reliability_figure, scores_figure
+from diagnose.report.methods import explained_methods, score_columns
 from diagnose.report.novelty_report import novelty_sections
 from diagnose.report.text import (
-    METHOD_MEANING,
-    METHODS,
     answer_card,
     caveats,
     confusions,
@@ -64,7 +63,7 @@ def without_interval(metrics: Mapping[str, Any]) -> list[str]:
 
 def _score_table(metrics: Mapping[str, Any]) -> Table:
     results = sorted(metrics["protocols"].items(), key=lambda item: item[1]["leaky"])
-    columns = {metrics["model"]: metrics["model"].upper(), **METHODS}
+    columns = score_columns(metrics["model"])
     shown = [key for key in columns if any(key in result["methods"] for _, result in results)]
     return Table(
         head=["protocol", *(columns[key] for key in shown)],
@@ -149,10 +148,16 @@ def _meaning_section(metrics: Mapping[str, Any], clean: Mapping[str, Any]) -> Se
             ),
             *[(name, f"{MEANING[name]}{_sensors(result)}.") for name, result in clean.items()],
             ("LEAKY", f"{LEAKY_MEANING}."),
-            *[(METHODS[name], text) for name, text in METHOD_MEANING.items() if _has(metrics, name)],
+            *_explanations(metrics),
         ],
         folded=True,
     )
+
+
+def _explanations(metrics: Mapping[str, Any]) -> list[tuple[str, str]]:
+    """Label and meaning of every method beside the network that ran."""
+    shown = [text for text in explained_methods() if _has(metrics, text.name)]
+    return [(text.label, text.meaning) for text in shown]
 
 
 def _fault_section(folder: Path, clean: Mapping[str, Any], metrics: Mapping[str, Any]) -> Section:

@@ -7,6 +7,7 @@ from typing import Any
 
 import numpy as np
 
+from diagnose.report.methods import controls_on_cards, rivals_on_cards
 from diagnose.report.novelty_report import novelty_caveats
 from diagnose.scoring.judged import interval_text
 from diagnose.scoring.metrics import LEAST_UNITS, is_above
@@ -14,39 +15,6 @@ from gensig.text.page import Card, Table
 
 FEW_UNITS = 10
 CONFUSED = 0.1
-# Methods beside the network, in the order of the columns, as readers see them.
-METHODS = {
-    "indicators": "indicators",
-    "indicators_without_level": "indicators without RMS",
-    "rms_threshold": "RMS threshold",
-    "nearest_spectrum": "1-NN on spectra",
-    "minirocket": "MiniRocket",
-    "reference": "against a sound record",
-    "level_kept": "network with RMS",
-    "oracle": "oracle",
-    "label_shuffle": "label shuffle",
-    "sham": "sham",
-    "chance": "chance",
-}
-RIVALS = ("indicators", "rms_threshold", "nearest_spectrum", "minirocket")
-MUST_BE_AT_CHANCE = {"label_shuffle": "label shuffle", "metadata_probe": "metadata", "sham": "sham"}
-METHOD_MEANING = {
-    "indicators": "logistic regression or gradient boosting (chosen on validation units) on RMS, kurtosis, crest "
-    "factor, FM4 and sideband ratio of every channel over the whole stretch of signal; it knows the speed and the "
-    "tooth counts.",
-    "rms_threshold": "thresholds on the level alone.",
-    "nearest_spectrum": "the class of the training signal with the nearest log-magnitude spectrum, mean over the "
-    "windows.",
-    "minirocket": "ridge regression on the shares of positive values of fixed convolutions (Dempster et al. 2021), "
-    "mean over the windows; the penalty is chosen on validation units.",
-    "reference": "logistic regression or gradient boosting (chosen on validation units) on which tooth is louder or "
-    "quieter than in a sound record of the same machine; it is given that record, which the others are not.",
-    "level_kept": "the same network on windows in m/s^2, their level not removed.",
-    "oracle": "the better of two models that are given each record's healthy twin; see Controls.",
-    "sham": "the same training on a data set of severity zero whose labels were kept; see Controls.",
-    "label_shuffle": "the same training on shuffled labels. Chance must lie in its interval, which covers the units "
-    "and the luck of the shuffle; if it lies below, something leaks.",
-}
 
 
 def score_cell(method: Mapping[str, Any] | None) -> str:
@@ -71,17 +39,13 @@ def answer_card(name: str, result: Mapping[str, Any], model: str, meaning: str) 
     verdict = [f"{'above chance' if above else 'not distinguishable from chance'} ({chance:.2f})"]
     if score["low"] is None:
         verdict = [f"no verdict against chance ({chance:.2f}): too few machines"]
-    elif others := {key: methods[key]["balanced_accuracy"]["mean"] for key in RIVALS if key in methods}:
-        best = max(others, key=lambda key: others[key])
-        # an interval that holds the other's mean tells the two apart neither way
-        better, worse = score["low"] > others[best], score["high"] < others[best]
-        comparison = "better than" if better else "worse than" if worse else "not told from"
-        verdict.append(f"{comparison} {METHODS[best]} ({others[best]:.2f})")
+    elif comparison := _best_rival(methods, score):
+        verdict.append(comparison)
     leak = False
     if "oracle" in methods:
         share, best = result["over_oracle"]["balanced_accuracy"], methods["oracle"]["balanced_accuracy"]
         verdict.append(f"{share['mean']:.2f} ({_spread(share)}) of the oracle ({best['mean']:.2f})")
-    for key, control in MUST_BE_AT_CHANCE.items():
+    for key, control in controls_on_cards().items():
         if key in methods:
             found = methods[key]["balanced_accuracy"]
             above_chance = is_above(found, chance)
@@ -96,6 +60,22 @@ def answer_card(name: str, result: Mapping[str, Any], model: str, meaning: str) 
     mark = "good" if above and not leak else "bad"
     text = _sentence(meaning if meaning.startswith("tested") else f"tested {meaning}")
     return Card(title=name, value=value, spread=spread, verdict="; ".join(verdict), meaning=text, mark=mark)
+
+
+def _best_rival(methods: Mapping[str, Any], score: Mapping[str, Any]) -> str | None:
+    """Comparison of the network's score with the best baseline; None where none ran."""
+    labels = {name: label for name, label in rivals_on_cards().items() if name in methods}
+    if not labels:
+        return None
+    means = {name: methods[name]["balanced_accuracy"]["mean"] for name in labels}
+    best = max(means, key=lambda name: means[name])
+    # an interval that holds the other's mean tells the two apart neither way
+    comparison = "not told from"
+    if score["low"] > means[best]:
+        comparison = "better than"
+    elif score["high"] < means[best]:
+        comparison = "worse than"
+    return f"{comparison} {labels[best]} ({means[best]:.2f})"
 
 
 def _spread(score: Mapping[str, Any]) -> str:

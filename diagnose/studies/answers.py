@@ -9,6 +9,8 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
+from diagnose.baselines.base import Role
+from diagnose.baselines.registry import baseline_names
 from diagnose.data.windows import Task
 from diagnose.scoring.conditions import by_condition, condition_columns
 from diagnose.scoring.detection_limit import HEALTHY, detection, size_columns
@@ -17,7 +19,7 @@ from diagnose.scoring.metrics import balanced_accuracy
 from diagnose.scoring.paired import compare
 from diagnose.scoring.predictions import Prediction
 from diagnose.scoring.window_length import by_window_length
-from diagnose.settings import BASELINES, TrainSettings
+from diagnose.settings import TrainSettings
 
 ANSWERS_SEED = 20240608
 
@@ -36,7 +38,8 @@ def protocol_answers(task: Task, settings: TrainSettings, predictions: Sequence[
     where no windows were kept.
     """
     network_name = str(settings.model.get("name", "network"))
-    names = dict.fromkeys(p.method for p in predictions if p.method == network_name or p.method in BASELINES)
+    compared = (network_name, *baseline_names(Role.RIVAL))
+    names = dict.fromkeys(p.method for p in predictions if p.method in compared)
     runs = {name: [p for p in predictions if p.method == name] for name in names}
     record = reduce(np.intersect1d, [run[0].record for run in runs.values()])
     judged = {name: _judged(task, name, run, record) for name, run in runs.items()}

@@ -5,11 +5,16 @@ from __future__ import annotations
 from collections.abc import Callable, Sequence
 from typing import Any
 
-from diagnose.baselines import oracle
+import numpy as np
+
+from diagnose.baselines.base import Role
+from diagnose.baselines.oracle import has_twin
+from diagnose.baselines.registry import baseline_names
 from diagnose.data.windows import CROSS_SENSOR, Task
+from diagnose.scoring.metrics import balanced_accuracy, confusion_by_unit
 from diagnose.scoring.predictions import Prediction
 from diagnose.settings import BOTH, TrainSettings
-from diagnose.studies.jobs import LEVEL_KEPT, ORACLE, PROBE, SHAM, Job
+from diagnose.studies.jobs import LEVEL_KEPT, ORACLE, ORACLE_NETWORK, PROBE, SHAM, Job
 from diagnose.training import sham
 
 Pairs = Sequence[tuple[Any, Any]]
@@ -28,7 +33,7 @@ def control_jobs(task: Task, settings: TrainSettings, clean: Sequence[str]) -> l
         shams = sham.sham_protocols(sham.sham_task(task, settings.sham), clean)
     if not clean:
         return []
-    with_oracle = settings.oracle == "auto" and oracle.has_twin(task.dataset)
+    with_oracle = settings.oracle == "auto" and has_twin(task.dataset)
     jobs = [Job(protocols=clean, seed=None, control=PROBE)] if settings.metadata_probe else []
     # a twin of the same channels says nothing of channels never seen
     known = tuple(name for name in clean if name != CROSS_SENSOR) if with_oracle else ()
@@ -77,3 +82,18 @@ def sham_methods(
         told = {"seeds": [run.seed for run in mine], "detail": [run.detail for run in mine]}
         found.setdefault(protocol, {})[method] = {**scores, **told}
     return found
+
+
+def chosen_oracle(task: Task, runs: Sequence[Prediction]) -> str | None:
+    """Name of the oracle with the best mean score on the validation units; None where none ran."""
+    oracles = (ORACLE_NETWORK, *baseline_names(Role.BOUND))
+    labels, n_classes = task.labels(), len(task.class_names)
+    scores: dict[str, list[float]] = {}
+    for run in runs:
+        if run.method not in oracles or run.validation is None:
+            continue
+        label = labels[run.validation.record]
+        predicted = run.validation.log_probability.argmax(axis=1)
+        confusion = confusion_by_unit(label, predicted, np.zeros_like(label), n_classes)[0]
+        scores.setdefault(run.method, []).append(float(balanced_accuracy(confusion)))
+    return max(scores, key=lambda name: float(np.mean(scores[name])), default=None)

@@ -11,20 +11,16 @@ from concurrent.futures import ProcessPoolExecutor, as_completed
 from concurrent.futures.process import BrokenProcessPool
 from contextlib import contextmanager
 from dataclasses import dataclass, replace
+from functools import partial
 from typing import Any
 
 import numpy as np
 import torch
 
-from diagnose.baselines.classic import Prediction as BaselinePrediction
-from diagnose.baselines.classic import indicator_model, nearest_spectrum, ridge_model, rms_threshold
-from diagnose.baselines.features import Cache, FeatureTable, feature_table
-from diagnose.baselines.oracle import NETWORK as ORACLE_NETWORK
-from diagnose.baselines.oracle import Cache as OracleCache
-from diagnose.baselines.oracle import fit_oracle_indicators, oracle_windows
-from diagnose.baselines.probe import fit_probe
-from diagnose.baselines.reference import Levels, reference_table
-from diagnose.baselines.window_features import rocket_tables, spectrum_table
+from diagnose.baselines.base import Role, Source
+from diagnose.baselines.features import Cache
+from diagnose.baselines.oracle import oracle_windows
+from diagnose.baselines.registry import baseline_names
 from diagnose.data.protocols import HEALTHY_ONLY, OPEN_PROTOCOLS
 from diagnose.data.turns import load_inputs, wants_turns
 from diagnose.data.windows import SUBSETS, Task, WindowSet, subset_segments
@@ -33,20 +29,18 @@ from diagnose.networks.domain import Domain, fit_domain
 from diagnose.scoring.metrics import over_records
 from diagnose.scoring.predictions import Prediction, Rows
 from diagnose.settings import TrainSettings
+from diagnose.studies.baseline_runs import baseline_predictions
 from diagnose.studies.novelty import NoveltyRun, fitted_runs, trained_runs
 from diagnose.training.heads import predict_heads
 from diagnose.training.sham import sham_method, sham_task
 from diagnose.training.tensorboard import epoch_log
-from diagnose.training.train import (
-    input_scale,
-    predict_windows,
-    train_network,
-    with_shuffled_labels,
-)
+from diagnose.training.train import predict_windows, train_network, with_shuffled_labels
 from gensig.errors import GensigError
 
-# Controls beside the label shuffle, and the network that sees the level.
+# Controls of a job beside the label shuffle, and the network that sees the level.
 PROBE, ORACLE, SHAM, LEVEL_KEPT = "probe", "oracle", "sham", "level_kept"
+# Names of trained controls in metrics.json; those of `SHAM` and `LEVEL_KEPT` are their own.
+LABEL_SHUFFLE, ORACLE_NETWORK = "label_shuffle", "oracle_network"
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -119,14 +113,7 @@ def run_job(task: Task, settings: TrainSettings, job: Job) -> list[Outcome]:
         task = _sham(task, settings)
     if job.seed is not None:
         return [_run_training(task, settings, name, job.seed, job.shuffled, job.control) for name in job.protocols]
-    cache: Cache = {}
-    if job.control == PROBE:
-        return [fit_probe(task, name, results=results) for name in job.protocols for results in (False, True)]
-    if job.control == ORACLE:
-        twins: OracleCache = {}
-        return [fit_oracle_indicators(task, name, twins) for name in job.protocols]
-    found = [prediction for name in job.protocols for prediction in _run_baselines(task, settings, name, cache)]
-    return [replace(one, method=sham_method(one.method, "")) for one in found] if job.control == SHAM else [*found]
+    return [*_run_baselines(task, settings, job)]
 
 
 def _run_training(
@@ -138,7 +125,8 @@ def _run_training(
         rng = np.random.default_rng([seed, 2])
         train = with_shuffled_labels(train, n_classes, rng)
         validation = with_shuffled_labels(validation, n_classes, rng)
-    run = "-".join(word for word in (protocol, "label_shuffle" if shuffled else control, f"seed{seed}") if word)
+    variant = LABEL_SHUFFLE if shuffled else control
+    run = "-".join(word for word in (protocol, variant, f"seed{seed}") if word)
     with epoch_log(settings.out, run, wanted=settings.tensorboard) as on_epoch:
         training = train_network(
             train,
@@ -161,7 +149,7 @@ def _run_training(
         _, last = over_records(predict_windows(training.last_model, test), test.record)
     return Prediction(
         protocol=protocol,
-        method="label_shuffle" if shuffled else names.get(control, network),
+        method=LABEL_SHUFFLE if shuffled else names.get(control, network),
         seed=seed,
         record=record,
         log_probability=log_probability,
@@ -179,70 +167,34 @@ def _run_training(
     )
 
 
-def _run_baselines(task: Task, settings: TrainSettings, protocol: str, cache: Cache) -> list[Prediction]:
+def _run_baselines(task: Task, settings: TrainSettings, job: Job) -> list[Prediction]:
+    """Predictions of the baselines of a job on each of its protocols."""
+    names = _names_of_baselines(settings, job.control)
+    caches: dict[str, Cache] = {}
     predictions = []
-    for method in settings.baselines:
-        detail, record, log_probability = _fit_baseline(task, settings, protocol, method, cache)
-        tested = np.isin(record, subset_segments(task, protocol, "test").record)
-        held_out = Rows(record=record[~tested], log_probability=log_probability[~tested])
-        predictions.append(
-            Prediction(
-                protocol=protocol,
-                method=method,
-                seed=0,
-                record=record[tested],
-                log_probability=log_probability[tested],
-                detail=detail,
-                validation=held_out if held_out.record.size else None,
-            )
-        )
-    return predictions
-
-
-def _fit_baseline(task: Task, settings: TrainSettings, protocol: str, method: str, cache: Cache) -> BaselinePrediction:
-    """Fit one of `diagnose.settings.BASELINES` and judge it on the test and the validation records."""
-    n_classes = len(task.class_names)
-    if method in ("nearest_spectrum", "minirocket"):
-        sets = [_windows(task, protocol)[subset] for subset in SUBSETS]
-        if method == "minirocket":
-            train, validation, test = rocket_tables(*sets, n_features=settings.minirocket_features)
-            return ridge_model(train, validation, _with_validation(validation, test), n_classes=n_classes)
-        scale = input_scale(sets[0])
-        train, validation, test = (spectrum_table(windows, scale) for windows in sets)
-        return nearest_spectrum(train, _with_validation(validation, test), n_classes=n_classes)
-    if method == "reference":
-        levels: Levels = {}
-        train, validation, test = (
-            reference_table(task.part(protocol, subset), subset_segments(task, protocol, subset), levels)
-            for subset in SUBSETS
-        )
-        judged = _with_validation(validation, test)
-        return indicator_model(train, validation, judged, n_classes=n_classes, with_level=True)
-    train, validation, test = (
-        feature_table(
-            task.part(protocol, subset),
-            subset_segments(task, protocol, subset),
+    for protocol in job.protocols:
+        source = Source(
+            task=task,
+            protocol=protocol,
             features=settings.features,
-            cache=cache,
+            minirocket_features=settings.minirocket_features,
+            windows=partial(_windows, task, protocol),
+            caches=caches,
         )
-        for subset in SUBSETS
-    )
-    judged = _with_validation(validation, test)
-    if method == "rms_threshold":
-        return rms_threshold(train, judged, n_classes=n_classes)
-    return indicator_model(train, validation, judged, n_classes=n_classes, with_level=method == "indicators")
+        predictions += baseline_predictions(source, names)
+    if job.control != SHAM:
+        return predictions
+    network = str(settings.model.get("name", "network"))
+    return [replace(run, method=sham_method(run.method, network)) for run in predictions]
 
 
-def _with_validation(validation: FeatureTable, test: FeatureTable) -> FeatureTable:
-    """Rows of both parts; the test rows alone where a record is in both, as in a leaky split."""
-    if np.isin(validation.record, test.record).any():
-        return test
-    return FeatureTable(
-        values=np.concatenate([validation.values, test.values]),
-        names=test.names,
-        label=np.concatenate([validation.label, test.label]),
-        record=np.concatenate([validation.record, test.record]),
-    )
+def _names_of_baselines(settings: TrainSettings, control: str) -> tuple[str, ...]:
+    """Names of the baselines that a control runs; without one, those of the settings."""
+    if control == PROBE:
+        return baseline_names(Role.AT_CHANCE, Role.FOLLOWER)
+    if control == ORACLE:
+        return baseline_names(Role.BOUND)
+    return settings.baselines
 
 
 # Windows of the protocol a process works on; jobs come protocol by protocol.

@@ -113,7 +113,7 @@ def plan_life_study(task: Task, settings: TrainSettings) -> tuple[tuple[str, ...
     DatasetError    for a data set without lives
     """
     lives = lives_of(task)
-    protocols, left_out = choose_life_protocols(task, lives, settings)
+    protocols, left_out = choose_life_protocols(task, lives, settings.protocols)
     for protocol in protocols:
         for subset in SUBSETS:
             segments = life_segments(task, lives, protocol, subset)
@@ -133,7 +133,12 @@ def run_life_job(task: Task, settings: TrainSettings, job: Job) -> list[LifePred
     """Predictions on the test part of a protocol: of the baselines, or with a seed those of the network."""
     lives, protocol = lives_of(task), job.protocols[0]
     parts = {subset: life_segments(task, lives, protocol, subset) for subset in SUBSETS}
-    level = early_level(lives, parts["train"].record, settings.remaining_life)
+    level = early_level(
+        lives,
+        parts["train"].record,
+        level_h=settings.remaining_life.early_life_h,
+        share=settings.remaining_life.early_life_share,
+    )
     known = lives.known(level)
     for subset in ("train", "validation"):
         parts[subset] = _only(parts[subset], known)

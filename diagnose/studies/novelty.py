@@ -27,6 +27,18 @@ FloatArray = NDArray[np.floating]
 IntArray = NDArray[np.integer]
 SCORED = SUBSETS[1:]
 WITH_LEVEL, WITHOUT_LEVEL = "indicators", "indicators_without_level"
+# Names of the scores in metrics.json, and their labels on the page.
+SCORE_LABELS = {
+    "nearest_indicators": "5th neighbour, indicators",
+    "nearest_indicators_without_level": "5th neighbour, indicators without RMS",
+    "forest_indicators": "isolation forest, indicators",
+    "forest_indicators_without_level": "isolation forest, indicators without RMS",
+    "nearest_band_levels": "5th neighbour, band levels",
+    "autoencoder": "autoencoder",
+    "largest_probability": "1 - largest probability",
+    "energy": "energy",
+    "nearest_features": "5th neighbour, network's features",
+}
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -161,7 +173,6 @@ def _classifier_runs(
 
 def network_outputs(model: nn.Module, windows: WindowSet, chosen: IntArray) -> tuple[FloatArray, FloatArray]:
     """Features (window, feature) that the last layer of the class scores reads, and its output (window, class)."""
-    heads = [part for name, part in model.named_modules() if name == "head" or name.startswith("head.")]
     heads = [part for name, part in model.named_modules() if name == "head" or name.startswith("head.")]
     layer = [part for part in heads if isinstance(part, nn.Linear)][-1]
     seen: list[tuple[torch.Tensor, torch.Tensor]] = []

@@ -15,7 +15,6 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from diagnose.baselines.oracle import chosen_oracle
 from diagnose.data.at_rate import at_rate
 from diagnose.data.protocols import OPEN_PROTOCOLS, channels_to_cross, choose_protocols
 from diagnose.data.turns import check_turns, completed, n_points, wants_turns
@@ -41,8 +40,8 @@ from diagnose.scoring.metrics import (
 from diagnose.scoring.predictions import Prediction, write_predictions
 from diagnose.settings import BOTH, TrainSettings
 from diagnose.studies.answers import protocol_answers
-from diagnose.studies.controls import control_jobs, sham_methods, without_sham
-from diagnose.studies.jobs import Job, Outcome, run_jobs
+from diagnose.studies.controls import chosen_oracle, control_jobs, sham_methods, without_sham
+from diagnose.studies.jobs import LABEL_SHUFFLE, ORACLE, Job, Outcome, run_jobs
 from diagnose.studies.novelty import NoveltyRun
 from diagnose.studies.novelty_metrics import (
     check_open_protocol,
@@ -272,7 +271,8 @@ def _protocol_result(
     for method in dict.fromkeys(prediction.method for prediction in mine):
         runs = [prediction for prediction in mine if prediction.method == method]
         pairs = [(run.record, run.predicted) for run in runs]
-        scores = score_predictions(task, pairs, settings.n_bootstrap, shuffled=method == "label_shuffle")
+        shuffled = method == LABEL_SHUFFLE
+        scores = score_predictions(task, pairs, settings.n_bootstrap, shuffled=shuffled)
         methods[method] = {**scores, "seeds": [run.seed for run in runs], "detail": [run.detail for run in runs]}
     network = [run for run in mine if run.method == str(settings.model.get("name", "network"))]
     test = np.unique(network[0].record)
@@ -285,7 +285,7 @@ def _protocol_result(
     oracle = chosen_oracle(task, mine)
     over_oracle: dict[str, Any] = {}
     if oracle is not None:
-        methods["oracle"] = {**methods[oracle], "chosen": oracle}
+        methods[ORACLE] = {**methods[oracle], "chosen": oracle}
         found = [
             _confusion(task, [(run.record, run.predicted) for run in mine if run.method == name])
             for name in (network[0].method, oracle)

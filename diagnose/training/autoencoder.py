@@ -11,9 +11,9 @@ import torch
 from numpy.typing import NDArray
 from torch import nn
 
-from diagnose.data.windows import WindowSet
+from diagnose.data.windows import WindowSet, input_scale
 from diagnose.settings import TrainSettings
-from diagnose.training.train import device_of, input_scale
+from diagnose.training.train import device_of
 from gensig.errors import ConfigError, SimulationError
 
 FloatArray = NDArray[np.floating]

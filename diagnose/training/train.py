@@ -14,7 +14,7 @@ from torch import nn
 from torch.nn.functional import cross_entropy, log_softmax
 
 from diagnose.data.targets import further_loss, place_loss
-from diagnose.data.windows import WindowSet
+from diagnose.data.windows import WindowSet, input_scale
 from diagnose.networks.calibration import fit_temperature
 from diagnose.networks.network import Network
 from diagnose.networks.registry import build_model
@@ -212,14 +212,6 @@ def with_shuffled_labels(windows: WindowSet, n_classes: int, rng: np.random.Gene
         shuffled[members] = rng.permutation(np.concatenate([dealt, extra]))
     assert records.size == shuffled.size
     return replace(windows, label=shuffled[position], targets={})
-
-
-def input_scale(windows: WindowSet) -> list[float]:
-    """RMS of each channel over the training signals: 1 where windows are divided by theirs, or a channel is silent."""
-    if windows.normalise == "rms":
-        return [1.0] * windows.signals[0].shape[0]
-    power = np.mean([np.var(signal, axis=-1) for signal in windows.signals], axis=0)
-    return [float(value) for value in np.where(power > 0, np.sqrt(power), 1.0)]
 
 
 def windows_an_epoch(windows: WindowSet, fraction: float) -> int:

@@ -98,3 +98,18 @@ class FakeDataset:
                 subsets["validation"].append((i, 0.5, 0.75))
                 subsets["test"].append((i, 0.75, 1.0))
         return subsets
+
+
+class CompleteDataset(FakeDataset):
+    """Two channels, healthy twins and every column that a baseline reads."""
+
+    def __init__(self, **changes):
+        super().__init__(**{"duration": 0.5, "n_channels": 2, "twins": True, **changes})
+        rng = np.random.default_rng(7)
+        self.columns |= {
+            "fault_gear": np.where(self.columns["label"] > 0, "wheel", ""),
+            "start_tooth_pinion": rng.integers(N_TEETH["n_teeth_pinion"], size=self.n_records),
+            "start_tooth_wheel": rng.integers(N_TEETH["n_teeth_wheel"], size=self.n_records),
+            "start_phase": rng.uniform(size=self.n_records),
+            "integration_error": rng.uniform(1e-5, 1e-4, self.n_records),
+        }

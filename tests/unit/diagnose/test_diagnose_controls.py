@@ -8,13 +8,11 @@ import pytest
 from fake_dataset import CLASSES, FakeDataset
 
 import gensig.dataset.reader
-from diagnose.baselines.oracle import chosen_oracle, oracle_table, oracle_windows
+from diagnose.baselines.base import Source
+from diagnose.baselines.oracle import oracle_table, oracle_windows
 from diagnose.baselines.probe import (
     EXCLUDED,
     LABELS,
-    METADATA,
-    RESULTS,
-    fit_probe,
     probe_values,
     probed_columns,
 )
@@ -24,7 +22,8 @@ from diagnose.report.control_sections import controls_section, oracle_verdict, v
 from diagnose.scoring.metrics import ratio_with_interval
 from diagnose.scoring.predictions import Prediction, Rows
 from diagnose.settings import settings_from
-from diagnose.studies.controls import control_jobs
+from diagnose.studies.baseline_runs import baseline_predictions
+from diagnose.studies.controls import chosen_oracle, control_jobs
 from diagnose.studies.study import task_from
 from gensig.dataset.schema import COLUMNS, SIGNALS
 from gensig.errors import ConfigError
@@ -166,17 +165,26 @@ def test_a_leak_is_found_and_where_there_is_none_the_probe_is_at_chance():
     dataset = FakeDataset(**{**SMALL, "n_units": 24, "records_per_unit": 8})
     task = make_task(dataset)
 
-    def share(**options):
-        found = fit_probe(task, "by_unit", **options)
-        assert found.method == (RESULTS if options["results"] else METADATA)
+    source = Source(
+        task=task,
+        protocol="by_unit",
+        features="basic",
+        minirocket_features=84,
+        windows=dict,
+        caches={},
+    )
+
+    def share(name):
+        (found,) = baseline_predictions(source, [name])
+        assert found.method == name
         return np.mean(found.predicted == task.labels()[found.record])
 
-    assert share(results=False) == 1.0
+    assert share("metadata_probe") == 1.0
     dataset.columns["label"] = np.random.default_rng(3).permutation(dataset.columns["label"])
-    assert 0.1 < share(results=False) < 0.45
+    assert 0.1 < share("metadata_probe") < 0.45
     dataset.columns["integration_error"] = 1e-4 + 1e-4 * dataset.columns["label"]
-    assert share(results=False) < 0.45
-    assert share(results=True) == 1.0
+    assert share("metadata_probe") < 0.45
+    assert share("result_probe") == 1.0
 
 
 # --- the jobs -----------------------------------------------------------------------------------------------------

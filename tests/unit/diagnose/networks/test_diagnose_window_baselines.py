@@ -7,9 +7,17 @@ from fake_dataset import FakeDataset
 from numpy.testing import assert_allclose
 from threadpoolctl import threadpool_limits
 
-from diagnose.baselines.classic import nearest_spectrum, ridge_model
-from diagnose.baselines.minirocket import KERNELS, _dilations, fit_minirocket, minirocket_features
-from diagnose.baselines.window_features import rocket_tables, spectrum_table
+from diagnose.baselines.base import Parts
+from diagnose.baselines.estimators import record_scores
+from diagnose.baselines.minirocket import (
+    KERNELS,
+    MiniRocket,
+    _dilations,
+    fit_minirocket,
+    minirocket_features,
+    rocket_tables,
+)
+from diagnose.baselines.nearest_spectrum import NearestSpectrum, spectrum_table
 from diagnose.data.windows import SUBSETS, load_windows, subset_segments, task_of
 from diagnose.scoring.metrics import balanced_accuracy, confusion_by_unit
 
@@ -105,20 +113,26 @@ def subset(windows, chosen):
     return replace(windows, **parts)
 
 
+def judged(baseline, parts, n_classes=4):
+    """What was fitted, the test records, and their log-probabilities."""
+    detail = baseline.fit(parts.train, parts.validation, n_classes)
+    return detail, *record_scores(baseline.predict_proba(parts.test), parts.test.record)
+
+
 def test_both_find_the_fault_and_stay_at_chance_without_one():
     for strength, low, high in ((2.0, 0.6, 1.0), (0.0, 0.0, 0.55)):
         sets, task = make_sets(strength=strength)
-        tables = rocket_tables(*sets, n_features=84 * 4)
-        text, record, score = ridge_model(*tables, n_classes=4)
+        text, record, score = judged(MiniRocket(), rocket_tables(*sets, n_features=84 * 4))
         assert low <= accuracy(task, record, score.argmax(axis=1)) <= high
         assert text.startswith("ridge, penalty ")
-        train, _, test = (spectrum_table(windows, [1.0]) for windows in sets)
-        text, record, score = nearest_spectrum(train, test, n_classes=4)
+        tables = [spectrum_table(windows, [1.0]) for windows in sets]
+        parts = Parts(train=tables[0], validation=tables[1], test=tables[2])
+        text, record, score = judged(NearestSpectrum(), parts)
         assert low <= accuracy(task, record, score.argmax(axis=1)) <= high
         assert text == f"1-NN of {len(sets[0].signals)} spectra"
 
 
 def test_two_classes_have_one_score_and_it_points_the_right_way():
     sets, task = make_sets(classes=("healthy", "missing_tooth"), n_units=8)
-    _, record, score = ridge_model(*rocket_tables(*sets, n_features=84 * 2), n_classes=2)
+    _, record, score = judged(MiniRocket(), rocket_tables(*sets, n_features=84 * 2), n_classes=2)
     assert accuracy(task, record, score.argmax(axis=1)) > 0.8

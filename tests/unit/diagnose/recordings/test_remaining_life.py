@@ -155,9 +155,10 @@ def test_the_early_level_is_of_training_lives_that_failed():
     record = np.flatnonzero(np.char.startswith(lives.name, "u0"))
     names = np.unique(lives.name[record[lives.failed[record]]])
     lengths = [(lives.age + lives.remaining)[lives.name == name][0] for name in names]
-    assert early_level(lives, record, settings.remaining_life) == pytest.approx(0.6 * np.median(lengths), rel=1e-12)
-    given = settings_of("remaining_life.early_life_h=42").remaining_life
-    assert early_level(lives, record, given) == 42
+    share = settings.remaining_life.early_life_share
+    level = early_level(lives, record, level_h=None, share=share)
+    assert level == pytest.approx(0.6 * np.median(lengths), rel=1e-12)
+    assert early_level(lives, record, level_h=42, share=share) == 42
 
 
 def test_weights_of_a_life_do_not_grow_with_its_snapshots():
@@ -169,7 +170,7 @@ def test_a_split_that_cuts_lives_is_left_out():
     dataset = FakeLives(n_lives=12)
     settings = settings_of()
     task = task_from(dataset, settings)
-    protocols, left_out = choose_life_protocols(task, lives_of(task), settings)
+    protocols, left_out = choose_life_protocols(task, lives_of(task), settings.protocols)
     assert protocols == ("by_unit",)
     assert left_out["random_window_leaky"] == "life u00 is in its train and its validation part"
     with pytest.raises(ConfigError, match="life u00 is in its train"):

@@ -8,7 +8,7 @@ from fake_dataset import FakeDataset
 from numpy.testing import assert_allclose
 from threadpoolctl import threadpool_limits
 
-from diagnose.baselines.classic import indicator_model, rms_threshold
+from diagnose.baselines.estimators import record_scores
 from diagnose.baselines.features import (
     FEATURES,
     GEARS,
@@ -17,6 +17,8 @@ from diagnose.baselines.features import (
     feature_table,
     indicators,
 )
+from diagnose.baselines.indicator_models import IndicatorModel, IndicatorModelWithoutLevel
+from diagnose.baselines.rms_threshold import RmsThreshold
 from diagnose.data.windows import SUBSETS, subset_segments, task_of
 from diagnose.report.page import without_interval
 from diagnose.report.text import score_cell
@@ -211,12 +213,18 @@ def accuracy(record, predicted, task):
     return float(balanced_accuracy(confusion_by_unit(label, predicted, np.zeros_like(label), 4)[0]))
 
 
+def judged(baseline, train, validation, test):
+    """What was fitted, the test records, and their log-probabilities."""
+    detail = baseline.fit(train, validation, int(test.label.max()) + 1)
+    return detail, *record_scores(baseline.predict_proba(test), test.record)
+
+
 def test_indicator_model_finds_the_fault_and_stays_at_chance_without_one():
-    (train, validation, test), task = make_tables()
-    _, record, score = indicator_model(train, validation, test, n_classes=4, with_level=False)
+    tables, task = make_tables()
+    _, record, score = judged(IndicatorModelWithoutLevel(), *tables)
     assert accuracy(record, score.argmax(axis=1), task) > 0.6
-    (train, validation, test), task = make_tables(strength=0.0, n_units=12)
-    _, record, score = indicator_model(train, validation, test, n_classes=4, with_level=True)
+    tables, task = make_tables(strength=0.0, n_units=12)
+    _, record, score = judged(IndicatorModel(), *tables)
     assert accuracy(record, score.argmax(axis=1), task) < 0.55
 
 
@@ -226,10 +234,22 @@ def test_indicator_model_passes_over_what_no_stretch_is_long_enough_for():
     for table in tables:
         values = np.concatenate([table.values, np.full((len(table.values), 1), np.nan)], axis=1)
         with_gap.append(replace(table, values=values, names=(*table.names, "channel_0/nb4_wheel")))
-    first = indicator_model(*tables, n_classes=4, with_level=True)
-    second = indicator_model(*with_gap, n_classes=4, with_level=True)
+    first = judged(IndicatorModel(), *tables)
+    second = judged(IndicatorModel(), *with_gap)
     assert first[0] == second[0]
     np.testing.assert_array_equal(first[2], second[2])
+
+
+def test_the_level_changes_the_model_with_it_and_not_the_one_without():
+    tables, _ = make_tables(n_units=4, records_per_unit=4)
+    louder = []
+    for table in tables:
+        level = np.array([name.endswith("log_rms") for name in table.names])
+        louder.append(replace(table, values=table.values + level * table.label[:, None]))
+    without = [judged(IndicatorModelWithoutLevel(), *several)[2] for several in (tables, louder)]
+    np.testing.assert_array_equal(*without)
+    with_level = [judged(IndicatorModel(), *several)[2] for several in (tables, louder)]
+    assert (with_level[0] != with_level[1]).any()
 
 
 def test_rms_threshold_uses_the_level_only():
@@ -237,8 +257,8 @@ def test_rms_threshold_uses_the_level_only():
     label = np.arange(200) % 2
     values = np.stack([np.log(1 + label + 0.1 * rng.uniform(size=200)), rng.normal(size=200)], axis=1)
     table = FeatureTable(values=values, names=("a/log_rms", "a/kurtosis"), label=label, record=np.arange(200))
-    text, _, score = rms_threshold(table, table, n_classes=2)
+    text, _, score = judged(RmsThreshold(), table, table, table)
     assert (score.argmax(axis=1) == label).all()
     assert text.startswith("thresholds 1.")
     blind = FeatureTable(values=values[:, ::-1], names=table.names, label=label, record=table.record)
-    assert (rms_threshold(blind, blind, n_classes=2)[2].argmax(axis=1) == label).mean() < 0.7
+    assert (judged(RmsThreshold(), blind, blind, blind)[2].argmax(axis=1) == label).mean() < 0.7

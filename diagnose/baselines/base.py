@@ -1,0 +1,136 @@
+"""Interface of baselines: fit, probabilities, the input they read, and their words on the page."""
+
+from __future__ import annotations
+
+from abc import ABC, abstractmethod
+from collections.abc import Callable, Mapping
+from dataclasses import dataclass
+from enum import Enum
+from typing import TYPE_CHECKING, ClassVar
+
+import numpy as np
+from numpy.typing import NDArray
+
+from diagnose.baselines.features import Cache, FeatureTable
+from diagnose.data.windows import Segments, Task, subset_segments
+
+if TYPE_CHECKING:
+    from diagnose.data.windows import WindowSet
+
+FloatArray = NDArray[np.floating]
+
+
+class Role(Enum):
+    """Purpose of a baseline; it decides when it runs and in which table of the page it is."""
+
+    RIVAL = "the network must beat it"  # runs where the key `baselines` names it
+    AT_CHANCE = "it must be at chance, else something leaks"  # runs with metadata_probe=true
+    FOLLOWER = "it is at chance unless faults change its input"  # runs with metadata_probe=true
+    BOUND = "its input tells more than the network's"  # runs with oracle=auto
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class MethodText:
+    """Name and words of a method.
+
+    Attributes
+    ----------
+    name : key in ``metrics.json`` and in the setting `baselines`
+    label : short name on the page
+    meaning : sentence of the report
+    card_label : short name on the cards of the page; None for a method that they do not mention
+    """
+
+    name: str
+    label: str
+    meaning: str
+    card_label: str | None
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class Source:
+    """Data of one protocol, from which inputs are made.
+
+    Attributes
+    ----------
+    task, protocol : records, labels and split
+    features : key of `diagnose.baselines.features.FEATURES`
+    minirocket_features : number of features
+    windows : returns the windows of each subset
+    caches : by name of the input, filled and used, so that protocols share what they have in common
+    """
+
+    task: Task
+    protocol: str
+    features: str
+    minirocket_features: int
+    windows: Callable[[], Mapping[str, WindowSet]]
+    caches: dict[str, Cache]
+
+    def part(self, subset: str) -> Task:
+        """The task as a subset sees it."""
+        return self.task.part(self.protocol, subset)
+
+    def segments(self, subset: str) -> Segments:
+        """Stretches of records of a subset."""
+        return subset_segments(self.task, self.protocol, subset)
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class Parts:
+    """Tables of the three subsets, with the same columns."""
+
+    train: FeatureTable
+    validation: FeatureTable
+    test: FeatureTable
+
+    def judged(self) -> FeatureTable:
+        """Validation and test rows; test rows alone if a record is in both, as in a leaky split."""
+        if np.isin(self.validation.record, self.test.record).any():
+            return self.test
+        both = (self.validation, self.test)
+        return FeatureTable(
+            values=np.concatenate([table.values for table in both]),
+            names=self.test.names,
+            label=np.concatenate([table.label for table in both]),
+            record=np.concatenate([table.record for table in both]),
+        )
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class Input:
+    """Kind of tables that baselines read; a study makes each once a protocol.
+
+    Attributes
+    ----------
+    name : for the caches
+    make : returns the tables of a protocol
+    """
+
+    name: str
+    make: Callable[[Source], Parts]
+
+
+class Baseline(ABC):
+    """Method that is fitted to a table: stretches of signal or records in rows.
+
+    Every subclass is one entry of `diagnose.baselines.registry.BASELINES`. An object is fitted
+    once. No estimate may depend on the order of the rows, nor on anything random but a fixed seed.
+    """
+
+    text: ClassVar[MethodText]
+    role: ClassVar[Role]
+    reads: ClassVar[Input]
+
+    @abstractmethod
+    def fit(self, train: FeatureTable, validation: FeatureTable, n_classes: int) -> str:
+        """Fit to the training rows; choices are made on the validation rows.
+
+        Returns
+        -------
+        what was fitted, in words
+        """
+
+    @abstractmethod
+    def predict_proba(self, table: FeatureTable) -> FloatArray:
+        """Probabilities (row, class), each row with sum 1."""

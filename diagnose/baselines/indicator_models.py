@@ -1,0 +1,79 @@
+"""Simple models on condition indicators, with the level of the signal and without it."""
+
+from __future__ import annotations
+
+from typing import final
+
+import numpy as np
+from numpy.typing import NDArray
+
+from diagnose.baselines.base import Baseline, Input, MethodText, Parts, Role, Source
+from diagnose.baselines.estimators import ChosenModel, choose_model
+from diagnose.baselines.features import LEVEL, FeatureTable, feature_table
+
+FloatArray = NDArray[np.floating]
+
+
+def indicator_tables(source: Source) -> Parts:
+    """Indicators of every stretch of the signal."""
+    cache = source.caches.setdefault(INDICATOR_INPUT.name, {})
+
+    def table(subset: str) -> FeatureTable:
+        segments = source.segments(subset)
+        features = source.features
+        return feature_table(source.part(subset), segments, features=features, cache=cache)
+
+    return Parts(train=table("train"), validation=table("validation"), test=table("test"))
+
+
+INDICATOR_INPUT = Input(name="indicators", make=indicator_tables)
+
+
+@final
+class IndicatorModel(Baseline):
+    """Logistic regression or gradient boosting on all indicators."""
+
+    text = MethodText(
+        name="indicators",
+        label="indicators",
+        card_label="indicators",
+        meaning="logistic regression or gradient boosting (chosen on validation units) on RMS, "
+        "kurtosis, crest factor, FM4 and sideband ratio of every channel over the whole stretch "
+        "of signal; it knows the speed and the tooth counts.",
+    )
+    role = Role.RIVAL
+    reads = INDICATOR_INPUT
+    _model: ChosenModel
+
+    def fit(self, train: FeatureTable, validation: FeatureTable, n_classes: int) -> str:
+        """Fit all candidates and keep the best one."""
+        self._model = choose_model(train, validation, n_classes)
+        return self._model.name
+
+    def predict_proba(self, table: FeatureTable) -> FloatArray:
+        """Probabilities (row, class) of the chosen model."""
+        return self._model.probability(table)
+
+
+@final
+class IndicatorModelWithoutLevel(Baseline):
+    """The same without the RMS: a fair comparison with windows divided by theirs."""
+
+    text = MethodText(
+        name="indicators_without_level",
+        label="indicators without RMS",
+        card_label=None,
+        meaning="the same models without the RMS, for networks on windows without their level.",
+    )
+    role = Role.RIVAL
+    reads = INDICATOR_INPUT
+    _model: ChosenModel
+
+    def fit(self, train: FeatureTable, validation: FeatureTable, n_classes: int) -> str:
+        """Fit all candidates and keep the best one."""
+        self._model = choose_model(train, validation, n_classes, without=LEVEL)
+        return self._model.name
+
+    def predict_proba(self, table: FeatureTable) -> FloatArray:
+        """Probabilities (row, class) of the chosen model."""
+        return self._model.probability(table)

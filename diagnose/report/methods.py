@@ -1,0 +1,112 @@
+"""Methods of a study as the page names them: baselines of the registry and trained controls."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+
+from diagnose.baselines.base import MethodText, Role
+from diagnose.baselines.registry import BASELINES
+from diagnose.studies.jobs import LABEL_SHUFFLE, LEVEL_KEPT, ORACLE, ORACLE_NETWORK, SHAM
+from diagnose.training.sham import sham_method
+
+CHANCE = "chance"
+
+LEVEL_TEXT = MethodText(
+    name=LEVEL_KEPT,
+    label="network with RMS",
+    card_label=None,
+    meaning="the same network on windows in m/s^2, their level not removed.",
+)
+ORACLE_TEXT = MethodText(
+    name=ORACLE,
+    label="oracle",
+    card_label=None,
+    meaning="the better of two models that are given each record's healthy twin; see Controls.",
+)
+SHAM_TEXT = MethodText(
+    name=SHAM,
+    label="sham",
+    card_label="sham",
+    meaning="the same training on a data set of severity zero whose labels were kept; see Controls.",
+)
+SHUFFLE_TEXT = MethodText(
+    name=LABEL_SHUFFLE,
+    label="label shuffle",
+    card_label="label shuffle",
+    meaning="the same training on shuffled labels. Chance must lie in its interval, which covers "
+    "the units and the luck of the shuffle; if it lies below, something leaks.",
+)
+# Notes of the section Controls, where they say more than the sentences above.
+SHAM_NOTE = (
+    "the same trainings on a data set of severity zero whose labels were kept. Above chance: "
+    "something other than the fault tells the class."
+)
+ORACLE_NOTE = (
+    "the better, on validation units, of the same network and of a model on indicators, both given "
+    "the record's healthy twin in as much noise. What it finds is in the signal; it is a bound for "
+    "those who do not know how this machine sounds when healthy, as far as these two can learn, "
+    "not of what any detector could find."
+)
+
+
+def baseline_texts(*roles: Role) -> list[MethodText]:
+    """Texts of the baselines of these roles, in the order of the registry."""
+    return [baseline.text for baseline in BASELINES.values() if baseline.role in roles]
+
+
+def score_columns(model: str) -> dict[str, str]:
+    """Headings of the table of scores by name of the method; the network first."""
+    controls = (LEVEL_TEXT, ORACLE_TEXT, SHUFFLE_TEXT, SHAM_TEXT)
+    texts = [*baseline_texts(Role.RIVAL), *controls]
+    labels = {text.name: text.label for text in texts}
+    return {model: model.upper(), **labels, CHANCE: CHANCE}
+
+
+def explained_methods() -> list[MethodText]:
+    """Methods that the page explains beside its table of scores."""
+    controls = (LEVEL_TEXT, ORACLE_TEXT, SHAM_TEXT, SHUFFLE_TEXT)
+    return [*baseline_texts(Role.RIVAL), *controls]
+
+
+def rivals_on_cards() -> dict[str, str]:
+    """Labels of the baselines that the cards compare with the network."""
+    return _card_labels(baseline_texts(Role.RIVAL))
+
+
+def controls_on_cards() -> dict[str, str]:
+    """Labels of the controls whose verdict the cards give."""
+    return _card_labels([SHUFFLE_TEXT, *baseline_texts(Role.AT_CHANCE), SHAM_TEXT])
+
+
+def controls_at_chance() -> dict[str, str]:
+    """Labels of every control that must be at chance, a rival's counterpart on the sham set too."""
+    rivals = baseline_texts(Role.RIVAL)
+    shams = {sham_method(text.name, ""): f"{SHAM}, {text.label}" for text in rivals}
+    return {
+        SHUFFLE_TEXT.name: SHUFFLE_TEXT.label,
+        **{text.name: text.label for text in baseline_texts(Role.AT_CHANCE)},
+        SHAM: f"{SHAM}, network",
+        **shams,
+    }
+
+
+def oracle_labels(model: str) -> dict[str, str]:
+    """Labels of the models that are given healthy twins."""
+    baselines = {text.name: text.label for text in baseline_texts(Role.BOUND)}
+    return {ORACLE_NETWORK: model, **baselines}
+
+
+def control_notes() -> dict[str, str]:
+    """Explanation of each control by the beginning of its label."""
+    probes = baseline_texts(Role.AT_CHANCE, Role.FOLLOWER)
+    bounds = {f"{ORACLE}, {text.label}": text.meaning for text in baseline_texts(Role.BOUND)}
+    return {
+        **{text.label: text.meaning for text in probes},
+        SHAM: SHAM_NOTE,
+        ORACLE: ORACLE_NOTE,
+        **bounds,
+    }
+
+
+def _card_labels(texts: Sequence[MethodText]) -> dict[str, str]:
+    return {text.name: text.card_label for text in texts if text.card_label is not None}
