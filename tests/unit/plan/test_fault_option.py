@@ -1,11 +1,11 @@
-"""An option of the faults by itself: composed without the words that cannot change it."""
+"""Fault options, composed alone."""
 
 from importlib import resources
 
 import pytest
 
 from gensig.options.compose import compose, options
-from gensig.plan.request import _fault_option, read_request
+from gensig.plan.request import _fault_option, _typed_words, read_request
 
 
 class TestFaultOptionAlone:
@@ -20,14 +20,26 @@ class TestFaultOptionAlone:
     @pytest.mark.parametrize("fault", options("fault"))
     def test_it_is_that_of_the_whole_configuration(self, fault):
         words = [*self.OTHERS, f"fault={fault}"]
-        assert _fault_option(words, None) == compose("generate", words)["fault"]
+        assert _fault_option(_typed_words(words), fault, (), None) == compose("generate", words)["fault"]
 
     def test_a_reference_to_another_group_is_followed(self):
-        words = ["operating.torque_nm=3", "fault.crack_depth_mm=${operating.torque_nm}", "fault=crack"]
-        request = read_request(["plan.classes=[crack]", *words[:2]])
-        assert request.config["classes"]["crack"]["crack_depth_mm"] == 3
-        assert _fault_option(words, None)["crack_depth_mm"] == 3
+        words = ["operating.torque_nm=3", "fault.crack_depth_mm=${operating.torque_nm}"]
+        for choice in ("plan.classes=[crack]", "fault=crack"):
+            assert read_request([choice, *words]).config["classes"]["crack"]["crack_depth_mm"] == 3
+
+    def test_the_whole_configuration_is_composed_once(self, monkeypatch):
+        composed = []
+
+        def counted(name, *args, **kwargs):
+            composed.append(name)
+            return compose(name, *args, **kwargs)
+
+        monkeypatch.setattr("gensig.plan.request.compose", counted)
+        read_request(["experiment=quickstart", "fault.crack_depth_mm=1.25"])
+        assert composed.count("generate") == 1
+        assert all(name == "generate" or name.startswith("fault/") for name in composed)
 
     def test_nobody_can_change_what_the_next_one_gets(self):
-        _fault_option(["fault=crack"], None)["vary"].clear()
-        assert _fault_option(["fault=crack"], None)["vary"]
+        words = _typed_words([])
+        _fault_option(words, "crack", (), None)["vary"].clear()
+        assert _fault_option(words, "crack", (), None)["vary"]
