@@ -16,6 +16,7 @@ from gensig.driveline.linear.dampers import TorsionalDamper, with_dampers
 from gensig.driveline.linear.forced import USUAL_ORDERS, SteadyResponse, over_cycle
 from gensig.driveline.linear.shaft_line import LineGear
 from gensig.driveline.mesh_phase import start_rolls
+from gensig.driveline.running import named_by_side
 from gensig.errors import ConfigError
 from gensig.life.root.strength import Strength
 from gensig.mesh.options import read_mesh_options, read_slice_options
@@ -125,9 +126,9 @@ def seen_by_dampers(
 
 def read_mesh_strength(config: Configuration, line: EngineLine, mesh: int) -> RootStrength:
     """Pair and strength of one mesh of a line, without load; flanks, material and strength of the configuration."""
-    given, own = line.drive.pairs[mesh], config.section("mesh")
+    own = config.section("mesh")
     # the mesh code knows gears by their sides, the tables by the names of the machine
-    pair = replace(given, pinion=replace(given.pinion, name="pinion"), wheel=replace(given.wheel, name="wheel"))
+    pair = named_by_side(line.drive.pairs[mesh])
     flanks = SlicedPair(
         pair=pair,
         material=read_material(config),

@@ -189,7 +189,8 @@ def mesh_forces(machine: EngineLine, speed: float, torque: float) -> Array:
 
 def named_by_side(pair: GearPair) -> GearPair:
     """The pair with its gears named as faults and tables name them; in a line they have names of their own."""
-    return replace(pair, pinion=replace(pair.pinion, name="pinion"), wheel=replace(pair.wheel, name="wheel"))
+    pinion, wheel = (replace(gear, name=side) for side, gear in pair.gears.items())
+    return replace(pair, pinion=pinion, wheel=wheel)
 
 
 def reference_force(machine: EngineLine, place: int, force: float) -> float:

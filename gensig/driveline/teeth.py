@@ -20,7 +20,7 @@ from gensig.driveline.running import OwnMesh, named_by_side, reference_force
 from gensig.driveline.time.line_mesh import mesh_start, tooth_angle
 from gensig.errors import ConfigError, GeometryError
 from gensig.faults.base import Fault, faulty_teeth
-from gensig.geometry.contact import GearPair
+from gensig.geometry.contact import SIDES, GearPair
 from gensig.material import Material
 from gensig.mesh.load_distribution import loaded_pair_table
 from gensig.mesh.options import MeshOptions, SliceOptions
@@ -32,7 +32,6 @@ Array = NDArray[np.float64]
 
 SOUND_NODES = 128  # most of a pitch of sound helical teeth: short tables are read faster, and these ripple slowly
 FORCES_PER_OCTAVE = 2  # at which sound helical teeth are tabulated: chords reach over all depths of bite
-SIDES = ("pinion", "wheel")
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)

@@ -9,7 +9,7 @@ from enum import Enum
 from typing import ClassVar
 
 from gensig.errors import FaultError
-from gensig.geometry.contact import GearPair
+from gensig.geometry.contact import SIDES, GearPair
 from gensig.geometry.gear import Gear
 from gensig.geometry.tooth import Tooth, healthy_tooth
 from gensig.units import from_si, split_unit
@@ -46,8 +46,8 @@ class Fault(ABC):
     tooth: int | str | tuple[int, ...] = field()
 
     def __post_init__(self) -> None:
-        if self.gear not in ("pinion", "wheel"):
-            raise FaultError(f"fault.gear = {self.gear!r}; allowed: pinion, wheel")
+        if self.gear not in SIDES:
+            raise FaultError(f"fault.gear = {self.gear!r}; allowed: {', '.join(SIDES)}")
         if isinstance(self.tooth, str) and self.tooth != ALL:
             raise FaultError(f"fault.tooth = {self.tooth!r}; give a number, a list of numbers, or {ALL}")
         if isinstance(self.tooth, tuple) and not 0 < len(set(self.tooth)) == len(self.tooth):
@@ -118,7 +118,7 @@ def faulty_teeth(
     ------
     FaultError    for a tooth number that is not on the gear, or a fault that does not fit its tooth
     """
-    gears = {"pinion": pair.pinion, "wheel": pair.wheel}
+    gears = pair.gears
     teeth: dict[tuple[str, int], Tooth] = {}
     for fault in faults:
         gear = gears[fault.gear]

@@ -18,6 +18,8 @@ from gensig.geometry.involute import inverse_involute, involute
 
 Array = NDArray[np.float64]
 
+SIDES = ("pinion", "wheel")  # the two gears of a pair, the driving one first
+
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class GearPair:
@@ -64,6 +66,20 @@ class GearPair:
                     f"{gear.name}: its tip cuts {-clearance * 1e3:.3g} mm into the root of the {mate.name}; reduce the "
                     f"sum of the profile shifts or addendum_coefficient"
                 )
+
+    @property
+    def gears(self) -> dict[str, Gear]:
+        """The gears by their side of the pair, see ``SIDES``."""
+        return dict(zip(SIDES, (self.pinion, self.wheel), strict=True))
+
+    def curvature(self, side: str, position: Array | float) -> Array | float:
+        """Curvature radius of a gear's flank at positions s, m."""
+        by_side = dict(zip(SIDES, (self.pinion_curvature, self.wheel_curvature), strict=True))
+        return by_side[side](position)
+
+    def speed_ratio(self, side: str) -> float:
+        """Speed of a gear over the pinion's, positive."""
+        return 1.0 / (self.gears[side].n_teeth / self.pinion.n_teeth)
 
     @property
     def ratio(self) -> float:

@@ -146,9 +146,9 @@ def crack_growth(pair: GearPair, material: Material, crack: Crack, options: Crac
             f"somewhere, and the transverse contact ratio is {pair.transverse_contact_ratio:.3f}; take "
             f"system=helical_pair, whose pairs share the load"
         )
-    gear = {"pinion": pair.pinion, "wheel": pair.wheel}[crack.gear]
+    gear = pair.gears[crack.gear]
     zone = np.linspace(pair.path_of_contact - pair.base_pitch, pair.base_pitch, N_PLACES)
-    curvature = np.asarray(pair.pinion_curvature(zone) if crack.gear == "pinion" else pair.wheel_curvature(zone))
+    curvature = np.asarray(pair.curvature(crack.gear, zone))
     chord, strain = crack.root_chord(gear), material.in_plane("plane_strain")
     tooth = healthy_tooth(gear)
     sizes = crack_depths(options, chord)
@@ -173,7 +173,7 @@ def crack_growth(pair: GearPair, material: Material, crack: Crack, options: Crac
         torques=np.ones(1),
         intensity=np.sqrt(np.maximum(greatest, 0.0) * strain.youngs_modulus)[None] * force,
         face_width=gear.face_width,
-        meshes=1.0 if crack.gear == "pinion" else 1.0 / pair.ratio,
+        meshes=pair.speed_ratio(crack.gear),
     )
 
 

@@ -6,6 +6,7 @@ from dataclasses import dataclass
 from typing import Any
 
 from gensig.errors import ConfigError
+from gensig.geometry.contact import SIDES
 from gensig.options.configuration import Section
 from gensig.units import from_si, read, split_unit, unit
 
@@ -16,7 +17,6 @@ CHOICES = {
     "geometry": ("worn", "unworn"),
     "load_radius": ("base", "reference"),
 }
-SIDES = ("pinion", "wheel")
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)

@@ -139,11 +139,11 @@ def pit_growth(
     if stresses is None and pair.pinion.helix_angle != 0.0:
         raise ConfigError("life: the nominal contact stress of pit growth is that of a spur pair; take its slices")
     torques, stress = (np.ones(1), np.array([contact_stress(pair, material, 1.0)])) if stresses is None else stresses
-    gear = {"pinion": pair.pinion, "wheel": pair.wheel}[pits.gear]
+    gear = pair.gears[pits.gear]
     law = PitGrowth(
         options=options,
         sizes=np.array([0.0, 1.0]),
-        meshes=1.0 if pits.gear == "pinion" else 1.0 / pair.ratio,
+        meshes=pair.speed_ratio(pits.gear),
         torques=torques,
         stress_at_one=stress / np.sqrt(torques),
         first_diameter=pits.pit_diameter * first,

@@ -60,7 +60,7 @@ def sliced_crack_growth(
     ConfigError    for a crack on the compressed side, or a width that is not looked at
     """
     require_open(crack)
-    gear = {"pinion": pair.pinion, "wheel": pair.wheel}[crack.gear]
+    gear = pair.gears[crack.gear]
     sizes, face = crack_depths(options, crack.root_chord(gear)), gear.face_width
     looked = sizes[::DEPTH_STEP]
 
@@ -90,7 +90,7 @@ def sliced_crack_growth(
         torques=torques,
         intensity=np.sqrt(np.maximum(greatest, 0.0) * strain.youngs_modulus) / torques[:, None],
         face_width=face,
-        meshes=1.0 if crack.gear == "pinion" else 1.0 / pair.ratio,
+        meshes=pair.speed_ratio(crack.gear),
     )
 
 

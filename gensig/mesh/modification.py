@@ -15,7 +15,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from gensig.errors import ConfigError
-from gensig.geometry.contact import GearPair
+from gensig.geometry.contact import SIDES, GearPair
 from gensig.geometry.gear import Gear
 from gensig.geometry.tooth import Tooth, healthy_tooth
 from gensig.units import from_si, unit
@@ -126,11 +126,16 @@ class PairModification:
     misalignment: float = unit("um", default=0.0)
 
     @property
+    def sides(self) -> dict[str, FlankModification]:
+        """The modification of each gear, by its side of the pair."""
+        return dict(zip(SIDES, (self.pinion, self.wheel), strict=True))
+
+    @property
     def is_any(self) -> bool:
         """Whether anything stands otherwise than an aligned involute helicoid."""
         plain = FlankModification()
         return self.misalignment != 0.0 or any(
-            replace(side, profile_shape=plain.profile_shape) != plain for side in (self.pinion, self.wheel)
+            replace(side, profile_shape=plain.profile_shape) != plain for side in self.sides.values()
         )
 
     def deviation(self, pair: GearPair, position: Array, place: Array) -> Array:
@@ -142,15 +147,15 @@ class PairModification:
         place : (slice,) m      from the end that enters first
         """
         on_path = np.clip(position, 0.0, pair.path_of_contact)
-        curvature = {"pinion": pair.pinion_curvature(on_path), "wheel": pair.wheel_curvature(on_path)}
-        profile = sum(self.profile(pair, name, np.asarray(values)) for name, values in curvature.items())
+        curvature = {side: np.asarray(pair.curvature(side, on_path)) for side in SIDES}
+        profile = sum(self.profile(pair, side, values) for side, values in curvature.items())
         return profile + self.lead(pair, place)[:, None]
 
     def profile(self, pair: GearPair, name: str, curvature_radius: Array) -> Array:
         """Depth over the profile of the gear of that name, (point,) m; see ``FlankModification.profile``."""
-        if name == "pinion":
-            return self.pinion.profile(pair.pinion, curvature_radius, float(pair.pinion_curvature(0.0)))
-        return self.wheel.profile(pair.wheel, curvature_radius, float(pair.wheel_curvature(pair.path_of_contact)))
+        lowest = dict(zip(SIDES, (0.0, pair.path_of_contact), strict=True))
+        start = float(pair.curvature(name, lowest[name]))
+        return self.sides[name].profile(pair.gears[name], curvature_radius, start)
 
     def lead(self, pair: GearPair, place: Array) -> Array:
         """Depth of both gears together across the face, (slice,) m; nowhere less than 0."""
@@ -166,13 +171,13 @@ def sound_teeth(pair: GearPair, modification: PairModification = PLAIN) -> Mappi
     """The tooth that all of a spur gear have before faults and errors, by gear: as cut, or modified."""
     if modification.is_any:
         return _modified_teeth(pair, modification)
-    return {"pinion": healthy_tooth(pair.pinion), "wheel": healthy_tooth(pair.wheel)}
+    return {side: healthy_tooth(gear) for side, gear in pair.gears.items()}
 
 
 @lru_cache(maxsize=16)
 def _modified_teeth(pair: GearPair, modification: PairModification) -> Mapping[str, Tooth]:
     """A mate feels the sum of both leads only: all of it stands on the gear with the narrower face."""
-    gears = {"pinion": pair.pinion, "wheel": pair.wheel}
+    gears = pair.gears
     teeth = {name: healthy_tooth(gear) for name, gear in gears.items()}
     narrow = min(gears, key=lambda name: gears[name].face_width)
     edges = np.linspace(0.0, pair.face_width, N_SLICES + 1)

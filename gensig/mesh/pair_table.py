@@ -94,10 +94,10 @@ def pair_table(
     position = node_positions(pair, options)
     sound = _sound_structure(pair, material, options)
     whole = sound_teeth(pair, modification)
-    sides = {}
+    tables = {}
     for name, side in _node_sides(pair, material, options).items():
         mine = {tooth: odd[gear, tooth] for gear, tooth in sorted(odd) if gear == name}
-        sides[name] = _gear_table(
+        tables[name] = _gear_table(
             side.under(load),
             position,
             whole[name],
@@ -107,7 +107,7 @@ def pair_table(
             material.in_plane(options.elasticity),
             options,
         )
-    stiffest = float(sides["pinion"].compliance.min() + sides["wheel"].compliance.min())
+    stiffest = float(sum(table.compliance.min() for table in tables.values()))
     if sound["shared"] >= 0.95 * stiffest:
         raise ExtrapolationError(
             f"the gear bodies share {sound['shared']:.3g} m/N of the stiffest pair's {stiffest:.3g} m/N, more than one "
@@ -117,8 +117,7 @@ def pair_table(
         pair=pair,
         options=options,
         position=position,
-        pinion=sides["pinion"],
-        wheel=sides["wheel"],
+        **tables,
         shared_compliance=sound["shared"],
     )
 
@@ -136,17 +135,14 @@ def _sound_structure(pair: GearPair, material: Material, options: MeshOptions) -
     position = node_positions(pair, options)
     structure = material.in_plane(options.elasticity)
     on_path = np.clip(position, 0.0, pair.path_of_contact)
-    rows = {
-        gear.name: _structure_at_nodes(healthy_tooth(gear), curvature, structure, options)
-        for gear, curvature in (
-            (pair.pinion, np.asarray(pair.pinion_curvature(on_path))),
-            (pair.wheel, np.asarray(pair.wheel_curvature(on_path))),
-        )
-    }
+    corner = (corner_gap_by_pinion(pair, position), np.zeros_like(position))
+    by_side: dict[str, Any] = {}
+    for (side, gear), gap in zip(pair.gears.items(), corner, strict=True):
+        curvature = np.asarray(pair.curvature(side, on_path))
+        by_side[side] = gap, _structure_at_nodes(healthy_tooth(gear), curvature, structure, options)
     shared = shared_body_compliance(pair, structure) if options.pair_coupling == "coupled" else 0.0
     return {
-        "pinion": (corner_gap_by_pinion(pair, position), rows["pinion"]),
-        "wheel": (np.zeros_like(position), rows["wheel"]),
+        **by_side,
         "bending": slice_bending(pair, position, material, options),
         "shared": shared,
     }

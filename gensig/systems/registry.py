@@ -8,7 +8,7 @@ from typing import Any
 from gensig.dynamics.integrator import Solver
 from gensig.dynamics.pair import Body, Rotor, Support, solid_disc
 from gensig.errors import ConfigError
-from gensig.geometry.contact import GearPair
+from gensig.geometry.contact import SIDES, GearPair
 from gensig.geometry.gear import Gear
 from gensig.material import Material
 from gensig.mesh.modification import FlankModification, PairModification, sound_teeth
@@ -26,7 +26,6 @@ from gensig.systems.spur_pair import SpurPair
 from gensig.systems.supports import AS_GIVEN, held_axially, on_bearings, put_on_bearings, read_holding
 from gensig.units import read, to_si
 
-SIDES = ("pinion", "wheel")
 COMMON_GEAR_KEYS = (
     "normal_module_mm",
     "pressure_angle_deg",
@@ -66,7 +65,8 @@ def read_helical_pair(config: Configuration) -> HelicalPair:
     flanks = read_sliced_pair(config)
     machine = _read_machine(config, flanks.pair)
     bodies = {
-        name: held_axially(machine[name], getattr(flanks.pair, name), config.section("gear", name)) for name in SIDES
+        name: held_axially(machine[name], gear, config.section("gear", name))
+        for name, gear in flanks.pair.gears.items()
     }
     return HelicalPair(pair=flanks.pair, flanks=flanks, **{**machine, **bodies})
 
@@ -79,7 +79,7 @@ def _read_machine(config: Configuration, pair: GearPair) -> dict[str, Any]:
     for key in machine:
         if key not in SYSTEM_KEYS:
             raise ConfigError(f"system: unknown key '{key}'; known: {', '.join(SYSTEM_KEYS)}")
-    gears = {"pinion": pair.pinion, "wheel": pair.wheel}
+    gears = pair.gears
     operating, quality = (
         read_operating(config.section("operating")),
         read(Quality, config.section("quality"), "quality"),
@@ -87,13 +87,12 @@ def _read_machine(config: Configuration, pair: GearPair) -> dict[str, Any]:
     bodies = {name: _read_body(gears[name], sides[name], material) for name in SIDES}
     held = {name: read_holding(gears[name], sides[name]) for name in SIDES}
     if on_bearings(machine.get("supports", AS_GIVEN), quality):
-        force = operating.torque / gears["pinion"].base_radius
+        force = operating.torque / pair.pinion.base_radius
         bodies = {name: put_on_bearings(bodies[name], gears[name], held[name], material, force) for name in SIDES}
     return {
         "material": material,
         "mesh": read_mesh_options(config.section("mesh")),
-        "pinion": bodies["pinion"],
-        "wheel": bodies["wheel"],
+        **bodies,
         "operating": operating,
         "sensing": read_sensing(config.section("sensing")),
         "quality": quality,

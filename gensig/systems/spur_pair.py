@@ -62,14 +62,14 @@ class SpurPair(PairMachine):
         sound = single_pair(plain, alone, (), sound_teeth(pair, PLAIN))
         depth = self.mesh_force * (1.0 / sound.stiffness - shared)
         starts = (pair.pinion, pair.pinion_curvature(alone[0])), (pair.wheel, pair.wheel_curvature(alone[1]))
-        sides = {
-            gear.name: FlankModification(
+        pinion, wheel = (
+            FlankModification(
                 tip_relief=float(back),
                 tip_relief_height=gear.tip_radius - float(np.hypot(gear.base_radius, curvature)),
             )
             for (gear, curvature), back in zip(starts, depth, strict=True)
-        }
-        return PairModification(pinion=sides["pinion"], wheel=sides["wheel"])
+        )
+        return PairModification(pinion=pinion, wheel=wheel)
 
 
 @lru_cache(maxsize=32)

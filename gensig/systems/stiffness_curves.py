@@ -90,7 +90,7 @@ def stiffness_curves(
     pair = machine.pair
     position = np.linspace(0.0, pair.path_of_contact, n_positions)
     sound, faulty = (single_pair(machine, position, some, whole) for some in ((), faults))
-    gear = pair.wheel if faults and faults[0].gear == "wheel" else pair.pinion
+    gear = pair.gears[faults[0].gear] if faults else pair.pinion
     roll = pair.base_pitch * (np.arange(gear.n_teeth * points_per_tooth) + 0.5) / points_per_tooth
     static = static_mesh(table, pair_states(table, roll), machine.mesh_force)
     return StiffnessCurves(

@@ -63,7 +63,7 @@ class RootFactors:
 
 def gears_of(pair: GearPair) -> dict[str, Gear]:
     """The gears by name."""
-    return {"pinion": pair.pinion, "wheel": pair.wheel}
+    return pair.gears
 
 
 def normal_contact_ratio(pair: GearPair) -> float:

@@ -13,7 +13,7 @@ from functools import cached_property
 import numpy as np
 from numpy.typing import NDArray
 
-from gensig.geometry.contact import GearPair
+from gensig.geometry.contact import SIDES, GearPair
 from gensig.life.options import WearOptions
 from gensig.material import Material
 
@@ -173,7 +173,7 @@ def depth_per_mesh(path: FlankPath, line_load: Array, pressure: Array, options: 
     time on the path of contact; half of it off either flank. Source: wear-life paper, eqs. (18) to (21). It falls to
     nothing as n_intervals grows.
     """
-    factor = np.array([options.wear_factor("pinion"), options.wear_factor("wheel")])
+    factor = np.array([options.wear_factor(side) for side in SIDES])
     if options.rule == "band":
         slip = path.slide_roll
         return np.stack([factor[side] * slip[side] * line_load for side in (0, 1)])

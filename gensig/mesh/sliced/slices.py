@@ -159,8 +159,7 @@ def sliced_mesh(
         shared_compliance=shared,
         deviation=deviation,
         edges=edges,
-        pinion=sides["pinion"],
-        wheel=sides["wheel"],
+        **sides,
     )
 
 
