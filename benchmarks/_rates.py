@@ -20,6 +20,7 @@ from gensig.dynamics.pair import PairDynamics
 from gensig.plan.make import make_plan
 from gensig.plan.request import read_request
 from gensig.record.inputs import InputReader
+from gensig.systems.pair_machine import pair_dynamics
 
 Array = NDArray[np.float64]
 Work = tuple[Callable[[], Any], float]  # what to time, and the seconds that it simulates
@@ -45,7 +46,7 @@ def machines(*words: str, n: int = n_lanes("float32")) -> list[PairDynamics]:
     """The machines of as many quickstart records."""
     config, rows = quickstart(n, *words)
     reader = InputReader(config)
-    return [reader.inputs(row).run.dynamics() for row in rows]
+    return [pair_dynamics(reader.inputs(row).run) for row in rows]
 
 
 def rates(works: dict[str, Work], runs: int) -> dict[str, float]:

@@ -18,7 +18,7 @@ from gensig.dynamics.decimation import Decimator, decimator
 from gensig.production import folder as generation
 from gensig.record import simulate as records
 from gensig.record.inputs import InputReader
-from gensig.systems import lead_in, pair_machine, spur_pair
+from gensig.systems import pair_machine, spur_pair
 
 PLAN, TABLES, EQUATIONS = "machine and plan row", "mesh tables", "equations and packing"
 SETTLING, RECORDING, CHECKING = "integration: settling", "integration: recording", "integration: error check"
@@ -30,7 +30,7 @@ CLOCKED: tuple[tuple[Any, str, str], ...] = (
     (generation, "_folder_inputs", PLAN),
     (InputReader, "inputs", PLAN),
     (spur_pair, "_mesh_table", TABLES),
-    (pair_machine.Run, "dynamics", EQUATIONS),
+    (pair_machine, "pair_dynamics", EQUATIONS),
     (pair_machine, "settling_oversampling", EQUATIONS),
     (integrator, "settling_time", EQUATIONS),
     (integrator, "pack", EQUATIONS),
@@ -79,10 +79,9 @@ class Stages:
     @contextmanager
     def watching(self, n_whole: int) -> Iterator[None]:
         """Clock the product's functions; recordings of fewer samples than ``n_whole`` are those of the error check."""
-        counted = self._counted(pair_machine.simulate_together)
+        counted = self._counted(pair_machine.simulate_pairs)
         with ExitStack() as patches:
-            for owner in (pair_machine, lead_in):
-                patches.enter_context(mock.patch.object(owner, "simulate_together", counted))
+            patches.enter_context(mock.patch.object(pair_machine, "simulate_pairs", counted))
             for owner, name, stage in CLOCKED:
                 clocked = self._clocked(getattr(owner, name), stage, n_whole)
                 patches.enter_context(mock.patch.object(owner, name, clocked))

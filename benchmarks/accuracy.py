@@ -21,8 +21,10 @@ from gensig.faults.registry import fault_parts, read_faults
 from gensig.plan.request import read_request
 from gensig.sensing.agreement import agreement
 from gensig.sensing.manufacturing import draw_gearbox, draw_specimen
-from gensig.systems.pair_machine import BOUNCING, CleanRecord, Run, simulate_together
+from gensig.systems.base import simulate_together
+from gensig.systems.pair_machine import BOUNCING
 from gensig.systems.registry import read_system
+from gensig.systems.run import CleanRecord, Run
 
 FAULTS = ("healthy", "crack", "pitting", "chipped", "missing_tooth", "broken", "wear")
 CONDITIONS = ((600, 20), (1800, 20), (1800, 2), (3000, 20), (6000, 20), (6000, 60))  # r/min, N m

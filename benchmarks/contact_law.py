@@ -30,8 +30,9 @@ from gensig.mesh.face import slice_gaps
 from gensig.mesh.load_distribution import pair_states, static_mesh
 from gensig.mesh.pair_table import PairTable, flank_sides, pair_table
 from gensig.plan.request import read_request
-from gensig.systems.pair_machine import Run
+from gensig.systems.pair_machine import pair_dynamics
 from gensig.systems.registry import read_system
+from gensig.systems.run import Run
 from gensig.systems.spur_pair import SpurPair
 
 Array = NDArray[np.float64]
@@ -60,7 +61,7 @@ class Case:
     @property
     def dynamics(self) -> PairDynamics:
         """Perfect gears, tooth 0 of either entering at A at time 0: what ``SpurPair.simulate`` takes unasked."""
-        return Run(system=self.system, faults=self.faults).dynamics()
+        return pair_dynamics(Run(system=self.system, faults=self.faults))
 
     @property
     def roll(self) -> Array:

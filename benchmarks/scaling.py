@@ -29,8 +29,10 @@ from gensig.mesh.load_distribution import sound_load
 from gensig.plan.request import read_request
 from gensig.production.folder import begin_folder, run_folder, write_shard
 from gensig.systems import spur_pair
-from gensig.systems.pair_machine import Run, Start, simulate_together
+from gensig.systems.base import simulate_together
+from gensig.systems.pair_machine import pair_dynamics
 from gensig.systems.registry import read_system
+from gensig.systems.run import Run, Start
 
 DURATIONS = (0.05, 0.16, 0.5, 1.6, 5.0, 16.0, 50.0)  # s
 COUNTS = (8, 80, 800, 8000)  # records
@@ -171,7 +173,7 @@ def against_teeth(runs: int) -> tuple[dict[str, float], dict[str, float]]:
     def table(run: Run) -> None:
         spur_pair._mesh_table.cache_clear()
         sound_load.cache_clear()
-        run.dynamics()
+        pair_dynamics(run)
 
     for n_teeth in TEETH:
         teeth = list(range(n_teeth))

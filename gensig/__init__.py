@@ -24,7 +24,7 @@ if TYPE_CHECKING:
     from gensig.faults.base import Fault
     from gensig.production.fault_pairs import FaultPairs
     from gensig.production.streaming import RecordStream
-    from gensig.systems.pair_machine import PairMachine
+    from gensig.systems.base import Machine
 
 __all__ = ["__version__", "fault_pairs", "generate", "load_faults", "load_system", "open_dataset", "stream"]
 
@@ -38,7 +38,7 @@ def open_dataset(path: str | Path, *, allow_incomplete: bool = False) -> Dataset
     return reader.open_dataset(path, allow_incomplete=allow_incomplete)
 
 
-def load_system(*overrides: str, config_dir: str | Path | None = None) -> PairMachine:
+def load_system(*overrides: str, config_dir: str | Path | None = None) -> Machine:
     """The sound machine that overrides describe, as the commands would build it; for its faults see `load_faults`."""
     from gensig.plan.request import read_request
     from gensig.record.machines import read_machine

@@ -25,10 +25,11 @@ from gensig.driveline.table_rows import (
 )
 from gensig.dynamics.pair import Rotor
 from gensig.errors import ConfigError
-from gensig.geometry.contact import GearPair
+from gensig.geometry.contact import SIDES, GearPair
 from gensig.options.configuration import Configuration
-from gensig.systems.pair_machine import PairMachine, Run
+from gensig.systems.pair_machine import GearPairMachine, pair_dynamics
 from gensig.systems.registry import read_material
+from gensig.systems.run import Run
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -131,14 +132,15 @@ def read_drive_line(config: Configuration) -> DriveLine:
     )
 
 
-def drive_line_of_pair(system: PairMachine, name: str) -> DriveLine:
+def drive_line_of_pair(system: GearPairMachine, name: str) -> DriveLine:
     """A single pair, with its motor and load, as the line of two to four nodes that it is; without the soft drive.
 
     The mesh is held at the mean stiffness of sound teeth under the set torque.
     """
-    dynamics = Run(system=system, faults=()).dynamics()
+    dynamics = pair_dynamics(Run(system=system, faults=()))
     pair = system.pair
-    sides = (("pinion", pair.pinion, dynamics.pinion, system.motor), ("wheel", pair.wheel, dynamics.wheel, system.load))
+    bodies, rotors = (dynamics.pinion, dynamics.wheel), (system.motor, system.load)
+    sides = tuple(zip(SIDES, pair.gears.values(), bodies, rotors, strict=True))
     nodes = [Node(name=side, inertia=body.inertia) for side, _, body, _ in sides]
     gears = [
         LineGear(

@@ -1,7 +1,7 @@
 """Records of an engine's drive line: one mesh of it by its own teeth, with the faults and units of every data set.
 
-The machine answers as a gear pair does: its ``pair`` is the driving and the driven gear of that mesh, ``operating`` its
-driving shaft. ``docs/theory/shaft_line_records.md``.
+Its ``pair`` is the driving and the driven gear of that mesh, ``operating`` the motion of the driving shaft.
+``docs/theory/shaft_line_records.md``.
 """
 
 from __future__ import annotations
@@ -10,6 +10,7 @@ import math
 import warnings
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
+from typing import Self, final
 
 import numpy as np
 from numpy.typing import NDArray
@@ -17,6 +18,7 @@ from numpy.typing import NDArray
 from gensig.driveline import loads
 from gensig.driveline.engine_line import EngineLine, read_engine_line
 from gensig.driveline.excitation.engine_torques import Engine
+from gensig.driveline.line_gears import line_bodies, line_gears, line_meshes
 from gensig.driveline.mesh_phase import start_phase
 from gensig.driveline.running import (
     EngineCourse,
@@ -41,9 +43,11 @@ from gensig.driveline.teeth import (
 )
 from gensig.driveline.time.newmark import LineMotion, LineSolver
 from gensig.dynamics.integrator import Solver, check_memory
-from gensig.dynamics.pair import Body, Support
+from gensig.dynamics.pair import Body
 from gensig.errors import ConfigError, SimulationError
 from gensig.faults.base import Fault
+from gensig.geometry.contact import SIDES, GearPair
+from gensig.geometry.gear import Gear
 from gensig.mesh.modification import PLAIN, sound_teeth
 from gensig.mesh.options import SliceOptions, read_mesh_options, read_slice_options
 from gensig.mesh.pair_table import PairTable
@@ -51,11 +55,12 @@ from gensig.mesh.sliced.sliced_table import SlicedTable
 from gensig.operation.options import read_operating
 from gensig.options.configuration import Configuration
 from gensig.sensing.encoder import Disc
-from gensig.sensing.manufacturing import Quality, Specimen, perfect_specimen
+from gensig.sensing.manufacturing import Quality, perfect_specimen
 from gensig.sensing.options import read_sensing
 from gensig.sensing.toothed_wheel import ToothedWheel, draw_wheel, instantaneous_speed
-from gensig.systems.pair_machine import CleanRecord, PairMachine, Run, Start
+from gensig.systems.base import Machine, MachineMesh, specimen_table
 from gensig.systems.registry import read_heat, read_material, read_modification
+from gensig.systems.run import CleanRecord, Run, Start
 from gensig.systems.stiffness_curves import StiffnessCurves, stiffness_curves
 from gensig.systems.supports import in_gearbox
 from gensig.units import SPEED, read
@@ -67,17 +72,47 @@ MOST_ENERGY_RESIDUAL = 1e-3
 KNOT = 5e-3  # s between the knots of a course that changes
 AFTER = 0.2  # s for which a course is told after a record: the low-pass looks ahead
 FAR_ABOVE = 3.0  # of the force of the supports; the stiffness of a ball bearing follows its third root
-SIDES = ("pinion", "wheel")
 AXES = ("x", "y")
 
 
+@final
 @dataclass(frozen=True, slots=True, kw_only=True)
-class LineMachine(PairMachine):
+class LineMachine(Machine):
     """An engine on its drive line; ``place`` is the mesh of the line whose teeth are followed one by one."""
 
     engine: EngineLine
     place: int
     slices: SliceOptions
+
+    @property
+    def pair(self) -> GearPair:
+        """Driving and driven gear of the followed mesh, as pinion and wheel."""
+        return named_by_side(self.engine.drive.pairs[self.place])
+
+    @property
+    def gears(self) -> dict[str, Gear]:
+        """All gears of the line: pinion and wheel of the followed mesh, the others by their names of the tables."""
+        return line_gears(self.engine.drive, self.place)
+
+    @property
+    def bodies(self) -> dict[str, Body]:
+        """Mass and support of every gear, and the inertia of its node."""
+        return line_bodies(self.engine.drive, self.place)
+
+    @property
+    def pinion(self) -> Body:
+        """Mass, inertia and support of the driving gear of the followed mesh."""
+        return self.bodies[self.pair.pinion.name]
+
+    @property
+    def wheel(self) -> Body:
+        """Mass, inertia and support of the driven gear of the followed mesh."""
+        return self.bodies[self.pair.wheel.name]
+
+    @property
+    def meshes(self) -> tuple[MachineMesh, ...]:
+        """All meshes of the line; records follow one of them."""
+        return line_meshes(self.engine.drive, self.place)
 
     @property
     def ratio(self) -> float:
@@ -101,14 +136,14 @@ class LineMachine(PairMachine):
 
     @property
     def channels(self) -> tuple[str, ...]:
-        """What can be recorded: turning and, with lateral motion, bearing of both gears, and the toothed wheels."""
+        """Rotation and, with lateral motion, bearing of both gears of the followed mesh, and the toothed wheels."""
         lateral = [f"{side}_{axis}" for side in SIDES for axis in AXES] if self.engine.drive.lateral else []
         return (*(f"{side}_rotation" for side in SIDES), *lateral, *(f"{name}{SPEED}" for name in self.engine.wheels))
 
     @property
     def most_pairs(self) -> int:
-        """Nothing: the loads of teeth are not told."""
-        raise ConfigError("dataset.store_mesh_state: a drive line does not tell the loads of its teeth; take false")
+        """0: the loads of teeth are not known."""
+        return 0
 
     @property
     def torque_of(self) -> str:
@@ -249,15 +284,19 @@ class LineMachine(PairMachine):
         angle = machine.ratio * motion.nominal_angle + motion.signals["angle", shaft]
         return loads.greatest_loads(machine.pair, angle, motion.signals["mesh_force", machine.place])
 
-    def simulate_alone(self, run: Run) -> CleanRecord | SimulationError | None:
-        """One record; nothing of a drive line is simulated side by side."""
-        try:
-            return self._record(run)
-        except SimulationError as error:
-            return error
+    @classmethod
+    def simulate_runs(cls, runs: Sequence[Run[Self]]) -> list[CleanRecord | SimulationError]:
+        """Simulate runs one after the other, in the order given."""
+        records: list[CleanRecord | SimulationError] = []
+        for run in runs:
+            try:
+                records.append(run.system._record(run))
+            except SimulationError as error:
+                records.append(error)
+        return records
 
     @one_thread
-    def _record(self, run: Run) -> CleanRecord:
+    def _record(self, run: Run[LineMachine]) -> CleanRecord:
         sensing, rate = self.sensing, self.sensing.sampling_rate
         line = self.line(run)
         kinds = {name: self._channel(line, name) for name in sensing.channels}
@@ -283,10 +322,10 @@ class LineMachine(PairMachine):
             integration_check="energy",
         )
 
-    def line(self, run: Run) -> RunningLine:
+    def line(self, run: Run[LineMachine]) -> RunningLine:
         """The line of one run, ready to be integrated."""
         specimen = run.specimen or perfect_specimen(self.pair.pinion, self.pair.wheel)
-        start = run.start or Start(tooth_pinion=0, tooth_wheel=0, phase=0.0)
+        start = run.start or Start()
         engine = self.engine
         if run.gearbox is not None and engine.drive.lateral:
             bodies = (self.pinion, slice(0, 2)), (self.wheel, slice(2, 4))
@@ -305,7 +344,7 @@ class LineMachine(PairMachine):
             turned=turned,
         )
         own = OwnMesh(
-            table=self._line_table(run.faults, specimen),
+            table=specimen_table(self, run.faults, specimen),
             errors=(specimen.pinion_error, specimen.wheel_error),
             start_teeth=teeth,
             start_phase=start.phase,
@@ -333,10 +372,6 @@ class LineMachine(PairMachine):
         turns = pitches / self.pair.pinion.n_teeth + start.tooth_wheel % max(1, round(2.0 * self.ratio))
         return 2.0 * math.pi * turns / self.ratio % (4.0 * math.pi)
 
-    def _line_table(self, faults: Sequence[Fault], specimen: Specimen) -> PairTable | SlicedTable:
-        table = self.mesh_table((*specimen.forms, *faults))
-        return replace(table, pair=replace(self.pair, backlash=self.pair.backlash * specimen.backlash_factor))
-
     def _course(self) -> EngineCourse:
         operating = self.operating
         if operating.is_steady:
@@ -353,7 +388,7 @@ class LineMachine(PairMachine):
         side, _, what = name.rpartition("_")
         drive = self.engine.drive
         mesh = drive.line.meshes[self.place]
-        gear = mesh.driving if side == "pinion" else mesh.driven
+        gear = dict(zip(SIDES, (mesh.driving, mesh.driven), strict=True))[side]
         if what in AXES:
             return "acceleration", line.matrices.names.index(f"{drive.line.gears[gear].name} {what}")
         return "acceleration", line.dof(drive.numbers[drive.line.gears[gear].node])
@@ -362,7 +397,9 @@ class LineMachine(PairMachine):
         wanted = name.removesuffix(SPEED)
         return next((k, wheel) for k, (own, wheel) in enumerate(self.engine.wheels.items()) if own == wanted)
 
-    def _seen(self, run: Run, line: RunningLine, motion: LineMotion, name: str, kind: tuple[str, int]) -> Array:
+    def _seen(
+        self, run: Run[LineMachine], line: RunningLine, motion: LineMotion, name: str, kind: tuple[str, int]
+    ) -> Array:
         """Deviation from the nominal speed that a toothed wheel shows, (sample,) rad/s."""
         place, wheel = self._wheel(name)
         disc = (
@@ -381,27 +418,16 @@ def read_line_machine(config: Configuration) -> LineMachine:
     ConfigError    for keys or tables that make no engine, and for a mesh that records cannot be made of
     """
     engine = read_engine_line(config)
-    drive = engine.drive
     place = _record_mesh(engine)
-    pair, mesh = drive.pairs[place], drive.line.meshes[place]
     if read_heat(config).is_any or read_modification(config).is_any:
         raise ConfigError("heat and modification are of a single gear pair; a drive line takes heat=none")
     operating, quality = (
         read_operating(config.section("operating")),
         read(Quality, config.section("quality"), "quality"),
     )
-    bodies = []
-    for place_of_gear in (mesh.driving, mesh.driven):
-        gear = drive.line.gears[place_of_gear]
-        still = Support(stiffness_x=0.0, stiffness_y=0.0, damping_x=0.0, damping_y=0.0)
-        inertia = drive.line.nodes[gear.node].inertia
-        bodies.append(Body(mass=gear.mass or 0.0, inertia=inertia, support=gear.support or still))
     machine = LineMachine(
-        pair=named_by_side(pair),
         material=read_material(config),
         mesh=read_mesh_options(config.section("mesh")),
-        pinion=bodies[0],
-        wheel=bodies[1],
         operating=operating,
         sensing=read_sensing(config.section("sensing")),
         quality=quality,

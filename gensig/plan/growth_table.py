@@ -25,8 +25,8 @@ from gensig.life.pit_growth import PitGrowthOptions
 from gensig.life.wear.wear_growth import WearGrowth, WearTable, wear_table
 from gensig.options.configuration import Configuration
 from gensig.record.vibration_limit import limited_by_vibration
+from gensig.systems.base import Machine
 from gensig.systems.growth_laws import crack_law, pit_law
-from gensig.systems.pair_machine import PairMachine
 from gensig.systems.wear import read_wear_case, wear_fault
 
 Array = NDArray[np.float64]
@@ -46,7 +46,7 @@ class LifeGears:
     def __init__(
         self,
         config: Configuration,
-        machine: PairMachine,
+        machine: Machine,
         torques: tuple[float, float],
     ) -> None:
         self.machine, self.torques = machine, torques

@@ -21,7 +21,7 @@ from gensig.plan.draws import draw_faults, draw_values
 from gensig.plan.growth_table import PAIRS_ONLY, LifeGears, unit_growth
 from gensig.record.machines import read_machine
 from gensig.record.streams import Stream, stream
-from gensig.systems.pair_machine import PairMachine
+from gensig.systems.base import Machine
 from gensig.systems.registry import LINE
 from gensig.units import from_si
 
@@ -225,7 +225,7 @@ def _setpoints(config: Configuration, options: LifeOptions, n_units: int) -> lis
 
 
 def _speed_and_torque(
-    machine: PairMachine,
+    machine: Machine,
     points: Sequence[Mapping[str, float]],
     n_units: int,
 ) -> tuple[Array, Array]:

@@ -29,7 +29,8 @@ from gensig.record.machines import read_machine
 from gensig.record.options import PlanOptions, read_dataset_options, read_plan_options
 from gensig.record.simulate import signal_shapes
 from gensig.record.streams import Stream, stream
-from gensig.systems.pair_machine import PairMachine, severity
+from gensig.systems.base import Machine
+from gensig.systems.pair_machine import severity
 from gensig.units import from_si
 
 SHARD_BYTES = 65_536_000  # 80 records of 4 x 51,200 float32 samples
@@ -256,9 +257,7 @@ class _Fault:
     is_checked: bool = True
 
 
-def _row(
-    machine: PairMachine, fault: _Fault, values: Mapping[str, float], start: np.random.Generator
-) -> dict[str, Any]:
+def _row(machine: Machine, fault: _Fault, values: Mapping[str, float], start: np.random.Generator) -> dict[str, Any]:
     """Columns of one record that follow from its drawn values."""
     applied = read_faults(fault.plain)
     if fault.is_checked:

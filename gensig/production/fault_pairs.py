@@ -21,8 +21,8 @@ from gensig.record.inputs import InputReader, RecordInputs, Row, simulate_motion
 from gensig.record.options import read_plan_options
 from gensig.record.streams import Stream, stream
 from gensig.sensing.instrument import Instrument
-from gensig.systems.pair_machine import CleanRecord
 from gensig.systems.registry import read_system
+from gensig.systems.run import CleanRecord
 
 Array = NDArray[np.float64]
 

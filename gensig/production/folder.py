@@ -41,7 +41,7 @@ from gensig.plan.make import make_plan
 from gensig.record.machines import read_machine
 from gensig.record.options import DatasetOptions, read_dataset_options
 from gensig.record.simulate import signal_shapes, simulate_records
-from gensig.systems.pair_machine import PairMachine
+from gensig.systems.base import Machine
 from gensig.units import channel_unit, from_si
 from gensig.version import __version__
 
@@ -255,7 +255,7 @@ def open_shard(path: Path, config: Configuration, n_records: int, params: Sequen
     )
 
 
-def _shaft_sensors(dataset: DatasetOptions, system: PairMachine) -> dict[str, Any]:
+def _shaft_sensors(dataset: DatasetOptions, system: Machine) -> dict[str, Any]:
     """Attributes of the stored shaft signals: shafts, pulses and lines."""
     tacho, encoder = system.sensing.tacho, system.sensing.encoder
     attributes: dict[str, Any] = {}
@@ -266,7 +266,7 @@ def _shaft_sensors(dataset: DatasetOptions, system: PairMachine) -> dict[str, An
     return attributes
 
 
-def root_attributes(config: Configuration, system: PairMachine) -> dict[str, Any]:
+def root_attributes(config: Configuration, system: Machine) -> dict[str, Any]:
     """What is the same for every record of a data set."""
     pair = system.pair
     return {

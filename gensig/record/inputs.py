@@ -36,9 +36,10 @@ from gensig.sensing.manufacturing import (
     draw_specimen,
     with_damping_ratio,
 )
+from gensig.systems.base import Machine
 from gensig.systems.lead_in import simulate_with_lead_in
 from gensig.systems.nuisances import with_nuisances
-from gensig.systems.pair_machine import CleanRecord, PairMachine, Run, Start
+from gensig.systems.run import CleanRecord, Run, Start
 from gensig.systems.shaft_sensors import shaft_signals
 
 Array = NDArray[np.float64]
@@ -104,7 +105,7 @@ class RecordInputs:
     is_reference: bool = False
 
     @property
-    def machine(self) -> PairMachine:
+    def machine(self) -> Machine:
         """The machine with the drawn values of its row."""
         return self.run.system
 
@@ -191,7 +192,7 @@ class InputReader:
         self.config = config
         self.dataset: DatasetOptions = read_dataset_options(config)
         self.plan: PlanOptions = read_plan_options(config)
-        self._machines: dict[tuple[tuple[str, float], ...], PairMachine] = {}
+        self._machines: dict[tuple[tuple[str, float], ...], Machine] = {}
 
     def inputs(self, row: Row) -> RecordInputs:
         """Inputs of one row of the plan.
@@ -220,7 +221,7 @@ class InputReader:
         instrument = draw_instrument(machine.sensing, *generators)
         return RecordInputs(seed=seed, numbers=numbers, run=run, instrument=instrument, dataset=self.dataset)
 
-    def machine(self, values: Mapping[str, float]) -> PairMachine:
+    def machine(self, values: Mapping[str, float]) -> Machine:
         """The machine of the configuration with drawn values put in."""
         drawn = tuple(values.items())
         if drawn not in self._machines:
@@ -242,7 +243,7 @@ def row_faults(row: Row) -> list[Fault]:
     return [fault for part in json.loads(str(row["faults_json"])) for fault in read_faults(part, "faults_json")]
 
 
-def twin_start(machine: PairMachine, rng: np.random.Generator) -> Start:
+def twin_start(machine: Machine, rng: np.random.Generator) -> Start:
     """Start of the healthy twin of a unit at a condition; ``rng`` is the condition's stream TWIN."""
     tooth = int(rng.integers(machine.pair.pinion.n_teeth))
     return Start(
@@ -252,7 +253,7 @@ def twin_start(machine: PairMachine, rng: np.random.Generator) -> Start:
     )
 
 
-def _gearbox(seed: int, number: int, machine: PairMachine) -> Gearbox:
+def _gearbox(seed: int, number: int, machine: Machine) -> Gearbox:
     """Supports and gains of a gearbox, drawn from its own streams."""
     sensing, quality = machine.sensing, machine.quality
     rng = stream(seed, Stream.GEARBOX, number)

@@ -3,11 +3,11 @@
 from __future__ import annotations
 
 from gensig.options.configuration import Configuration
-from gensig.systems.pair_machine import PairMachine
+from gensig.systems.base import Machine
 from gensig.systems.registry import LINE, read_system
 
 
-def read_machine(config: Configuration) -> PairMachine:
+def read_machine(config: Configuration) -> Machine:
     """Build what ``system.kind`` names.
 
     Raises

@@ -17,8 +17,9 @@ from gensig.options.configuration import Configuration
 from gensig.record.inputs import MISSING, InputReader, RecordInputs, Row, simulate_motions
 from gensig.record.options import read_dataset_options
 from gensig.sensing.chain import detectability
+from gensig.systems.base import Machine
 from gensig.systems.mesh_signals import mesh_signals
-from gensig.systems.pair_machine import CleanRecord, PairMachine
+from gensig.systems.run import CleanRecord
 from gensig.units import from_si
 from gensig.version import __version__
 
@@ -183,11 +184,11 @@ def _samples(
     return signals
 
 
-def _n_samples(machine: PairMachine) -> int:
+def _n_samples(machine: Machine) -> int:
     return round(machine.operating.duration * machine.sensing.sampling_rate)
 
 
-def signal_shapes(config: Configuration, machine: PairMachine) -> dict[str, tuple[int, ...]]:
+def signal_shapes(config: Configuration, machine: Machine) -> dict[str, tuple[int, ...]]:
     """Shape of every array of one record, by signal name."""
     dataset = read_dataset_options(config)
     n_channels, n_samples = len(machine.sensing.channel_names), _n_samples(machine)

@@ -17,7 +17,7 @@ from gensig.life.wear.wear_life import WearLife, wear_life
 from gensig.options.configuration import Configuration
 from gensig.record.inputs import InputReader, RecordInputs, simulate_motions
 from gensig.sensing.chain import power
-from gensig.systems.pair_machine import PairMachine
+from gensig.systems.base import Machine
 from gensig.systems.wear import wear_fault
 from gensig.units import channel_unit
 
@@ -72,7 +72,7 @@ class _Bench:
     case: WearCase
 
     @property
-    def machine(self) -> PairMachine:
+    def machine(self) -> Machine:
         """The machine that is measured."""
         return self.sound.machine
 

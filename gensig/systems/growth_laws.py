@@ -16,8 +16,8 @@ from gensig.life.pit_growth import PitGrowth, PitGrowthOptions, pit_growth
 from gensig.life.sliced_crack import sliced_crack_growth
 from gensig.life.sliced_stress import sliced_contact_stress
 from gensig.material import Material
+from gensig.systems.base import Machine
 from gensig.systems.helical_pair import HelicalPair
-from gensig.systems.pair_machine import PairMachine
 from gensig.systems.sliced_pair import SlicedPair
 
 Array = NDArray[np.float64]
@@ -25,9 +25,7 @@ Array = NDArray[np.float64]
 N_TORQUES = 3  # how slices share the load hangs little on the torque
 
 
-def crack_law(
-    machine: PairMachine, crack: Crack, options: CrackGrowthOptions, torques: tuple[float, float]
-) -> CrackGrowth:
+def crack_law(machine: Machine, crack: Crack, options: CrackGrowthOptions, torques: tuple[float, float]) -> CrackGrowth:
     """The law of a crack like ``crack``; ``torques`` in N m are the least and the greatest that it meets."""
     if not isinstance(machine, HelicalPair):
         return _spur_crack_law(machine.pair, machine.material, crack, options)
@@ -35,7 +33,7 @@ def crack_law(
 
 
 def pit_law(
-    machine: PairMachine,
+    machine: Machine,
     pits: DistributedPitting,
     options: PitGrowthOptions,
     first: float,

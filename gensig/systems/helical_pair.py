@@ -4,17 +4,22 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from dataclasses import dataclass
+from typing import final
 
 from gensig.dynamics._layout import MOST_PAIRS
+from gensig.dynamics.helical import AXIAL_DOFS
+from gensig.dynamics.pair import PAIR_DOFS
 from gensig.errors import ConfigError, GeometryError
 from gensig.faults.base import Fault
 from gensig.mesh.sliced.sliced_table import SlicedTable
-from gensig.systems.pair_machine import PairMachine
+from gensig.systems.pair_machine import GearPairMachine
 from gensig.systems.sliced_pair import SlicedPair
+from gensig.systems.stiffness_curves import StiffnessCurves
 
 
+@final
 @dataclass(frozen=True, slots=True, kw_only=True)
-class HelicalPair(PairMachine):
+class HelicalPair(GearPairMachine):
     """One machine whose teeth are cut into slices; with no helix it is a spur pair that also moves along its axes.
 
     ``flanks`` is the same pair at rest, for its transmission error, load over the flanks and stiffness.
@@ -22,9 +27,23 @@ class HelicalPair(PairMachine):
 
     flanks: SlicedPair
 
+    @property
+    def gear_channels(self) -> tuple[str, ...]:
+        """Both gears also move along their axes and tilt."""
+        return (*PAIR_DOFS, *AXIAL_DOFS)
+
     def mesh_table(self, faults: Sequence[Fault] = ()) -> SlicedTable:
         """Force over phase and approach of every distinct pair of teeth, with the given faults."""
         return self.flanks.mesh_table(faults)
+
+    def stiffness_curves(
+        self, faults: Sequence[Fault] = (), *, n_positions: int = 201, points_per_tooth: int = 100
+    ) -> StiffnessCurves:
+        """Raise ConfigError: these curves are of whole teeth, and a helical pair has slices."""
+        raise ConfigError(
+            "stiffness_curves are those of system=spur_pair; a helical pair has its stiffness slice by slice: "
+            "flanks.transmission_error(), or gensig stiffness system=helical_pair"
+        )
 
     @property
     def most_pairs(self) -> int:

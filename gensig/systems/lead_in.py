@@ -10,10 +10,11 @@ import numpy as np
 
 from gensig.dynamics.mesh_state import MeshState
 from gensig.errors import SimulationError
-from gensig.systems.pair_machine import CleanRecord, Run, Start, simulate_together
+from gensig.systems.base import Machine, simulate_together
+from gensig.systems.run import CleanRecord, Run, Start
 
 
-def simulate_with_lead_in(runs: Sequence[Run]) -> list[CleanRecord | SimulationError]:
+def simulate_with_lead_in(runs: Sequence[Run[Machine]]) -> list[CleanRecord | SimulationError]:
     """As ``simulate_together``, but every acceleration has its ``sensing.n_lead`` samples before the record too.
 
     All else that a record tells is of the record alone, but for ``contact_loss_fraction``, which counts both.
@@ -25,14 +26,14 @@ def simulate_with_lead_in(runs: Sequence[Run]) -> list[CleanRecord | SimulationE
     ]
 
 
-def earlier(run: Run) -> Run:
+def earlier(run: Run[Machine]) -> Run[Machine]:
     """The same motion from ``sensing.n_lead`` samples before its first one: teeth and phase turned back."""
     n_lead = run.system.sensing.n_lead
     if n_lead == 0:
         return run
     operating, pair, rate = run.system.operating, run.system.pair, run.system.sensing.sampling_rate
     lead = n_lead / rate
-    start = run.start or Start(tooth_pinion=0, tooth_wheel=0, phase=0.0)
+    start = run.start or Start()
     turned = operating.speed * float(operating.time_at_set_speed(np.array([-lead]))[0])
     pitches = start.phase + turned * pair.pinion.n_teeth / (2.0 * math.pi)
     teeth = math.floor(pitches)
@@ -48,7 +49,7 @@ def earlier(run: Run) -> Run:
     )
 
 
-def _cut(record: CleanRecord, run: Run) -> CleanRecord:
+def _cut(record: CleanRecord, run: Run[Machine]) -> CleanRecord:
     """What the record tells, from its own first sample on; the acceleration stays whole."""
     n_lead, rate = run.system.sensing.n_lead, run.system.sensing.sampling_rate
     if n_lead == 0:

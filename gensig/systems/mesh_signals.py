@@ -8,10 +8,18 @@ import numpy as np
 from numpy.typing import NDArray
 
 from gensig.dynamics.mesh_state import NO_TOOTH, MeshState
+from gensig.errors import ConfigError
 
 
 def mesh_signals(mesh: MeshState | None, n_samples: int, n_pairs: int) -> dict[str, NDArray[Any]]:
-    """The mesh state as a shard takes it, ``n_pairs`` rows of pairs; of a failed record nothing is known."""
+    """The mesh state as a shard takes it, ``n_pairs`` rows of pairs; of a failed record nothing is known.
+
+    Raises
+    ------
+    ConfigError    for a machine that does not know the loads of its teeth: no pairs
+    """
+    if n_pairs == 0:
+        raise ConfigError("dataset.store_mesh_state: a drive line does not tell the loads of its teeth; take false")
     if mesh is None:
         nobody = np.full((n_pairs, n_samples), NO_TOOTH, dtype=np.int16)
         return {

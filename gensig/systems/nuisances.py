@@ -15,7 +15,8 @@ from gensig.dynamics.response import accelerations
 from gensig.operation.setpoint import Nominal
 from gensig.sensing.nuisance import draw_tones
 from gensig.sensing.tones import SENSE, TURN, Tones, shaft
-from gensig.systems.pair_machine import CleanRecord, Run, Start
+from gensig.systems.pair_machine import PairRun, pair_dynamics
+from gensig.systems.run import CleanRecord, Start
 from gensig.systems.shaft_sensors import gear_angle
 
 Array = NDArray[np.float64]
@@ -26,7 +27,7 @@ BLOCK = 2048  # samples over which amplitudes go straight: 40 ms at 51.2 kHz
 
 
 def with_nuisances(
-    run: Run, record: CleanRecord, units: Mapping[str, np.random.Generator], record_rng: np.random.Generator
+    run: PairRun, record: CleanRecord, units: Mapping[str, np.random.Generator], record_rng: np.random.Generator
 ) -> CleanRecord:
     """A record whose bearings also feel what ``sensing.nuisances`` lists; without any, the record itself.
 
@@ -36,14 +37,14 @@ def with_nuisances(
     nuisances = run.system.sensing.nuisances
     if not nuisances:
         return record
-    dynamics = replace(run, faults=(), specimen=None).dynamics()
+    dynamics = pair_dynamics(replace(run, faults=(), specimen=None))
     tones = draw_tones(nuisances, dynamics, units, record_rng)
     gain = 1.0 if run.gearbox is None else run.gearbox.gain[:, None]
     heard = nuisance_acceleration(run, dynamics, tones, record.shaft_angle)
     return replace(record, acceleration=record.acceleration + gain * heard)
 
 
-def nuisance_acceleration(run: Run, dynamics: PairDynamics, tones: Sequence[Tones], shaft_angle: Array) -> Array:
+def nuisance_acceleration(run: PairRun, dynamics: PairDynamics, tones: Sequence[Tones], shaft_angle: Array) -> Array:
     """Accelerations of a run's channels under some tones, ``n_lead`` samples before the record too.
 
     Parameters
@@ -66,7 +67,7 @@ def nuisance_acceleration(run: Run, dynamics: PairDynamics, tones: Sequence[Tone
     n_lead, rate = sensing.n_lead, sensing.sampling_rate
     before = operating.nominal(np.arange(-n_lead, 0) / rate).angle + shaft_angle[0]
     turned = np.concatenate([before, shaft_angle])
-    begin_at = run.start or Start(tooth_pinion=0, tooth_wheel=0, phase=0.0)
+    begin_at = run.start or Start()
     first = {gear: float(gear_angle(run.system, gear, begin_at, np.zeros(1))[0]) for gear in SENSE}
     channels = [dynamics.dofs.index(name) for name in sensing.channels]
 

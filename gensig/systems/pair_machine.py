@@ -1,11 +1,11 @@
-"""A gear pair that runs: from configuration to records, many side by side, whatever its teeth."""
+"""One gear pair that runs: its lateral and torsional motion, many records side by side."""
 
 from __future__ import annotations
 
-from abc import ABC, abstractmethod
+from abc import abstractmethod
 from collections.abc import Sequence
-from dataclasses import dataclass, replace
-from typing import TYPE_CHECKING
+from dataclasses import dataclass, field, replace
+from typing import Self
 
 import numpy as np
 from numpy.typing import NDArray
@@ -25,141 +25,96 @@ from gensig.dynamics.integrator import (
 )
 from gensig.dynamics.mesh_state import MeshState, mesh_state
 from gensig.dynamics.pair import Body, PairDynamics, Rotor
-from gensig.errors import ConfigError, FaultError, SimulationError
+from gensig.errors import FaultError, SimulationError
 from gensig.faults.base import Fault, faulty_teeth
 from gensig.geometry.contact import GearPair
-from gensig.material import Material
-from gensig.mesh.options import MeshOptions
-from gensig.mesh.pair_table import N_PAIRS, PairTable
-from gensig.mesh.sliced.sliced_table import SlicedTable
-from gensig.operation.setpoint import Operating
+from gensig.geometry.gear import Gear
 from gensig.sensing.agreement import agreement
-from gensig.sensing.chain import Sensing
 from gensig.sensing.encoder import Disc
-from gensig.sensing.manufacturing import Gearbox, Quality, Specimen, nominal_gearbox, perfect_specimen
+from gensig.sensing.manufacturing import nominal_gearbox, perfect_specimen
+from gensig.systems.base import Machine, MachineMesh, specimen_table
+from gensig.systems.run import CleanRecord, Run, Start
 from gensig.systems.supports import in_gearbox
 from gensig.units import from_si
 
-if TYPE_CHECKING:
-    from gensig.systems.stiffness_curves import StiffnessCurves
-
 Array = NDArray[np.float64]
 
-
-@dataclass(frozen=True, slots=True, kw_only=True)
-class Start:
-    """Where a record begins: the teeth that enter contact at roll 0, and the roll as a share of a base pitch."""
-
-    tooth_pinion: int
-    tooth_wheel: int
-    phase: float
-
-
-# What an integration at half the step says of a record: its error is below the limit; teeth bounce, which makes point
-# values mean little, but band levels and indicators agree; neither; nobody looked; a drive line, whose error is the
-# residual of its energy balance.
-CHECKS = ("error", "levels", "unresolved", "none", "energy")
 FINEST_BOUNCING = 20  # steps per sample above which what bounces does not come nearer to anything
+PairMachine = Machine  # the name of version 0.9
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
-class CleanRecord:
-    """Accelerations before noise, (channel, sample) m/s2 (rad/s2 for rotations), and what the run tells of itself.
+class GearPairMachine(Machine):
+    """One gear pair with its supports, drive, motor and load; subclasses say how its teeth mesh."""
 
-    ``shaft_angle`` (sample,) rad of the pinion, from its nominal place at the first sample on, ``mean_speed`` rad/s,
-    ``integration_check`` one of ``CHECKS``, ``mesh`` the loads of the teeth where they were asked for.
-    """
-
-    acceleration: Array
-    shaft_angle: Array
-    mean_speed: float
-    contact_loss_fraction: float
-    integration_error: float
-    integration_check: str
-    mesh: MeshState | None = None
-
-
-@dataclass(frozen=True, slots=True, kw_only=True)
-class PairMachine(ABC):
-    """One gear pair with its supports, drive, sensors and quality; how its teeth mesh is the subclass's."""
-
-    pair: GearPair
-    material: Material
-    mesh: MeshOptions
+    pair: GearPair = field()
     pinion: Body
     wheel: Body
-    operating: Operating
-    sensing: Sensing
-    quality: Quality
-    solver: Solver
     motor: Rotor | None = None
     load: Rotor | None = None
 
+    @property
     @abstractmethod
-    def mesh_table(self, faults: Sequence[Fault] = ()) -> PairTable | SlicedTable:
-        """Compliance and gap tables with the given faults."""
+    def gear_channels(self) -> tuple[str, ...]:
+        """Channels of the two gears: every motion that they have."""
 
-    def stiffness_curves(
-        self, faults: Sequence[Fault] = (), *, n_positions: int = 201, points_per_tooth: int = 100
-    ) -> StiffnessCurves:
-        """Single-pair and mesh stiffness with their parts, of spur teeth; ConfigError for teeth in slices."""
-        raise ConfigError(
-            "stiffness_curves are those of system=spur_pair; a helical pair has its stiffness slice by slice: "
-            "flanks.transmission_error(), or gensig stiffness system=helical_pair"
-        )
+    @abstractmethod
+    def require_drive(self) -> None:
+        """Raise GeometryError unless at least one pair of teeth is always in contact."""
 
-    def simulate_alone(self, run: Run) -> CleanRecord | SimulationError | None:
-        """The record of a machine that is not simulated side by side with others; None for one that is."""
-        return None
+    @property
+    def gears(self) -> dict[str, Gear]:
+        """Pinion and wheel."""
+        return self.pair.gears
 
-    def draw_discs(self, rng: np.random.Generator) -> tuple[Disc, ...]:
-        """The toothed wheels of one gearbox with their errors; a pair has none."""
-        return ()
+    @property
+    def bodies(self) -> dict[str, Body]:
+        """Mass, inertia and support of pinion and wheel."""
+        return dict(zip(self.gears, (self.pinion, self.wheel), strict=True))
 
-    def driven_tooth(self, tooth_pinion: int, drawn: int) -> int:
-        """Tooth of the driven gear that meets one of the driving gear at the start: the drawn one, put on anew."""
-        return drawn
+    @property
+    def meshes(self) -> tuple[MachineMesh, ...]:
+        """The one mesh."""
+        driving, driven = self.gears
+        return (MachineMesh(driving=driving, driven=driven, pair=self.pair, followed=True),)
+
+    @property
+    def channels(self) -> tuple[str, ...]:
+        """All degrees of freedom: those of the gears, and the rotations of motor and load if there are any."""
+        rotors = {"motor_rotation": self.motor, "load_rotation": self.load}
+        return (*self.gear_channels, *[name for name, rotor in rotors.items() if rotor is not None])
 
     @property
     def ratio(self) -> float:
-        """Speed of the pinion's shaft over the one that ``operating`` is told for."""
+        """1: the configuration gives the speed of the pinion."""
         return 1.0
 
     @property
     def torque_of(self) -> str:
-        """What the set torque is that of, where it is not the driving shaft's own."""
+        """Empty: the set torque is that of the pinion's shaft."""
         return ""
-
-    def mesh_torques(self, speed: float, torque: float) -> Array:
-        """Loads that a tooth meets at a set-point, one a mesh, all equally likely, as torques of the pinion in N m.
-
-        ``speed`` rad/s of the pinion, ``torque`` N m of the set-point; (mesh,).
-        """
-        return np.array([torque])
 
     @property
     def load_exponent(self) -> int:
-        """Power of the speed that the set torque follows along a course, beyond its own profile."""
+        """0: the set torque follows its own profile alone."""
         return 0
-
-    @property
-    def most_pairs(self) -> int:
-        """Pairs of teeth that may be followed at once."""
-        return N_PAIRS
-
-    def require_drive(self) -> None:
-        """Raise GeometryError unless at least one pair is always in contact."""
-        self.pair.require_continuous_drive()
-
-    def _specimen_table(self, faults: Sequence[Fault], specimen: Specimen) -> PairTable | SlicedTable:
-        """The faults on the flanks of a set of gears, at its backlash; which asks for no tables of its own."""
-        table = self.mesh_table((*specimen.forms, *faults))
-        return replace(table, pair=replace(self.pair, backlash=self.pair.backlash * specimen.backlash_factor))
 
     @property
     def mesh_force(self) -> float:
         """Normal force of the set torque, N."""
         return self.operating.torque / self.pair.pinion.base_radius
+
+    def mesh_torques(self, speed: float, torque: float) -> Array:
+        """The set torque: every mesh of a tooth has the same load, (1,) N m."""
+        return np.array([torque])
+
+    def driven_tooth(self, tooth_pinion: int, drawn: int) -> int:
+        """The drawn tooth: the gears are put on anew for every record."""
+        return drawn
+
+    def draw_discs(self, rng: np.random.Generator) -> tuple[Disc, ...]:
+        """None: a pair has no toothed wheels."""
+        return ()
 
     def check(self) -> None:
         """Raise for what would stop every record: interrupted drive, fits out of range, channels, step length."""
@@ -168,95 +123,70 @@ class PairMachine(ABC):
         self.quality.check_covered(self.pair.pinion, self.pair.wheel)
         sensing, operating = self.sensing, self.operating
         check_memory(operating.duration, sensing.sampling_rate, len(sensing.channels), self.solver.precision)
-        nominal = Run(system=self, faults=()).dynamics()
-        check_channels(sensing.channels, nominal.dofs)
+        nominal = pair_dynamics(Run(system=self, faults=()))
+        check_channels(sensing.channels, self.channels)
         sensing.check(operating.duration)
         check_step(nominal, sensing.sampling_rate, self.solver.oversampling, self.solver.max_error)
 
-    def simulate(
-        self,
-        faults: Sequence[Fault] = (),
-        *,
-        start: Start | None = None,
-        specimen: Specimen | None = None,
-        gearbox: Gearbox | None = None,
-    ) -> CleanRecord:
-        """Simulate one record; what is not given is perfect, nominal, and starts with teeth 0 at A."""
-        run = Run(system=self, faults=tuple(faults), start=start, specimen=specimen, gearbox=gearbox)
-        (record,) = simulate_together([run])
-        if isinstance(record, SimulationError):
-            raise record
-        return record
+    @classmethod
+    def simulate_runs(cls, runs: Sequence[Run[Self]]) -> list[CleanRecord | SimulationError]:
+        """Simulate runs in groups of those that share rate, duration and law, side by side; in the order given."""
+        return simulate_pairs(runs)
 
-    def _dynamics(self, faults: Sequence[Fault], start: Start, specimen: Specimen, gearbox: Gearbox) -> PairDynamics:
-        return PairDynamics(
-            table=self._specimen_table(faults, specimen),
-            pinion=in_gearbox(self.pinion, gearbox, slice(0, 2), self.quality),
-            wheel=in_gearbox(self.wheel, gearbox, slice(2, 4), self.quality),
-            operating=self.operating,
-            pinion_error=specimen.pinion_error,
-            wheel_error=specimen.wheel_error,
-            pinion_tilt=specimen.pinion_tilt + np.zeros(self.pair.pinion.n_teeth),
-            wheel_tilt=specimen.wheel_tilt + np.zeros(self.pair.wheel.n_teeth),
-            start_tooth_pinion=start.tooth_pinion,
-            start_tooth_wheel=start.tooth_wheel,
-            start_phase=start.phase,
-            motor=self.motor,
-            load=self.load,
-        )
+
+PairRun = Run[GearPairMachine]
 
 
 def severity(faults: Sequence[Fault], pair: GearPair) -> float:
     """Largest severity of the faults, 0 when there is none."""
-    gears = {"pinion": pair.pinion, "wheel": pair.wheel}
+    gears = pair.gears
     value = max((fault.severity(gears[fault.gear]) for fault in faults), default=0.0)
     if value > 1.0:
         raise FaultError(f"the fault's severity is {value:.3g}, above 1: it is larger than its tooth")
     return value
 
 
-@dataclass(frozen=True, slots=True, kw_only=True)
-class Run:
-    """One record to be simulated; what is None is perfect, nominal, and starts with teeth 0 at A.
-
-    ``tell_mesh`` asks for the loads of the teeth at every sample. ``discs`` are the toothed wheels of a drive line.
-    """
-
-    system: PairMachine
-    faults: tuple[Fault, ...]
-    start: Start | None = None
-    specimen: Specimen | None = None
-    gearbox: Gearbox | None = None
-    tell_mesh: bool = False
-    discs: tuple[Disc, ...] = ()
-
-    @property
-    def kind(self) -> tuple[object, ...]:
-        """What runs that are simulated side by side share."""
-        system = self.system
-        operating = system.operating
-        sensing = (system.sensing.sampling_rate, system.sensing.channels, operating.duration)
-        machine = (type(system), system.motor is None, system.load is None, operating.is_steady, self.tell_mesh)
-        return (*sensing, *machine, system.solver, system.mesh.law, system.mesh.roll_torque)
-
-    def finer(self) -> Run:
-        """The same at half the step."""
-        solver = self.system.solver
-        return replace(self, system=replace(self.system, solver=replace(solver, oversampling=2 * solver.oversampling)))
-
-    def dynamics(self) -> PairDynamics:
-        """The equations of motion."""
-        system, pair = self.system, self.system.pair
-        system.require_drive()
-        return system._dynamics(
-            self.faults,
-            self.start or Start(tooth_pinion=0, tooth_wheel=0, phase=0.0),
-            self.specimen or perfect_specimen(pair.pinion, pair.wheel),
-            self.gearbox or nominal_gearbox(len(system.sensing.channels)),
-        )
+def pair_dynamics(run: PairRun) -> PairDynamics:
+    """Equations of motion of a run, its specimen and gearbox included; GeometryError for an interrupted drive."""
+    machine, pair = run.system, run.system.pair
+    machine.require_drive()
+    start = run.start or Start()
+    specimen = run.specimen or perfect_specimen(pair.pinion, pair.wheel)
+    gearbox = run.gearbox or nominal_gearbox(len(machine.sensing.channels))
+    return PairDynamics(
+        table=specimen_table(machine, run.faults, specimen),
+        pinion=in_gearbox(machine.pinion, gearbox, slice(0, 2), machine.quality),
+        wheel=in_gearbox(machine.wheel, gearbox, slice(2, 4), machine.quality),
+        operating=machine.operating,
+        pinion_error=specimen.pinion_error,
+        wheel_error=specimen.wheel_error,
+        pinion_tilt=specimen.pinion_tilt + np.zeros(pair.pinion.n_teeth),
+        wheel_tilt=specimen.wheel_tilt + np.zeros(pair.wheel.n_teeth),
+        start_tooth_pinion=start.tooth_pinion,
+        start_tooth_wheel=start.tooth_wheel,
+        start_phase=start.phase,
+        motor=machine.motor,
+        load=machine.load,
+    )
 
 
-def simulate_together(runs: Sequence[Run]) -> list[CleanRecord | SimulationError]:
+def _lane_key(run: PairRun) -> tuple[object, ...]:
+    """Everything that runs must share to be integrated side by side."""
+    system = run.system
+    operating = system.operating
+    sensing = (system.sensing.sampling_rate, system.sensing.channels, operating.duration)
+    machine = (type(system), system.motor is None, system.load is None, operating.is_steady, run.tell_mesh)
+    return (*sensing, *machine, system.solver, system.mesh.law, system.mesh.roll_torque)
+
+
+def _finer(run: PairRun) -> PairRun:
+    """The same run at half the step."""
+    solver = run.system.solver
+    finer = replace(solver, oversampling=2 * solver.oversampling)
+    return replace(run, system=replace(run.system, solver=finer))
+
+
+def simulate_pairs(runs: Sequence[PairRun]) -> list[CleanRecord | SimulationError]:
     """Simulate records in groups of those that share rate, duration and law, side by side; in the order given.
 
     A record's bits do not depend on what it is simulated beside. A motion that does not stay finite gives its error in
@@ -267,17 +197,13 @@ def simulate_together(runs: Sequence[Run]) -> list[CleanRecord | SimulationError
     kinds: dict[tuple[object, ...], list[int]] = {}
     for place, run in enumerate(runs):
         system = run.system
-        alone = system.simulate_alone(run)
-        if alone is not None:
-            found[place] = alone
-            continue
         try:
-            machines[place] = run.dynamics()
+            machines[place] = pair_dynamics(run)
             settling = settling_oversampling(machines[place], system.solver, system.sensing.sampling_rate)
         except SimulationError as error:
             found[place] = error
         else:
-            kinds.setdefault((*run.kind, settling), []).append(place)
+            kinds.setdefault((*_lane_key(run), settling), []).append(place)
     for places in kinds.values():
         together = n_lanes(runs[places[0]].system.solver.precision)
         for first in range(0, len(places), together):
@@ -286,11 +212,11 @@ def simulate_together(runs: Sequence[Run]) -> list[CleanRecord | SimulationError
             found.update(zip(group, records, strict=True))
     coarse = [place for place, record in found.items() if _is_too_coarse(runs[place], record)]
     if coarse:
-        found.update(zip(coarse, simulate_together([runs[place].finer() for place in coarse]), strict=True))
+        found.update(zip(coarse, simulate_pairs([_finer(runs[place]) for place in coarse]), strict=True))
     return [found[place] for place in range(len(runs))]
 
 
-def _is_too_coarse(run: Run, record: CleanRecord | SimulationError) -> bool:
+def _is_too_coarse(run: PairRun, record: CleanRecord | SimulationError) -> bool:
     if isinstance(record, SimulationError) or record.integration_check != "unresolved":
         return False
     finest = FINEST_BOUNCING if record.contact_loss_fraction > BOUNCING else FINEST
@@ -314,7 +240,7 @@ def _checks(motions: Motions, solver: Solver, sampling_rate: float) -> tuple[Arr
     return errors, checks
 
 
-def _side_by_side(runs: Sequence[Run], machines: Sequence[PairDynamics]) -> list[CleanRecord | SimulationError]:
+def _side_by_side(runs: Sequence[PairRun], machines: Sequence[PairDynamics]) -> list[CleanRecord | SimulationError]:
     system = runs[0].system
     motions = integrate(
         machines,
@@ -351,6 +277,6 @@ def _side_by_side(runs: Sequence[Run], machines: Sequence[PairDynamics]) -> list
     return records
 
 
-def _mesh_state(run: Run, dynamics: PairDynamics, motions: Motions, lane: int) -> MeshState:
+def _mesh_state(run: PairRun, dynamics: PairDynamics, motions: Motions, lane: int) -> MeshState:
     faulty = faulty_teeth(run.system.pair, run.faults)
     return mesh_state(dynamics, motions.seen[lane], motions.shaft_angle[lane], faulty)

@@ -20,7 +20,7 @@ from gensig.sensing.manufacturing import Quality
 from gensig.sensing.options import read_sensing
 from gensig.systems.helical_pair import HelicalPair
 from gensig.systems.hot_pair import Duty, as_configured
-from gensig.systems.pair_machine import PairMachine
+from gensig.systems.pair_machine import GearPairMachine
 from gensig.systems.sliced_pair import SlicedPair
 from gensig.systems.spur_pair import SpurPair
 from gensig.systems.supports import AS_GIVEN, held_axially, on_bearings, put_on_bearings, read_holding
@@ -72,7 +72,7 @@ def read_helical_pair(config: Configuration) -> HelicalPair:
 
 
 def _read_machine(config: Configuration, pair: GearPair) -> dict[str, Any]:
-    """What a pair's machine has whatever its teeth, by the fields of ``PairMachine``."""
+    """What a pair's machine has whatever its teeth, by the fields of ``GearPairMachine``."""
     material = read_material(config)
     sides = {name: config.section("gear", name) for name in SIDES}
     machine = config.section("system")
@@ -163,13 +163,13 @@ def read_modification(config: Configuration) -> PairModification:
     return read(PairModification, own, "modification", **sides)
 
 
-SYSTEMS: dict[str, Callable[[Configuration], PairMachine]] = {
+SYSTEMS: dict[str, Callable[[Configuration], GearPairMachine]] = {
     "spur_pair": read_spur_pair,
     SLICED: read_helical_pair,
 }
 
 
-def read_system(config: Configuration) -> PairMachine:
+def read_system(config: Configuration) -> GearPairMachine:
     """Build the system that ``system.kind`` names.
 
     Raises

@@ -11,13 +11,14 @@ from numpy.typing import NDArray
 
 from gensig.sensing.encoder import draw_disc
 from gensig.sensing.tachometer import draw_mark, pulse_train
-from gensig.systems.pair_machine import CleanRecord, PairMachine, Start
+from gensig.systems.base import Machine
+from gensig.systems.run import CleanRecord, Start
 
 Array = NDArray[np.float64]
 SWITCHES = {"store_tacho": "tacho", "store_encoder": "encoder_angle", "store_shaft_angle": "shaft_angle"}
 
 
-def gear_angle(system: PairMachine, shaft: str, start: Start, shaft_angle: Array) -> Array:
+def gear_angle(system: Machine, shaft: str, start: Start, shaft_angle: Array) -> Array:
     """Angle of a gear in its own sense of rotation, 0 where its tooth 0 enters contact, (sample,) rad.
 
     The wheel's is that of the pinion over the ratio: its lag under load and its own vibration are left out.
@@ -26,14 +27,14 @@ def gear_angle(system: PairMachine, shaft: str, start: Start, shaft_angle: Array
     ----------
     shaft_angle : (sample,) rad    of the pinion since the record's start, as ``CleanRecord`` has it
     """
-    pinion, wheel = system.pair.pinion.n_teeth, system.pair.wheel.n_teeth
-    n_teeth, first = (pinion, start.tooth_pinion) if shaft == "pinion" else (wheel, start.tooth_wheel)
-    return (shaft_angle * pinion + 2.0 * math.pi * (first + start.phase)) / n_teeth
+    pair, first = system.pair, start.teeth[shaft]
+    turned = shaft_angle * pair.pinion.n_teeth + 2.0 * math.pi * (first + start.phase)
+    return turned / pair.gears[shaft].n_teeth
 
 
 def shaft_signals(
     names: Sequence[str],
-    system: PairMachine,
+    system: Machine,
     start: Start,
     record: CleanRecord | None,
     gearbox_rng: np.random.Generator,

@@ -5,9 +5,11 @@ from __future__ import annotations
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
 from functools import lru_cache
+from typing import final
 
 import numpy as np
 
+from gensig.dynamics.pair import PAIR_DOFS
 from gensig.errors import GeometryError
 from gensig.faults.base import Fault, faulty_teeth
 from gensig.geometry.contact import GearPair
@@ -15,16 +17,31 @@ from gensig.material import Material
 from gensig.mesh.load_distribution import loaded_pair_table
 from gensig.mesh.modification import PLAIN, FlankModification, PairModification, sound_teeth
 from gensig.mesh.options import MeshOptions
-from gensig.mesh.pair_table import PairTable
-from gensig.systems.pair_machine import PairMachine
+from gensig.mesh.pair_table import N_PAIRS, PairTable
+from gensig.systems.pair_machine import GearPairMachine
 from gensig.systems.stiffness_curves import StiffnessCurves, single_pair, stiffness_curves
 
 
+@final
 @dataclass(frozen=True, slots=True, kw_only=True)
-class SpurPair(PairMachine):
+class SpurPair(GearPairMachine):
     """One machine under one set of conventions; ``modification`` is of all teeth, before errors and faults."""
 
     modification: PairModification = PLAIN
+
+    @property
+    def gear_channels(self) -> tuple[str, ...]:
+        """Both gears move across and along the line of action and turn."""
+        return PAIR_DOFS
+
+    @property
+    def most_pairs(self) -> int:
+        """Pairs of teeth that the table covers at once."""
+        return N_PAIRS
+
+    def require_drive(self) -> None:
+        """Raise GeometryError unless at least one pair of teeth is always in contact."""
+        self.pair.require_continuous_drive()
 
     def mesh_table(self, faults: Sequence[Fault] = ()) -> PairTable:
         """Compliance and gap tables with the given faults."""

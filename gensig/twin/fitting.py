@@ -12,7 +12,8 @@ from numpy.typing import NDArray
 from gensig.errors import ConfigError
 from gensig.signals.mesh_motion import Motion, Teeth
 from gensig.signals.recording import Recording
-from gensig.systems.pair_machine import CleanRecord, PairMachine
+from gensig.systems.base import Machine
+from gensig.systems.run import CleanRecord
 from gensig.twin.grade import GRADES, N_SPECIMENS, Grade, fit_grade, simulated_lines, simulated_records
 from gensig.twin.lines import Lines, band_centers, band_sums, find_lines
 from gensig.twin.speed import find_motion
@@ -68,7 +69,7 @@ class Fit:
 
 
 def fit(
-    recording: Recording, system: PairMachine, speed_rpm: float, tell: Callable[[str], None] = lambda text: None
+    recording: Recording, system: Machine, speed_rpm: float, tell: Callable[[str], None] = lambda text: None
 ) -> Fit:
     """Fit speed, drift, grade, path and noise to a healthy recording.
 
@@ -109,7 +110,7 @@ def fit(
     )
 
 
-def _own_scatter(records: Sequence[CleanRecord], model: PairMachine, teeth: Teeth) -> float:
+def _own_scatter(records: Sequence[CleanRecord], model: Machine, teeth: Teeth) -> float:
     rate, speed_rpm = model.sensing.sampling_rate, from_si("speed_rpm", model.operating.speed)
     found = []
     for record in records:
@@ -123,7 +124,7 @@ def oversampling(sampling_rate: float, at_least: int) -> int:
     return max(at_least, math.ceil(INTERNAL_RATE / sampling_rate))
 
 
-def fitting_system(system: PairMachine, recording: Recording, mesh_frequency: float, teeth: Teeth) -> PairMachine:
+def fitting_system(system: Machine, recording: Recording, mesh_frequency: float, teeth: Teeth) -> Machine:
     """The machine at the speed that was found, heard by one ideal sensor at the recording's rate."""
     sampling_rate, solver = recording.sampling_rate, system.solver
     least, most = (turns * teeth.most / mesh_frequency for turns in SIMULATED_TURNS)

@@ -11,7 +11,8 @@ from numpy.typing import NDArray
 from gensig.errors import SimulationError
 from gensig.sensing.manufacturing import draw_specimen
 from gensig.signals.mesh_motion import Teeth
-from gensig.systems.pair_machine import CleanRecord, PairMachine, Run, Start, simulate_together
+from gensig.systems.base import Machine, simulate_together
+from gensig.systems.run import CleanRecord, Run, Start
 from gensig.twin.lines import Lines, find_lines
 
 Array = NDArray[np.float64]
@@ -66,9 +67,7 @@ def sideband_ratios(lines: Lines, teeth: Teeth) -> Array:
     return ratios
 
 
-def simulated_records(
-    system: PairMachine, grades: Sequence[float], n_specimens: int, seed: int
-) -> list[list[CleanRecord]]:
+def simulated_records(system: Machine, grades: Sequence[float], n_specimens: int, seed: int) -> list[list[CleanRecord]]:
     """Healthy records of the simulated bearing, by grade and specimen; specimens are the same for every grade.
 
     Raises
@@ -98,7 +97,7 @@ def _finite(record: CleanRecord | SimulationError) -> CleanRecord:
     return record
 
 
-def simulated_lines(record: CleanRecord, system: PairMachine) -> Lines:
+def simulated_lines(record: CleanRecord, system: Machine) -> Lines:
     """Lines of a simulated record, whose angle is known."""
     teeth = Teeth(driving=system.pair.pinion.n_teeth, driven=system.pair.wheel.n_teeth)
     cycles = record.shaft_angle * teeth.driving / (2.0 * np.pi)

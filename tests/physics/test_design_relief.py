@@ -12,8 +12,9 @@ from gensig.errors import GeometryError
 from gensig.mesh.load_distribution import pair_states, static_mesh
 from gensig.mesh.modification import PLAIN, FlankModification, PairModification
 from gensig.mesh.sliced.sliced_statics import chord_equilibrium, chord_states
-from gensig.systems.pair_machine import Run, simulate_together
+from gensig.systems.base import simulate_together
 from gensig.systems.registry import read_system
+from gensig.systems.run import Run
 
 UM, MM = 1e-6, 1e-3
 SIDES = ("pinion", "wheel")

@@ -16,7 +16,8 @@ from scipy.linalg import expm
 
 from gensig.faults.broken import MissingTooth
 from gensig.sensing.agreement import agreement
-from gensig.systems.pair_machine import Run, Start, simulate_together
+from gensig.systems.base import simulate_together
+from gensig.systems.run import Run, Start
 
 SAMPLING_RATE = 51200.0
 PHASE = 0.3

@@ -12,8 +12,8 @@ from gensig.operation.courses import Profile
 from gensig.operation.options import read_operating
 from gensig.plan.request import read_request
 from gensig.systems.lead_in import earlier
-from gensig.systems.pair_machine import Run
 from gensig.systems.registry import read_system
+from gensig.systems.run import Run
 
 SPEED, TORQUE = "operating.speed_profile", "operating.torque_profile"
 WALK = {"kind": "random_walk", "scatter": 0.01, "correlation_time_s": 0.1}

@@ -11,7 +11,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from gensig.faults.base import Fault
-from gensig.systems.pair_machine import PairMachine
+from gensig.systems.base import Machine
 from gensig.systems.stiffness_curves import StiffnessCurves
 from gensig.units import SPEED, channel_unit
 
@@ -25,7 +25,7 @@ ENVELOPE_BAND_HZ = (5000.0, 19000.0)
 
 
 def plot_stiffness(
-    system: PairMachine, curves: StiffnessCurves, faults: Sequence[Fault], path: Path, *, sound: StiffnessCurves
+    system: Machine, curves: StiffnessCurves, faults: Sequence[Fault], path: Path, *, sound: StiffnessCurves
 ) -> None:
     """Single pair, mesh over one revolution and as it is when ``sound``, load sharing and compliance terms."""
     figure, axes = pyplot.subplots(2, 2, figsize=(11, 7.2), layout="constrained")
@@ -64,9 +64,7 @@ def _single_pair(axes: Any, curves: StiffnessCurves, faults: Sequence[Fault]) ->
     axes.legend()
 
 
-def _mesh(
-    axes: Any, system: PairMachine, curves: StiffnessCurves, faults: Sequence[Fault], sound: StiffnessCurves
-) -> None:
+def _mesh(axes: Any, system: Machine, curves: StiffnessCurves, faults: Sequence[Fault], sound: StiffnessCurves) -> None:
     angle = np.degrees(curves.roll_angle)
     if faults:
         # A sound mesh has the period of a tooth, so that its turn of the pinion fits a turn of the wheel too.
@@ -86,7 +84,7 @@ def _mesh(
     )
 
 
-def _load_sharing(axes: Any, system: PairMachine, curves: StiffnessCurves, faults: Sequence[Fault]) -> None:
+def _load_sharing(axes: Any, system: Machine, curves: StiffnessCurves, faults: Sequence[Fault]) -> None:
     pitch_angle = 360.0 / _n_teeth(system, faults)
     begin = _fault_angle(system, faults[0]) - pitch_angle if faults else 0.0
     angle = np.degrees(curves.roll_angle)
@@ -117,7 +115,7 @@ def _terms(axes: Any, curves: StiffnessCurves) -> None:
 
 
 def plot_record(
-    system: PairMachine,
+    system: Machine,
     acceleration: NDArray[np.float32],
     values: dict[str, Any],
     path: Path,
@@ -175,15 +173,15 @@ def save(figure: Any, path: Path) -> None:
     pyplot.close(figure)
 
 
-def _n_teeth(system: PairMachine, faults: Sequence[Fault]) -> int:
+def _n_teeth(system: Machine, faults: Sequence[Fault]) -> int:
     return system.pair.wheel.n_teeth if faults and faults[0].gear == "wheel" else system.pair.pinion.n_teeth
 
 
-def _fault_angle(system: PairMachine, fault: Fault) -> float:
+def _fault_angle(system: Machine, fault: Fault) -> float:
     """Roll angle at which the faulty tooth enters contact, degrees."""
     return 360.0 * max(fault.first_tooth, 0) / _n_teeth(system, [fault])
 
 
-def _contact_angle(system: PairMachine, fault: Fault) -> float:
+def _contact_angle(system: Machine, fault: Fault) -> float:
     """Roll angle over which one tooth is in contact, degrees."""
     return 360.0 / _n_teeth(system, [fault]) * system.pair.transverse_contact_ratio

@@ -19,7 +19,7 @@ from gensig.mesh.pair_table import PairTable
 from gensig.options.configuration import Configuration
 from gensig.plan.request import read_request
 from gensig.record.machines import read_machine
-from gensig.systems.pair_machine import PairMachine
+from gensig.systems.base import Machine
 from gensig.systems.registry import SLICED
 from gensig.systems.spur_pair import SpurPair
 from gensig.systems.stiffness_curves import StiffnessCurves
@@ -63,7 +63,7 @@ def stiffness(arguments: Namespace) -> int:
     return 0
 
 
-def stiffness_content(system: PairMachine, curves: StiffnessCurves) -> dict[str, Any]:
+def stiffness_content(system: Machine, curves: StiffnessCurves) -> dict[str, Any]:
     """The keys of ``gensig stiffness --json``."""
     table = system.mesh_table()
     assert isinstance(table, PairTable)  # which the curves are made of
@@ -179,7 +179,7 @@ def _show(config: Configuration, record: Record, arguments: Namespace, name: str
     return 0
 
 
-def _write_record(config: Configuration, system: PairMachine, record: Record, output: str) -> None:
+def _write_record(config: Configuration, system: Machine, record: Record, output: str) -> None:
     """One record as a shard of one row, or as a table with time and channels."""
     path = Path(output)
     if path.suffix != ".csv":
@@ -198,7 +198,7 @@ def _write_record(config: Configuration, system: PairMachine, record: Record, ou
             np.savetxt(temporary, np.column_stack([time, *acceleration]), "%.9g", ",", header=header, comments="")
 
 
-def _print_record(system: PairMachine, acceleration: NDArray[np.float32], values: dict[str, Any]) -> None:
+def _print_record(system: Machine, acceleration: NDArray[np.float32], values: dict[str, Any]) -> None:
     from gensig.signals.indicators import crest_factor, kurtosis, rms
 
     print(f"speed {values['speed_rpm']:.3f} r/min, mesh frequency {values['mesh_frequency_hz']:.2f} Hz")

@@ -13,7 +13,7 @@ from gensig.geometry.contact import GearPair
 from gensig.life.root.root_stress import root_factors
 from gensig.options.configuration import Configuration
 from gensig.plan.request import read_request
-from gensig.systems.pair_machine import PairMachine
+from gensig.systems.pair_machine import GearPairMachine
 from gensig.systems.registry import SIDES, read_pair, read_system
 from gensig.text.option_writing import option_lines
 from gensig.units import to_si
@@ -73,7 +73,7 @@ class GearOption:
 
     gear: dict[str, Any]
     remarks: dict[str, str]
-    machine: PairMachine
+    machine: GearPairMachine
     is_helical: bool
 
     @property
@@ -247,7 +247,7 @@ def _short(value: float) -> float:
     return float(f"{value:.4g}")
 
 
-def _remarks(sheet: DataSheet, machine: PairMachine, bearings: Sequence[BearingSize]) -> dict[str, str]:
+def _remarks(sheet: DataSheet, machine: GearPairMachine, bearings: Sequence[BearingSize]) -> dict[str, str]:
     remarks = {
         "rated_speed_rpm": "given; of the pinion",
         "rated_torque_nm": "given; of the pinion",

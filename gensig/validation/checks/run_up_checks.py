@@ -13,8 +13,9 @@ from gensig.dynamics.response import accelerations
 from gensig.options.compose import compose
 from gensig.sensing.manufacturing import nominal_gearbox, perfect_specimen
 from gensig.systems.helical_pair import HelicalPair
-from gensig.systems.pair_machine import Run
+from gensig.systems.pair_machine import pair_dynamics
 from gensig.systems.registry import read_helical_pair
+from gensig.systems.run import Run
 from gensig.units import to_si
 
 Array = NDArray[np.float64]
@@ -42,7 +43,7 @@ class RunUpCase:
         system = self.system
         gears = system.pair.pinion, system.pair.wheel
         run = Run(system=system, faults=(), specimen=perfect_specimen(*gears), gearbox=nominal_gearbox(len(CHANNELS)))
-        dynamics = run.dynamics()
+        dynamics = pair_dynamics(run)
         amplitude = system.flanks.transmission_error().harmonics[:N_ORDERS]
         order, speed = np.arange(1, N_ORDERS + 1), to_si("speed_rpm", 1.0) * SPEEDS_RPM
         frequency = np.outer(speed, order * system.pair.pinion.n_teeth).ravel()

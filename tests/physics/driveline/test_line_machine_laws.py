@@ -15,7 +15,7 @@ from gensig.faults.registry import read_faults
 from gensig.plan.request import read_request
 from gensig.record.machines import read_machine
 from gensig.sensing.manufacturing import nominal_gearbox
-from gensig.systems.pair_machine import Run, Start
+from gensig.systems.run import Run, Start
 
 RPM = np.pi / 30.0
 SPEED, TORQUE = 1688.0 * RPM, 12680.0

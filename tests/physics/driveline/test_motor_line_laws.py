@@ -15,7 +15,7 @@ from gensig.errors import StepError
 from gensig.faults.registry import read_faults
 from gensig.plan.request import read_request
 from gensig.record.machines import read_machine
-from gensig.systems.pair_machine import Run, Start
+from gensig.systems.run import Run, Start
 
 RPM = np.pi / 30.0
 SPEED, TORQUE = 1746.0 * RPM, 60.0

@@ -13,7 +13,9 @@ from gensig.faults.crack import Crack
 from gensig.mesh.load_distribution import pair_states, static_mesh
 from gensig.mesh.pair_table import N_PAIRS
 from gensig.sensing.chain import detectability
-from gensig.systems.pair_machine import Run, simulate_together
+from gensig.systems.base import simulate_together
+from gensig.systems.pair_machine import pair_dynamics
+from gensig.systems.run import Run
 
 RATE = 51200.0
 QUICK = {"operating.duration_s": 0.1, "solver.max_error": None}
@@ -79,7 +81,7 @@ def test_pinion_and_wheel_teeth_stay_in_step(sound):
 def test_slowly_turned_the_shares_are_the_static_ones(record, machine):
     changes = {"operating.speed_rpm": 60, "operating.duration_s": 0.05}
     system, found = machine({**QUICK, **changes}), record(changes)
-    dynamics = Run(system=system, faults=()).dynamics()
+    dynamics = pair_dynamics(Run(system=system, faults=()))
     roll = dynamics.start_roll + system.pair.pinion.base_radius * found.shaft_angle
     static = static_mesh(dynamics.table, pair_states(dynamics.table, roll), dynamics.mesh_force)
     expected = np.sort(static.load / static.load.sum(axis=1, keepdims=True), axis=1).T

@@ -12,7 +12,8 @@ from gensig.operation.setpoint import Profile
 from gensig.sensing.nuisance import draw_tones, read_nuisances
 from gensig.sensing.tones import SENSE, Tones
 from gensig.systems.nuisances import nuisance_acceleration
-from gensig.systems.pair_machine import Run, Start
+from gensig.systems.pair_machine import pair_dynamics
+from gensig.systems.run import Run, Start
 
 RATE, DURATION = 51200.0, 0.2
 UNBALANCE = {"kind": "unbalance", "gear": "pinion", "iso21940_grade": 6.3, "used_share": [1.0, 1.0],
@@ -25,13 +26,13 @@ MESH = {"kind": "neighbour_mesh", "gear": "wheel", "n_teeth": 25, "n_teeth_mate"
 def tones_of(run, part):
     rng = [np.random.default_rng([7, k]) for k in range(3)]
     units = {"gearbox": rng[0], "specimen": rng[1]}
-    return draw_tones(read_nuisances([part]), run.dynamics(), units, rng[2])
+    return draw_tones(read_nuisances([part]), pair_dynamics(run), units, rng[2])
 
 
 def heard(run, tones, angle=None):
     times = np.arange(round(run.system.operating.duration * RATE)) / RATE
     angle = run.system.operating.nominal(times).angle if angle is None else angle
-    return nuisance_acceleration(run, run.dynamics(), tones, angle)
+    return nuisance_acceleration(run, pair_dynamics(run), tones, angle)
 
 
 @pytest.fixture(scope="module")
@@ -62,7 +63,7 @@ def test_unbalance_grows_with_the_square_of_the_speed_and_what_the_machine_answe
         w = run.system.operating.speed * (1.0 if gear == "pinion" else 23 / 84)
         force = np.zeros((1, 6), dtype=complex)
         force[0, [0, 1] if gear == "pinion" else [3, 4]] = 1.0, -1j * SENSE[gear]
-        answer = accelerations(run.dynamics(), np.array([w]), force)[0, [0, 1, 3, 4]]
+        answer = accelerations(pair_dynamics(run), np.array([w]), force)[0, [0, 1, 3, 4]]
         angle = w * np.arange(round(DURATION * RATE)) / RATE
         measured = amplitudes(heard(run, [tones]), angle, 1.0)
         mine = [0, 1] if gear == "pinion" else [2, 3]

@@ -13,7 +13,8 @@ from gensig.errors import SimulationError
 from gensig.faults.broken import MissingTooth
 from gensig.faults.crack import Crack
 from gensig.sensing.manufacturing import draw_gearbox, draw_specimen
-from gensig.systems.pair_machine import Run, simulate_together
+from gensig.systems.base import simulate_together
+from gensig.systems.run import Run
 
 SAMPLING_RATE = 51200.0
 LEFT = 5e-4  # of a spectrum; at 600 r/min, where drive and wheel are near each other, 4e-4, else up to 2e-4

@@ -11,7 +11,9 @@ from gensig.dynamics._layout import BACKLASH
 from gensig.faults.flank_form import ProfileError
 from gensig.mesh.load_distribution import static_mesh
 from gensig.sensing.manufacturing import draw_specimen, perfect_specimen
-from gensig.systems.pair_machine import Run, simulate_together
+from gensig.systems.base import simulate_together
+from gensig.systems.pair_machine import pair_dynamics
+from gensig.systems.run import Run
 
 UM = 1e-6
 SIZE = 6 * UM  # of an eccentricity
@@ -32,7 +34,7 @@ def rolls(system, n_pitches=84, per_pitch=40):
 
 def transmission_error(system, specimen, faults=()):
     """Approach under the set torque over a turn of the wheel, (phase,) m: how far the wheel lags."""
-    machine = Run(system=system, faults=faults, specimen=specimen).dynamics()
+    machine = pair_dynamics(Run(system=system, faults=faults, specimen=specimen))
     return static_mesh(machine.table, machine._states(rolls(system)), system.mesh_force).approach
 
 
@@ -128,7 +130,7 @@ class TestProfile:
         """They carry the specimen's form, under which the second pair touches later: softer than perfect gears."""
         specimen = replace(perfect_specimen(xiamen.pair.pinion, xiamen.pair.wheel), forms=self.FORMS)
         sound, cracked, perfect = (
-            Run(system=xiamen, faults=faults, specimen=some).dynamics().mean_mesh_stiffness
+            pair_dynamics(Run(system=xiamen, faults=faults, specimen=some)).mean_mesh_stiffness
             for some, faults in ((specimen, ()), (specimen, (one("crack"),)), (None, ()))
         )
         assert_allclose(cracked, sound, rtol=1e-12, atol=0)
@@ -138,7 +140,7 @@ class TestProfile:
 def test_drawn_backlash_asks_for_no_further_tables(xiamen):
     perfect = perfect_specimen(xiamen.pair.pinion, xiamen.pair.wheel)
     nominal, wider = (
-        Run(system=xiamen, faults=(), specimen=replace(perfect, backlash_factor=factor)).dynamics()
+        pair_dynamics(Run(system=xiamen, faults=(), specimen=replace(perfect, backlash_factor=factor)))
         for factor in (1.0, 1.2)
     )
     assert wider.table.pinion is nominal.table.pinion
@@ -152,7 +154,7 @@ def test_misalignment_softens_the_mesh(machine, misalignment):
     form = one("misalignment", gear="pinion", tooth="all", misalignment_um=misalignment, limit_um=100)
     perfect = perfect_specimen(system.pair.pinion, system.pair.wheel)
     stiffness = [
-        Run(system=system, faults=(), specimen=replace(perfect, forms=forms)).dynamics().mean_mesh_stiffness
+        pair_dynamics(Run(system=system, faults=(), specimen=replace(perfect, forms=forms))).mean_mesh_stiffness
         for forms in ((), (form,))
     ]
     assert stiffness[1] < 0.98 * stiffness[0]

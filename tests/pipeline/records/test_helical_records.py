@@ -13,8 +13,10 @@ from gensig.errors import ConfigError, GeometryError
 from gensig.plan.make import make_plan
 from gensig.plan.request import read_request
 from gensig.record.simulate import simulate_record, simulate_records
-from gensig.systems.pair_machine import Run, simulate_together
+from gensig.systems.base import simulate_together
+from gensig.systems.pair_machine import pair_dynamics
 from gensig.systems.registry import read_system
+from gensig.systems.run import Run
 
 SMALL = (
     "experiment=helical", "plan.n_records=10", "plan.n_units=2", "plan.n_gearboxes=2", "operating.duration_s=0.05",
@@ -79,7 +81,7 @@ def test_without_a_helix_it_moves_like_the_spur_pair() -> None:
 
 def test_an_axial_force_pushes_gears_apart_along_their_shafts() -> None:
     words = ["system=helical_pair", "operating.duration_s=0.02", "sensing.channels=[pinion_z,wheel_z]"]
-    dynamics = Run(system=read_system(read_request(words).config), faults=()).dynamics()
+    dynamics = pair_dynamics(Run(system=read_system(read_request(words).config), faults=()))
     rest = dict(zip(dynamics.dofs, dynamics.rest(), strict=True))
     thrust = dynamics.mesh_force * np.tan(dynamics.table.pair.base_helix_angle)
     assert rest["pinion_z"] == pytest.approx(-thrust / dynamics.pinion.support.stiffness_z, rel=1e-9)

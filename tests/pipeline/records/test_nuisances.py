@@ -13,7 +13,7 @@ from gensig.record.inputs import InputReader
 from gensig.record.machines import read_machine
 from gensig.record.simulate import forget_twins, simulate_record, simulate_records
 from gensig.systems.nuisances import with_nuisances
-from gensig.systems.pair_machine import CleanRecord
+from gensig.systems.run import CleanRecord
 
 BASE = ("plan.n_records=4", "plan.n_units=1", "plan.classes=[healthy,missing_tooth]", "operating.duration_s=0.1",
         "dataset.store_source=true", "dataset.store_clean=true", "dataset.store_shaft_angle=true",

@@ -12,7 +12,9 @@ from gensig.dynamics._vector import LANES
 from gensig.dynamics.integrator import integrate
 from gensig.dynamics.pair import PINION_ROTATION, PINION_Y
 from gensig.faults.broken import MissingTooth
-from gensig.systems.pair_machine import Run, simulate_together
+from gensig.systems.base import simulate_together
+from gensig.systems.pair_machine import pair_dynamics
+from gensig.systems.run import Run
 
 RATE, DRIVE = 51200.0, 20.0
 QUICK = {"operating.duration_s": 0.03, "solver.max_error": None, "operating.drive_frequency_hz": DRIVE,
@@ -95,9 +97,9 @@ class TestRamp:
         assert np.isfinite(found.acceleration).all()
         n = len(found.shaft_angle)
         lag = (still.shaft_angle - SET_SPEED * np.arange(n) / RATE) - (found.shaft_angle - turned(ramp, n))
-        twist = self.ACCELERATION * ramp.dynamics().reduced_inertia / ramp.dynamics().drive_stiffness
+        twist = self.ACCELERATION * pair_dynamics(ramp).reduced_inertia / pair_dynamics(ramp).drive_stiffness
         if rotors:  # the motor is what the drive holds; its coupling turns the pinion further back
-            driven = ramp.dynamics().reduced_inertia - ramp.system.motor.inertia
+            driven = pair_dynamics(ramp).reduced_inertia - ramp.system.motor.inertia
             twist += self.ACCELERATION * driven / ramp.system.motor.coupling_stiffness
         else:
             assert_allclose(twist, self.ACCELERATION / (2 * math.pi * DRIVE) ** 2, rtol=1e-12, atol=0)
@@ -143,13 +145,13 @@ class TestTorque:
     @pytest.mark.parametrize("factor", [0.3, 1.0, 1.8])
     def test_the_teeth_carry_their_share(self, run, factor):
         """Before and after the torque has changed."""
-        dynamics = run({TORQUE: [[-1, 1], [0.01, 1], [0.02, factor]]}).dynamics()
+        dynamics = pair_dynamics(run({TORQUE: [[-1, 1], [0.01, 1], [0.02, factor]]}))
         shares = self.carried(dynamics, 0.01 - 4 / dynamics.mesh_frequency, 0.03)
         assert_allclose(shares, [1.0, factor], rtol=2e-2, atol=0)
 
     @pytest.mark.parametrize("rotors", [{}, ROTORS], ids=["pair", "motor_and_load"])
     def test_and_begin_with_it(self, run, rotors):
-        dynamics = run({**rotors, TORQUE: [[0, 0.3], [1, 0.3]]}).dynamics()
+        dynamics = pair_dynamics(run({**rotors, TORQUE: [[0, 0.3], [1, 0.3]]}))
         assert_allclose(self.carried(dynamics, 0.0, 0.02), [0.3, 0.3], rtol=2e-2, atol=0)
 
     def test_without_torque_nothing_touches(self, record):
@@ -185,9 +187,9 @@ def test_rotors_move_and_stay_finite(run):
     """Eight degrees of freedom, on a ramp of speed and torque; every channel lives."""
     channels = ("pinion_y", "pinion_rotation", "wheel_rotation", "motor_rotation", "load_rotation")
     one = run({**ROTORS, SPEED: RAMP, TORQUE: RAMP, "sensing.channels": list(channels)}, MISSING)
-    motions = integrate([one.dynamics()], one.system.solver, sampling_rate=RATE, duration=0.03, channels=channels)
+    motions = integrate([pair_dynamics(one)], one.system.solver, sampling_rate=RATE, duration=0.03, channels=channels)
     assert motions.finite.all()
     assert np.isfinite(motions.acceleration).all()
     assert (motions.acceleration.std(axis=-1) > 1.0).all()
     assert motions.acceleration.shape == (LANES, 5, 1536)
-    assert one.dynamics().dofs.index("pinion_rotation") == PINION_ROTATION
+    assert pair_dynamics(one).dofs.index("pinion_rotation") == PINION_ROTATION

@@ -14,7 +14,8 @@ from gensig.dynamics.decimation import in_band_error
 from gensig.errors import SimulationError
 from gensig.faults.broken import MissingTooth
 from gensig.sensing.manufacturing import Specimen
-from gensig.systems.pair_machine import Run, Start, simulate_together
+from gensig.systems.base import simulate_together
+from gensig.systems.run import Run, Start
 
 LANES = n_lanes("float32")
 RATE = 51200.0

@@ -12,7 +12,8 @@ from gensig.dynamics.lanes import pack
 from gensig.errors import SimulationError
 from gensig.faults.broken import MissingTooth
 from gensig.sensing.manufacturing import Gearbox, Specimen
-from gensig.systems.pair_machine import CleanRecord, Run, Start, simulate_together
+from gensig.systems.base import simulate_together
+from gensig.systems.run import CleanRecord, Run, Start
 
 LAWS = {
     "one_sided": {},

@@ -21,7 +21,7 @@ from gensig.dynamics.integrator import (
 from gensig.dynamics.pair import Support, solid_disc
 from gensig.errors import ConfigError, SimulationError
 from gensig.faults.broken import MissingTooth
-from gensig.systems.pair_machine import Start
+from gensig.systems.run import Start
 
 
 def run(system, dynamics, **changes):

@@ -18,8 +18,9 @@ from gensig.record.inputs import InputReader
 from gensig.record.simulate import simulate_record
 from gensig.record.streams import Stream, stream
 from gensig.sensing.manufacturing import draw_gearbox, nominal_gearbox, with_damping_ratio
-from gensig.systems.pair_machine import Run
+from gensig.systems.pair_machine import pair_dynamics
 from gensig.systems.registry import read_system
+from gensig.systems.run import Run
 from gensig.systems.supports import read_holding
 
 BEARINGS = {
@@ -97,15 +98,15 @@ class TestStiffness:
 
 class TestDamping:
     def test_nominal_is_the_middle_of_the_range(self, machine):
-        dynamics = Run(system=machine(BEARINGS), faults=()).dynamics()
+        dynamics = pair_dynamics(Run(system=machine(BEARINGS), faults=()))
         assert_allclose(ratios(dynamics), math.sqrt(0.01 * 0.1), rtol=1e-12, atol=0)
 
     def test_a_gearbox_has_the_ratios_that_it_drew(self, machine):
         system = machine(BEARINGS)
         box = draw_gearbox(stream(0, Stream.GEARBOX), 4, system.quality, 0.0)
         box = with_damping_ratio(box, stream(0, Stream.SUPPORT), system.quality)
-        dynamics = Run(system=system, faults=(), gearbox=box).dynamics()
-        nominal, _ = supports(Run(system=system, faults=(), gearbox=nominal_gearbox(4)).dynamics())
+        dynamics = pair_dynamics(Run(system=system, faults=(), gearbox=box))
+        nominal, _ = supports(pair_dynamics(Run(system=system, faults=(), gearbox=nominal_gearbox(4))))
         assert_allclose(supports(dynamics)[0], nominal * box.stiffness_factor, rtol=1e-12, atol=0)
         assert_allclose(ratios(dynamics), box.damping_ratio, rtol=1e-12, atol=0)
         assert len(set(box.damping_ratio)) == 4
@@ -124,8 +125,8 @@ class TestDamping:
 
     def test_given_supports_take_a_ratio_too(self, machine):
         ratio = {key: value for key, value in BEARINGS.items() if key != "system.supports"}
-        dynamics = Run(system=machine(ratio), faults=()).dynamics()
-        plain, _ = supports(Run(system=machine(), faults=()).dynamics())
+        dynamics = pair_dynamics(Run(system=machine(ratio), faults=()))
+        plain, _ = supports(pair_dynamics(Run(system=machine(), faults=())))
         assert_allclose(supports(dynamics)[0], plain, rtol=1e-12, atol=0)
         assert_allclose(ratios(dynamics), math.sqrt(1e-3), rtol=1e-12, atol=0)
 
@@ -139,7 +140,7 @@ def test_as_given_supports_are_those_of_the_option(machine, config_with):
     assert drawn is box
     given = config_with()["gear"]
     for system in (plain, without):
-        stiffness, damping = supports(Run(system=system, faults=(), gearbox=drawn).dynamics())
+        stiffness, damping = supports(pair_dynamics(Run(system=system, faults=(), gearbox=drawn)))
         for found, kind, factor in (
             (stiffness, "stiffness_{}_n_per_m", box.stiffness_factor),
             (damping, "damping_{}_ns_per_m", box.damping_factor),
@@ -164,7 +165,7 @@ class TestRecords:
     def test_faults_leave_the_supports_alone(self, realistic, rows):
         by_condition = {}
         for row in rows:
-            found = np.concatenate(supports(run_of(realistic, row).dynamics()))
+            found = np.concatenate(supports(pair_dynamics(run_of(realistic, row))))
             by_condition.setdefault(row["condition_id"], []).append(found)
         assert len(by_condition) == 4
         for found in by_condition.values():
@@ -185,7 +186,7 @@ class TestRecords:
         for row in rows:
             run = run_of(realistic, row)
             drive = 2 * math.pi * run.system.operating.drive_frequency * run.system.operating.drive_damping_ratio
-            assert_allclose(settling_time(run.dynamics()), math.log(1e4) / drive, rtol=1e-3, atol=0)
+            assert_allclose(settling_time(pair_dynamics(run)), math.log(1e4) / drive, rtol=1e-3, atol=0)
 
 
 class TestBadInput:

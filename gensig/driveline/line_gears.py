@@ -1,0 +1,69 @@
+"""Gears, bodies and meshes of a drive line by name, for the machine that records are made of.
+
+The two gears of the mesh that records follow are named by their side of it. All others have their names of the tables.
+"""
+
+from __future__ import annotations
+
+from dataclasses import replace
+
+from gensig.driveline.drive_line import DriveLine
+from gensig.driveline.running import named_by_side
+from gensig.dynamics.pair import Body, Support
+from gensig.geometry.contact import SIDES
+from gensig.geometry.gear import Gear
+from gensig.systems.base import MachineMesh
+
+STILL = Support(stiffness_x=0.0, stiffness_y=0.0, damping_x=0.0, damping_y=0.0)
+
+
+def gear_names(drive: DriveLine, followed: int) -> tuple[str, ...]:
+    """Name of every gear of a line, (gear,), each once; ``followed`` is the place of the followed mesh."""
+    mesh = drive.line.meshes[followed]
+    sides = dict(zip((mesh.driving, mesh.driven), SIDES, strict=True))
+    names: list[str] = []
+    for number, gear in enumerate(drive.line.gears):
+        name = sides.get(number, gear.name)
+        if number not in sides and name in (*SIDES, *names):
+            name = f"{name} (gear {number + 1})"
+        names.append(name)
+    return tuple(names)
+
+
+def line_gears(drive: DriveLine, followed: int) -> dict[str, Gear]:
+    """Geometry of every gear by its name; pinion and wheel of the followed mesh first."""
+    names = gear_names(drive, followed)
+    gears = named_by_side(drive.pairs[followed]).gears
+    for mesh, pair in zip(drive.line.meshes, drive.pairs, strict=True):
+        for number, gear in ((mesh.driving, pair.pinion), (mesh.driven, pair.wheel)):
+            gears.setdefault(names[number], replace(gear, name=names[number]))
+    return gears
+
+
+def line_bodies(drive: DriveLine, followed: int) -> dict[str, Body]:
+    """Mass and support of every gear, and the inertia of its node, by its name; in the order of the table."""
+    names, nodes = gear_names(drive, followed), drive.line.nodes
+    return {
+        name: Body(
+            mass=gear.mass or 0.0,
+            inertia=nodes[gear.node].inertia,
+            support=gear.support or STILL,
+        )
+        for name, gear in zip(names, drive.line.gears, strict=True)
+    }
+
+
+def line_meshes(drive: DriveLine, followed: int) -> tuple[MachineMesh, ...]:
+    """All meshes of a line, in the order of the table."""
+    names = gear_names(drive, followed)
+    pairs = list(drive.pairs)
+    pairs[followed] = named_by_side(pairs[followed])
+    return tuple(
+        MachineMesh(
+            driving=names[mesh.driving],
+            driven=names[mesh.driven],
+            pair=pair,
+            followed=place == followed,
+        )
+        for place, (mesh, pair) in enumerate(zip(drive.line.meshes, pairs, strict=True))
+    )

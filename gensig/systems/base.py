@@ -1,0 +1,190 @@
+"""The machine: gears by name, bodies, meshes, set-point and sensors, and what records, plans and lives need of it."""
+
+from __future__ import annotations
+
+from abc import ABC, abstractmethod
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass, replace
+from typing import Any, Self
+
+import numpy as np
+from numpy.typing import NDArray
+
+from gensig.dynamics.integrator import Solver
+from gensig.dynamics.pair import Body
+from gensig.errors import SimulationError
+from gensig.faults.base import Fault
+from gensig.geometry.contact import GearPair
+from gensig.geometry.gear import Gear
+from gensig.material import Material
+from gensig.mesh.options import MeshOptions
+from gensig.mesh.pair_table import PairTable
+from gensig.mesh.sliced.sliced_table import SlicedTable
+from gensig.operation.setpoint import Operating
+from gensig.sensing.chain import Sensing
+from gensig.sensing.encoder import Disc
+from gensig.sensing.manufacturing import Gearbox, Quality, Specimen
+from gensig.systems.run import CleanRecord, Run, Start
+from gensig.systems.stiffness_curves import StiffnessCurves
+
+Array = NDArray[np.float64]
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class MachineMesh:
+    """A mesh of a machine: the names of its driving and its driven gear, and their geometry.
+
+    ``followed`` says that records follow its teeth one by one, with their faults and errors.
+    """
+
+    driving: str
+    driven: str
+    pair: GearPair
+    followed: bool
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class Machine(ABC):
+    """A machine with gears: material, set-point, sensors, quality and solver; each kind says how it moves.
+
+    The kinds are final: none overrides a method that another one defines.
+    """
+
+    material: Material
+    mesh: MeshOptions
+    operating: Operating
+    sensing: Sensing
+    quality: Quality
+    solver: Solver
+
+    @property
+    @abstractmethod
+    def pair(self) -> GearPair:
+        """Geometry of the mesh that records follow."""
+
+    @property
+    @abstractmethod
+    def gears(self) -> Mapping[str, Gear]:
+        """All gears by name, those that records follow first."""
+
+    @property
+    @abstractmethod
+    def bodies(self) -> Mapping[str, Body]:
+        """Mass, inertia and support of every gear, by its name."""
+
+    @property
+    @abstractmethod
+    def meshes(self) -> tuple[MachineMesh, ...]:
+        """All meshes."""
+
+    @property
+    @abstractmethod
+    def channels(self) -> tuple[str, ...]:
+        """Names of all channels that can be recorded."""
+
+    @property
+    @abstractmethod
+    def most_pairs(self) -> int:
+        """Number of tooth pairs whose loads can be recorded at once; 0 where the loads of teeth are not known."""
+
+    @property
+    @abstractmethod
+    def ratio(self) -> float:
+        """Speed of the pinion's shaft over that of the shaft whose speed the configuration gives."""
+
+    @property
+    @abstractmethod
+    def torque_of(self) -> str:
+        """The torque that ``operating`` sets, in words; empty where it is the driving shaft's own."""
+
+    @property
+    @abstractmethod
+    def load_exponent(self) -> int:
+        """Power of the speed that the set torque follows along a course, beyond its own profile."""
+
+    @property
+    @abstractmethod
+    def mesh_force(self) -> float:
+        """Normal force of the followed mesh at the set-point, N."""
+
+    @abstractmethod
+    def mesh_torques(self, speed: float, torque: float) -> Array:
+        """Loads of a tooth at a set-point, one for each time it meshes, all equally likely.
+
+        Parameters
+        ----------
+        speed : rad/s    of the pinion
+        torque : N m     of the set-point
+
+        Returns
+        -------
+        (mesh,) N m      torques of the pinion
+        """
+
+    @abstractmethod
+    def mesh_table(self, faults: Sequence[Fault] = ()) -> PairTable | SlicedTable:
+        """Tables of the followed mesh with the given faults."""
+
+    @abstractmethod
+    def stiffness_curves(
+        self, faults: Sequence[Fault] = (), *, n_positions: int = 201, points_per_tooth: int = 100
+    ) -> StiffnessCurves:
+        """Single-pair and mesh stiffness of spur teeth with their parts; ConfigError for teeth in slices."""
+
+    @abstractmethod
+    def driven_tooth(self, tooth_pinion: int, drawn: int) -> int:
+        """Tooth of the driven gear that meets a tooth of the driving gear at the start; ``drawn`` where any may."""
+
+    @abstractmethod
+    def draw_discs(self, rng: np.random.Generator) -> tuple[Disc, ...]:
+        """Toothed wheels of one gearbox with their errors, drawn at random."""
+
+    @abstractmethod
+    def check(self) -> None:
+        """Raise for what would stop every record: interrupted drive, channels, options and steps that do not fit."""
+
+    @classmethod
+    @abstractmethod
+    def simulate_runs(cls, runs: Sequence[Run[Self]]) -> list[CleanRecord | SimulationError]:
+        """Simulate runs of machines of this kind, in the order given; ``simulate_together`` takes any kinds."""
+
+    def simulate(
+        self,
+        faults: Sequence[Fault] = (),
+        *,
+        start: Start | None = None,
+        specimen: Specimen | None = None,
+        gearbox: Gearbox | None = None,
+    ) -> CleanRecord:
+        """Simulate one record; what is not given is perfect, nominal, and starts with teeth 0 at A."""
+        run = Run(system=self, faults=tuple(faults), start=start, specimen=specimen, gearbox=gearbox)
+        (record,) = self.simulate_runs([run])
+        if isinstance(record, SimulationError):
+            raise record
+        return record
+
+
+def specimen_table(machine: Machine, faults: Sequence[Fault], specimen: Specimen) -> PairTable | SlicedTable:
+    """Mesh table of a specimen's gears with the faults on them, at its own backlash.
+
+    Sound tables are shared: the backlash is put in afterwards.
+    """
+    table = machine.mesh_table((*specimen.forms, *faults))
+    backlash = machine.pair.backlash * specimen.backlash_factor
+    return replace(table, pair=replace(machine.pair, backlash=backlash))
+
+
+def simulate_together(runs: Sequence[Run[Any]]) -> list[CleanRecord | SimulationError]:
+    """Simulate runs of any machines, those of one kind together; in the order given.
+
+    A record's bits do not depend on the other runs. A motion that does not stay finite gives its error instead of a
+    record.
+    """
+    by_kind: dict[type[Machine], list[int]] = {}
+    for number, run in enumerate(runs):
+        by_kind.setdefault(type(run.system), []).append(number)
+    results: dict[int, CleanRecord | SimulationError] = {}
+    for kind, numbers in by_kind.items():
+        records = kind.simulate_runs([runs[number] for number in numbers])
+        results.update(zip(numbers, records, strict=True))
+    return [results[number] for number in range(len(runs))]
