@@ -1,6 +1,7 @@
 """Gears, bodies and meshes of a drive line by name, for the machine that records are made of.
 
-The two gears of the mesh that records follow are named by their side of it. All others have their names of the tables.
+The two gears of the mesh that records follow are named by their side of it. All others have their
+names of the tables.
 """
 
 from __future__ import annotations
@@ -18,7 +19,7 @@ STILL = Support(stiffness_x=0.0, stiffness_y=0.0, damping_x=0.0, damping_y=0.0)
 
 
 def gear_names(drive: DriveLine, followed: int) -> tuple[str, ...]:
-    """Name of every gear of a line, (gear,), each once; ``followed`` is the place of the followed mesh."""
+    """Name of every gear of a line, (gear,), each once; ``followed`` is the number of the mesh."""
     mesh = drive.line.meshes[followed]
     sides = dict(zip((mesh.driving, mesh.driven), SIDES, strict=True))
     names: list[str] = []
@@ -41,7 +42,7 @@ def line_gears(drive: DriveLine, followed: int) -> dict[str, Gear]:
 
 
 def line_bodies(drive: DriveLine, followed: int) -> dict[str, Body]:
-    """Mass and support of every gear, and the inertia of its node, by its name; in the order of the table."""
+    """Mass and support of every gear, and the inertia of its node, by its name, as in the table."""
     names, nodes = gear_names(drive, followed), drive.line.nodes
     return {
         name: Body(

@@ -1,6 +1,7 @@
-"""Records of an engine's drive line: one mesh of it by its own teeth, with the faults and units of every data set.
+"""The machine of an engine or a motor on its drive line, one mesh of which records follow tooth by tooth.
 
-Its ``pair`` is the driving and the driven gear of that mesh, ``operating`` the motion of the driving shaft.
+Its ``pair`` is the driving and the driven gear of that mesh. ``operating`` is the motion of the
+driving gear's shaft.
 ``docs/theory/shaft_line_records.md``.
 """
 
@@ -67,18 +68,19 @@ from gensig.units import SPEED, read
 
 Array = NDArray[np.float64]
 
-SETTLING = 0.3  # s before a record, in which what the start from the linear vibration leaves dies away
+SETTLING = 0.3  # s before a record, until the start from the linear vibration has died away
 MOST_ENERGY_RESIDUAL = 1e-3
 KNOT = 5e-3  # s between the knots of a course that changes
-AFTER = 0.2  # s for which a course is told after a record: the low-pass looks ahead
-FAR_ABOVE = 3.0  # of the force of the supports; the stiffness of a ball bearing follows its third root
+AFTER = 0.2  # s that a course goes on after a record: the low-pass looks ahead
+# times the force of the supports; the stiffness of a ball bearing follows its third root
+FAR_ABOVE = 3.0
 AXES = ("x", "y")
 
 
 @final
 @dataclass(frozen=True, slots=True, kw_only=True)
 class LineMachine(Machine):
-    """An engine on its drive line; ``place`` is the mesh of the line whose teeth are followed one by one."""
+    """An engine or a motor on its drive line; ``place`` is the number of the followed mesh."""
 
     engine: EngineLine
     place: int
@@ -91,7 +93,7 @@ class LineMachine(Machine):
 
     @property
     def gears(self) -> dict[str, Gear]:
-        """All gears of the line: pinion and wheel of the followed mesh, the others by their names of the tables."""
+        """All gears of the line: pinion and wheel of the followed mesh, the others as in the tables."""
         return line_gears(self.engine.drive, self.place)
 
     @property
@@ -136,9 +138,16 @@ class LineMachine(Machine):
 
     @property
     def channels(self) -> tuple[str, ...]:
-        """Rotation and, with lateral motion, bearing of both gears of the followed mesh, and the toothed wheels."""
-        lateral = [f"{side}_{axis}" for side in SIDES for axis in AXES] if self.engine.drive.lateral else []
-        return (*(f"{side}_rotation" for side in SIDES), *lateral, *(f"{name}{SPEED}" for name in self.engine.wheels))
+        """Rotation of both gears of the followed mesh, their bearings', and the toothed wheels' speeds.
+
+        Bearings move only with lateral motion.
+        """
+        rotations = [f"{side}_rotation" for side in SIDES]
+        bearings = [f"{side}_{axis}" for side in SIDES for axis in AXES]
+        speeds = [f"{name}{SPEED}" for name in self.engine.wheels]
+        if not self.engine.drive.lateral:
+            return (*rotations, *speeds)
+        return (*rotations, *bearings, *speeds)
 
     @property
     def most_pairs(self) -> int:
@@ -147,8 +156,10 @@ class LineMachine(Machine):
 
     @property
     def torque_of(self) -> str:
-        """The load or the brake: torques are told at the shaft that turns the line, whichever mesh is followed."""
-        return "brake, at the crank" if isinstance(self.engine.engine, Engine) else "load, as the motor feels it"
+        """The brake or the load, at the shaft that turns the line, whichever mesh is followed."""
+        if isinstance(self.engine.engine, Engine):
+            return "brake, at the crank"
+        return "load, as the motor feels it"
 
     @property
     def load_exponent(self) -> int:
@@ -167,7 +178,7 @@ class LineMachine(Machine):
 
     @property
     def law(self) -> ToothLaw:
-        """What all teeth have in common."""
+        """Material, conventions and slices of all teeth."""
         return ToothLaw(material=self.material, options=self.mesh, slices=self.slices)
 
     def mesh_table(self, faults: Sequence[Fault] = ()) -> PairTable | SlicedTable:
@@ -177,7 +188,7 @@ class LineMachine(Machine):
     def stiffness_curves(
         self, faults: Sequence[Fault] = (), *, n_positions: int = 201, points_per_tooth: int = 100
     ) -> StiffnessCurves:
-        """Those of the mesh that records follow, under its mean force; ConfigError where its gears are helical."""
+        """Curves of the followed mesh under its mean force; ConfigError where its gears are helical."""
         table = self.mesh_table(faults)
         if not isinstance(table, PairTable):
             raise ConfigError(
@@ -186,7 +197,14 @@ class LineMachine(Machine):
                 "system=helical_pair"
             )
         whole = sound_teeth(self.pair, PLAIN)
-        return stiffness_curves(self, table, faults, whole, n_positions=n_positions, points_per_tooth=points_per_tooth)
+        return stiffness_curves(
+            self,
+            table,
+            faults,
+            whole,
+            n_positions=n_positions,
+            points_per_tooth=points_per_tooth,
+        )
 
     def require_drive(self) -> None:
         """Raise unless at least one pair is always in contact, by the overlap of the face too."""
@@ -216,16 +234,17 @@ class LineMachine(Machine):
         self.mesh_table()
 
     def _warn_of_supports(self) -> None:
-        """Warn where gears bear far more than the one support that all of them are on is taken for."""
+        """Warn of mesh forces far above the force for which the support of all gears is taken."""
         drive, rated = self.engine.drive, self.engine.drive.support_force
         if rated is None:
             return
         force = np.abs(self.mesh_forces)
         heavy = [place for place in range(len(force)) if force[place] > FAR_ABOVE * rated]
         if heavy:
-            told = ", ".join(f"{self.engine.mesh_names[place]} {force[place]:.0f} N" for place in heavy)
+            names = self.engine.mesh_names
+            listed = ", ".join(f"{names[place]} {force[place]:.0f} N" for place in heavy)
             warnings.warn(
-                f"{drive.name}: mean tooth forces of meshes {told}, but every gear is on a support for "
+                f"{drive.name}: mean tooth forces of meshes {listed}, but every gear is on a support for "
                 f"system.support.force_n = {rated:g} N, less stiff than bearings so loaded; set it, and bearing and "
                 "shaft, to those of the gears of system.record_mesh",
                 UserWarning,
@@ -233,13 +252,16 @@ class LineMachine(Machine):
             )
 
     def driven_tooth(self, tooth_pinion: int, drawn: int) -> int:
-        """Tooth of the driven gear at the start: in a drive that turns once a cycle the marks of its timing say it.
+        """Tooth of the driven gear at the start.
 
-        Where the gears do not come back to each other after every cycle, the drawn one.
+        In a drive that turns once a cycle of the engine, the marks of its timing decide. Where the
+        gears do not come back to each other after every cycle, it is the drawn one.
         """
         pinion, wheel = self.pair.pinion.n_teeth, self.pair.wheel.n_teeth
-        is_timed = isinstance(self.engine.engine, Engine) and round(2.0 * self.ratio) == 1 and pinion % wheel == 0
-        return tooth_pinion % wheel if is_timed else drawn
+        once_a_cycle = isinstance(self.engine.engine, Engine) and round(2.0 * self.ratio) == 1
+        if once_a_cycle and pinion % wheel == 0:
+            return tooth_pinion % wheel
+        return drawn
 
     def draw_discs(self, rng: np.random.Generator) -> tuple[Disc, ...]:
         """The toothed wheels of one gearbox with their errors."""
@@ -360,11 +382,12 @@ class LineMachine(Machine):
         )
 
     def crank_angle(self, start: Start) -> float:
-        """Where the crank stands in its cycle when given teeth of the mesh are at a phase, rad.
+        """Angle of the crank in its cycle when given teeth of the mesh are at a phase, rad.
 
-        The driving gear's teeth are tied to the crank: the same tooth meets the same cylinder's firing in every record.
-        Where its shaft turns more than once a cycle, the driven gear's tooth chooses the turn. A motor has no cycle:
-        its turns go on being counted, so that the other meshes stand as the teeth allow.
+        The driving gear's teeth are tied to the crank: the same tooth meets the same cylinder's
+        firing in every record. Where its shaft turns more than once a cycle, the driven gear's tooth
+        chooses the turn. A motor has no cycle: its turns are counted on, so that the other meshes
+        stand as the teeth allow.
         """
         pitches = start.tooth_pinion + start.phase - start_phase(self.engine.drive, self.place)
         if not isinstance(self.engine.engine, Engine):
@@ -382,7 +405,7 @@ class LineMachine(Machine):
         return EngineCourse(time=time, speed=nominal.speed / self.ratio, torque=load * nominal.torque_factor)
 
     def _channel(self, line: RunningLine, name: str) -> tuple[str, int]:
-        """What the integration gives for a channel: a kind and a degree of freedom."""
+        """Signal of the integration for a channel: a kind and a degree of freedom."""
         if name.endswith(SPEED):
             return "angle", line.dof(self._wheel(name)[1].node)
         side, _, what = name.rpartition("_")
@@ -415,7 +438,7 @@ def read_line_machine(config: Configuration) -> LineMachine:
 
     Raises
     ------
-    ConfigError    for keys or tables that make no engine, and for a mesh that records cannot be made of
+    ConfigError    for keys or tables that make no engine, and for a mesh that has no records
     """
     engine = read_engine_line(config)
     place = _record_mesh(engine)

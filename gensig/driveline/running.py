@@ -188,7 +188,7 @@ def mesh_forces(machine: EngineLine, speed: float, torque: float) -> Array:
 
 
 def named_by_side(pair: GearPair) -> GearPair:
-    """The pair with its gears named as faults and tables name them; in a line they have names of their own."""
+    """The pair with its gears named by their sides, as faults and mesh tables name them."""
     pinion, wheel = (replace(gear, name=side) for side, gear in pair.gears.items())
     return replace(pair, pinion=pinion, wheel=wheel)
 

@@ -134,7 +134,7 @@ def _greatest(
 
 def _softening(mesh: SlicedMesh, gear: str, position: Array) -> Array:
     """What the crack makes its pair softer, (phase, slice) m2/N."""
-    softening = {"pinion": mesh.pinion, "wheel": mesh.wheel}[gear].softening[-1]
+    softening = mesh.sides[gear].softening[-1]
     return np.stack([np.interp(at, mesh.position, one) for at, one in zip(position.T, softening, strict=True)], axis=1)
 
 

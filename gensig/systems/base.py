@@ -1,4 +1,7 @@
-"""The machine: gears by name, bodies, meshes, set-point and sensors, and what records, plans and lives need of it."""
+"""The machine: gears by name, bodies, meshes, set-point and sensors.
+
+Records, plans, lives and commands need no more of any machine than is declared here.
+"""
 
 from __future__ import annotations
 
@@ -85,7 +88,7 @@ class Machine(ABC):
     @property
     @abstractmethod
     def most_pairs(self) -> int:
-        """Number of tooth pairs whose loads can be recorded at once; 0 where the loads of teeth are not known."""
+        """Number of tooth pairs whose loads can be recorded at once; 0 where they are not known."""
 
     @property
     @abstractmethod
@@ -129,11 +132,11 @@ class Machine(ABC):
     def stiffness_curves(
         self, faults: Sequence[Fault] = (), *, n_positions: int = 201, points_per_tooth: int = 100
     ) -> StiffnessCurves:
-        """Single-pair and mesh stiffness of spur teeth with their parts; ConfigError for teeth in slices."""
+        """Single-pair and mesh stiffness of spur teeth; ConfigError for teeth in slices."""
 
     @abstractmethod
     def driven_tooth(self, tooth_pinion: int, drawn: int) -> int:
-        """Tooth of the driven gear that meets a tooth of the driving gear at the start; ``drawn`` where any may."""
+        """Tooth of the driven gear that meets one of the pinion at the start; ``drawn`` if any may."""
 
     @abstractmethod
     def draw_discs(self, rng: np.random.Generator) -> tuple[Disc, ...]:
@@ -141,12 +144,15 @@ class Machine(ABC):
 
     @abstractmethod
     def check(self) -> None:
-        """Raise for what would stop every record: interrupted drive, channels, options and steps that do not fit."""
+        """Raise for what would stop every record: drive, channels, options and steps."""
 
     @classmethod
     @abstractmethod
     def simulate_runs(cls, runs: Sequence[Run[Self]]) -> list[CleanRecord | SimulationError]:
-        """Simulate runs of machines of this kind, in the order given; ``simulate_together`` takes any kinds."""
+        """Simulate runs of machines of this kind; ``simulate_together`` takes any kinds.
+
+        The results are in the order of the runs.
+        """
 
     def simulate(
         self,
@@ -164,7 +170,11 @@ class Machine(ABC):
         return record
 
 
-def specimen_table(machine: Machine, faults: Sequence[Fault], specimen: Specimen) -> PairTable | SlicedTable:
+def specimen_table(
+    machine: Machine,
+    faults: Sequence[Fault],
+    specimen: Specimen,
+) -> PairTable | SlicedTable:
     """Mesh table of a specimen's gears with the faults on them, at its own backlash.
 
     Sound tables are shared: the backlash is put in afterwards.
@@ -177,8 +187,8 @@ def specimen_table(machine: Machine, faults: Sequence[Fault], specimen: Specimen
 def simulate_together(runs: Sequence[Run[Any]]) -> list[CleanRecord | SimulationError]:
     """Simulate runs of any machines, those of one kind together; in the order given.
 
-    A record's bits do not depend on the other runs. A motion that does not stay finite gives its error instead of a
-    record.
+    A record's bits do not depend on the other runs. A motion that does not stay finite gives its
+    error instead of a record.
     """
     by_kind: dict[type[Machine], list[int]] = {}
     for number, run in enumerate(runs):

@@ -80,7 +80,7 @@ class GearPairMachine(Machine):
 
     @property
     def channels(self) -> tuple[str, ...]:
-        """All degrees of freedom: those of the gears, and the rotations of motor and load if there are any."""
+        """Motions of the gears, and the rotations of motor and load if there are any."""
         rotors = {"motor_rotation": self.motor, "load_rotation": self.load}
         return (*self.gear_channels, *[name for name, rotor in rotors.items() if rotor is not None])
 
@@ -117,7 +117,7 @@ class GearPairMachine(Machine):
         return ()
 
     def check(self) -> None:
-        """Raise for what would stop every record: interrupted drive, fits out of range, channels, step length."""
+        """Raise for what would stop every record: drive, fits out of range, channels, step length."""
         self.require_drive()
         self.mesh_table()
         self.quality.check_covered(self.pair.pinion, self.pair.wheel)
@@ -130,7 +130,7 @@ class GearPairMachine(Machine):
 
     @classmethod
     def simulate_runs(cls, runs: Sequence[Run[Self]]) -> list[CleanRecord | SimulationError]:
-        """Simulate runs in groups of those that share rate, duration and law, side by side; in the order given."""
+        """Simulate runs, those that share rate, duration and law side by side."""
         return simulate_pairs(runs)
 
 
@@ -147,7 +147,7 @@ def severity(faults: Sequence[Fault], pair: GearPair) -> float:
 
 
 def pair_dynamics(run: PairRun) -> PairDynamics:
-    """Equations of motion of a run, its specimen and gearbox included; GeometryError for an interrupted drive."""
+    """Equations of motion of a run with its specimen and gearbox; GeometryError for no drive."""
     machine, pair = run.system, run.system.pair
     machine.require_drive()
     start = run.start or Start()

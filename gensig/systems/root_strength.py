@@ -13,7 +13,6 @@ from gensig.errors import ConfigError
 from gensig.geometry.contact import GearPair
 from gensig.life.root.root_stress import (
     RootFactors,
-    gears_of,
     pair_root_stress,
     root_factors,
     root_width,
@@ -184,7 +183,7 @@ class RootStrength:
             name: pair_root_stress(
                 self.pair, gear, states.position, load, allow_extrapolation=mesh.allow_extrapolation
             ).ravel()
-            for name, gear in gears_of(self.pair).items()
+            for name, gear in self.pair.gears.items()
         }
         return states.position.ravel(), load.ravel() / force, stress
 
@@ -198,7 +197,7 @@ class RootStrength:
         length = slices.coupling_modules * pair.pinion.normal_module
         coupling = (length / float(mesh.slice_width[0])) ** 2 if coupled else 0.0
         stress = {}
-        for name, gear in gears_of(pair).items():
+        for name, gear in pair.gears.items():
             factor = stress_factor_on_path(
                 pair, gear, contact.position, allow_extrapolation=self.flanks.mesh.allow_extrapolation
             )

@@ -28,7 +28,7 @@ CHECKS = ("error", "levels", "unresolved", "none", "energy")
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Start:
-    """Start of a record: the teeth that enter contact at roll 0, and the roll as a share of a base pitch."""
+    """Start of a record: the teeth that enter contact at roll 0, and the roll in base pitches."""
 
     tooth_pinion: int = 0
     tooth_wheel: int = 0
@@ -44,7 +44,8 @@ class Start:
 class Run(Generic[MachineT_co]):
     """One record to be simulated; what is None is perfect, nominal, and starts with teeth 0 at A.
 
-    ``tell_mesh`` asks for the loads of the teeth at every sample. ``discs`` are the toothed wheels of a drive line.
+    ``tell_mesh`` asks for the loads of the teeth at every sample. ``discs`` are the toothed wheels
+    of a drive line.
     """
 
     system: MachineT_co
@@ -58,10 +59,15 @@ class Run(Generic[MachineT_co]):
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class CleanRecord:
-    """Accelerations before noise, (channel, sample) m/s2 (rad/s2 for rotations), with what the simulation knows of it.
+    """A record before noise, with the accuracy of its simulation.
 
-    ``shaft_angle`` (sample,) rad of the pinion, from its nominal place at the first sample on, ``mean_speed`` rad/s,
-    ``integration_check`` one of ``CHECKS``, ``mesh`` the loads of the teeth where they were asked for.
+    Parameters
+    ----------
+    acceleration : (channel, sample) m/s2; rad/s2 for rotations
+    shaft_angle : (sample,) rad    of the pinion, from its nominal place at the first sample on
+    mean_speed : rad/s
+    integration_check : one of ``CHECKS``
+    mesh : loads of the teeth, where the run asks for them
     """
 
     acceleration: Array

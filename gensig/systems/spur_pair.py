@@ -25,7 +25,7 @@ from gensig.systems.stiffness_curves import StiffnessCurves, single_pair, stiffn
 @final
 @dataclass(frozen=True, slots=True, kw_only=True)
 class SpurPair(GearPairMachine):
-    """One machine under one set of conventions; ``modification`` is of all teeth, before errors and faults."""
+    """A spur gear pair; ``modification`` is that of all teeth, before errors and faults."""
 
     modification: PairModification = PLAIN
 
@@ -52,7 +52,14 @@ class SpurPair(GearPairMachine):
     ) -> StiffnessCurves:
         """Single-pair and mesh stiffness with their parts; contact ratios below 1 are allowed, nothing need turn."""
         table, whole = self.mesh_table(faults), sound_teeth(self.pair, self.modification)
-        return stiffness_curves(self, table, faults, whole, n_positions=n_positions, points_per_tooth=points_per_tooth)
+        return stiffness_curves(
+            self,
+            table,
+            faults,
+            whole,
+            n_positions=n_positions,
+            points_per_tooth=points_per_tooth,
+        )
 
     def long_relief(self) -> PairModification:
         """Linear tip reliefs that make up for the deflection under the set torque, of teeth as cut.

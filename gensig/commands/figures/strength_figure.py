@@ -12,7 +12,7 @@ import numpy as np
 from gensig.commands.figures.machine_figures import FAULTY, GREY, SOUND, THIRD, pyplot, save
 from gensig.geometry.gear import Gear
 from gensig.geometry.tooth_profile import tooth_profile
-from gensig.life.root.root_stress import gears_of, normal_contact_ratio
+from gensig.life.root.root_stress import normal_contact_ratio
 from gensig.life.root.tooth_root import TANGENT, root_loading, root_section, virtual_gear
 from gensig.systems.root_strength import GearStress, RootHistory, RootStrength
 
@@ -49,7 +49,7 @@ def _stress(axis: Any, system: RootStrength, gears: dict[str, GearStress], histo
 
 def _tooth(axis: Any, system: RootStrength, found: GearStress) -> None:
     """Outline in the normal section with the 30 degree tangents, mm from the centreline and above the root circle."""
-    real = gears_of(system.pair)[system.decisive]
+    real = system.pair.gears[system.decisive]
     virtual, section = virtual_gear(real), root_section(real)
     floor = virtual.tip_radius - (real.tip_radius - real.root_radius)
     outline = tooth_profile(_spur(real))

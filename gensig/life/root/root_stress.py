@@ -61,11 +61,6 @@ class RootFactors:
         return math.prod(factors) / (self.width * self.normal_module)
 
 
-def gears_of(pair: GearPair) -> dict[str, Gear]:
-    """The gears by name."""
-    return pair.gears
-
-
 def normal_contact_ratio(pair: GearPair) -> float:
     """Contact ratio of the virtual spur gears, eps_alpha_n = eps_alpha / cos^2(beta_b)."""
     return pair.transverse_contact_ratio / math.cos(pair.base_helix_angle) ** 2
@@ -106,7 +101,7 @@ def root_factors(
         raise ConfigError(f"strength.edition = {edition!r}; allowed: {', '.join(map(str, EDITIONS))}")
     ratio, at_tip = normal_contact_ratio(pair), load_point == "tip"
     found = {}
-    for name, gear in gears_of(pair).items():
+    for name, gear in pair.gears.items():
         normal_pitch = math.pi * gear.normal_module * math.cos(gear.pressure_angle)
         place = 0.0 if at_tip else normal_pitch * (ratio - 1.0)
         loading = root_loading(gear, place, allow_extrapolation=allow_extrapolation)

@@ -14,7 +14,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from gensig.errors import ConfigError, ExtrapolationError, GeometryError
-from gensig.geometry.contact import GearPair, corner_gap_by_pinion
+from gensig.geometry.contact import SIDES, GearPair, corner_gap_by_pinion
 from gensig.geometry.tooth import Tooth, healthy_tooth
 from gensig.material import Material
 from gensig.mesh.body_coupling import shared_body_compliance
@@ -63,6 +63,11 @@ class SlicedMesh:
     edges: Array
     pinion: GearSlices
     wheel: GearSlices
+
+    @property
+    def sides(self) -> dict[str, GearSlices]:
+        """The slices of each gear, by its side of the pair."""
+        return dict(zip(SIDES, (self.pinion, self.wheel), strict=True))
 
     @property
     def slice_width(self) -> Array:
