@@ -54,9 +54,11 @@ def settle_courses(config: Configuration, typed: Collection[str]) -> Configurati
         raise ConfigError(f"{DURATION_KEY} and operating.turns are both given; leave one out")
     system = read_machine(config.with_keys("operating", **dict.fromkeys((*QUANTITIES, *RIPPLES))))
     least = least_speed(config, system.operating.speed)
-    n_teeth = {"pinion": system.pair.pinion.n_teeth, "wheel": system.pair.wheel.n_teeth}
+    pair = system.pair
+    n_teeth = {side: gear.n_teeth for side, gear in pair.gears.items()}
     gears = _faulted(config) & set(n_teeth) if schedule.turns_of == "faulted" else {schedule.turns_of}
-    slowdown = max(n_teeth[gear] for gear in gears or {"pinion"}) / n_teeth["pinion"]
+    slowest = max((n_teeth[gear] for gear in gears), default=pair.pinion.n_teeth)
+    slowdown = slowest / pair.pinion.n_teeth
     seconds = schedule.turns * slowdown * 2.0 * math.pi / least
     rate = system.sensing.sampling_rate
     duration = math.ceil(seconds * rate * (1.0 - 1e-12)) / rate

@@ -102,8 +102,7 @@ def paris(
     first: float,
 ) -> UnitGrowth:
     """A root crack that begins at a share of the root chord."""
-    pair = gears.machine.pair
-    gear = {"pinion": pair.pinion, "wheel": pair.wheel}[fault.gear]
+    gear = gears.machine.pair.gears[fault.gear]
     law = crack_law(gears.machine, fault.seed(), options, gears.torques)
     return UnitGrowth(law=law, start=options.start_share * first * fault.root_chord(gear))
 
