@@ -1,10 +1,12 @@
-"""Distributions and designs that plans draw from: a point of the unit interval in, a value out, whatever the design."""
+"""Distributions and designs that plans draw from: a point of the unit interval in, a value out."""
 
 from __future__ import annotations
 
 import math
+from abc import ABC, abstractmethod
 from collections.abc import Mapping
-from typing import Any
+from dataclasses import dataclass
+from typing import Any, final
 
 import numpy as np
 from numpy.typing import NDArray
@@ -15,17 +17,195 @@ Array = NDArray[np.float64]
 
 GRID = "grid"
 DESIGNS = ("latin_hypercube", "sobol", GRID)
+LEVELS = "levels"  # any distribution may have it; only a grid reads it
+CHOICE = "choice"
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class Distribution(ABC):
+    """Distribution of one key of a plan or of a fault.
+
+    Attributes
+    ----------
+    key : dotted name of the key, for messages
+    levels : number of values in a grid; None draws them
+    names_levels : whether the file gives ``levels``, null included
+    """
+
+    key: str
+    levels: int | None
+    names_levels: bool
+
+    @property
+    @abstractmethod
+    def least(self) -> float:
+        """Smallest value."""
+
+    @property
+    @abstractmethod
+    def n_levels(self) -> int | None:
+        """Number of values that the key has in a grid; None for one that is drawn."""
+
+    @abstractmethod
+    def values_at(self, unit: Array) -> list[Any]:
+        """Values at points of the unit interval, (point,); plain Python numbers."""
+
+    @abstractmethod
+    def level_values(self) -> list[Any]:
+        """Values in a grid, in order.
+
+        Raises
+        ------
+        ConfigError    for a distribution without levels
+        """
+
+    def require_levels(self) -> int:
+        """The number of levels; ConfigError where there is none."""
+        if self.n_levels is None:
+            raise ConfigError(f"{self.key}: a grid needs its levels, for instance levels: 4, or distribution: {CHOICE}")
+        return self.n_levels
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class Range(Distribution):
+    """Distribution between two values, both included."""
+
+    low: float
+    high: float
+
+    @property
+    def least(self) -> float:
+        """The lower end."""
+        return self.low
+
+    @property
+    def n_levels(self) -> int | None:
+        """Levels as given."""
+        return self.levels
+
+
+@final
+@dataclass(frozen=True, slots=True, kw_only=True)
+class Uniform(Range):
+    """Equal probability; levels in equal steps."""
+
+    def values_at(self, unit: Array) -> list[Any]:
+        """See ``Distribution``."""
+        return [float(value) for value in self.low + (self.high - self.low) * unit]
+
+    def level_values(self) -> list[Any]:
+        """See ``Distribution``."""
+        return [float(value) for value in np.linspace(self.low, self.high, self.require_levels())]
+
+
+@final
+@dataclass(frozen=True, slots=True, kw_only=True)
+class LogUniform(Range):
+    """Equal probability of the logarithm; levels in equal ratios."""
+
+    def values_at(self, unit: Array) -> list[Any]:
+        """See ``Distribution``."""
+        return [float(value) for value in self.low * (self.high / self.low) ** unit]
+
+    def level_values(self) -> list[Any]:
+        """See ``Distribution``."""
+        return [float(value) for value in np.geomspace(self.low, self.high, self.require_levels())]
+
+
+@final
+@dataclass(frozen=True, slots=True, kw_only=True)
+class Normal(Range):
+    """Normal distribution cut off at both ends; levels are medians of parts of equal probability."""
+
+    mean: float
+    std: float
+
+    def values_at(self, unit: Array) -> list[Any]:
+        """See ``Distribution``."""
+        from scipy.stats import truncnorm
+
+        a, b = (self.low - self.mean) / self.std, (self.high - self.mean) / self.std
+        return [float(value) for value in truncnorm.ppf(unit, a, b, loc=self.mean, scale=self.std)]
+
+    def level_values(self) -> list[Any]:
+        """See ``Distribution``."""
+        n = self.require_levels()
+        return self.values_at((np.arange(n) + 0.5) / n)
+
+
+@final
+@dataclass(frozen=True, slots=True, kw_only=True)
+class Integers(Range):
+    """Whole numbers of equal probability; levels are those nearest to equal steps."""
+
+    def values_at(self, unit: Array) -> list[Any]:
+        """See ``Distribution``."""
+        width = self.high - self.low + 1
+        return [min(int(self.low + np.floor(u * width)), int(self.high)) for u in unit]
+
+    def level_values(self) -> list[Any]:
+        """See ``Distribution``."""
+        return [round(float(value)) for value in np.linspace(self.low, self.high, self.require_levels())]
+
+
+@final
+@dataclass(frozen=True, slots=True, kw_only=True)
+class Choice(Distribution):
+    """Listed values of equal probability; they are its levels unless the file says ``levels: null``."""
+
+    values: tuple[Any, ...]
+
+    @property
+    def least(self) -> float:
+        """The smallest listed value."""
+        return min(self.values)
+
+    @property
+    def n_levels(self) -> int | None:
+        """Number of listed values."""
+        return None if self.names_levels else len(self.values)
+
+    def values_at(self, unit: Array) -> list[Any]:
+        """See ``Distribution``."""
+        n = len(self.values)
+        return [self.values[min(int(u * n), n - 1)] for u in unit]
+
+    def level_values(self) -> list[Any]:
+        """See ``Distribution``."""
+        self.require_levels()
+        return list(self.values)
+
+
+DISTRIBUTIONS: dict[str, type[Distribution]] = {
+    "uniform": Uniform,
+    "log_uniform": LogUniform,
+    "normal": Normal,
+    "integers": Integers,
+    CHOICE: Choice,
+}
 KEYS: dict[str, tuple[str, ...]] = {
     "uniform": ("low", "high"),
     "log_uniform": ("low", "high"),
     "normal": ("mean", "std", "low", "high"),
     "integers": ("low", "high"),
-    "choice": ("values",),
+    CHOICE: ("values",),
 }
-LEVELS = "levels"  # any distribution may have it; only a grid reads it
 
 
-def check_distribution(key: str, spec: Any) -> None:
+def read_distribution(key: str, spec: Any) -> Distribution:
+    """Distribution of a key from its boundary keys.
+
+    Raises
+    ------
+    ConfigError    unless ``spec`` is a complete distribution
+    """
+    _check_distribution(key, spec)
+    kind = spec["distribution"]
+    numbers = {name: tuple(spec[name]) if kind == CHOICE else spec[name] for name in KEYS[kind]}
+    return DISTRIBUTIONS[kind](key=key, levels=spec.get(LEVELS), names_levels=LEVELS in spec, **numbers)
+
+
+def _check_distribution(key: str, spec: Any) -> None:
     """Raise ConfigError unless ``spec`` is a complete distribution for ``key``."""
     if not isinstance(spec, Mapping) or spec.get("distribution") not in KEYS:
         raise ConfigError(
@@ -37,7 +217,7 @@ def check_distribution(key: str, spec: Any) -> None:
     missing = [name for name in needed if name not in spec]
     if extra or missing:
         raise ConfigError(f"{key}: {spec['distribution']} needs exactly {', '.join(needed)} (and levels, for a grid)")
-    if spec["distribution"] == "choice":
+    if spec["distribution"] == CHOICE:
         if not isinstance(spec["values"], list) or not spec["values"]:
             raise ConfigError(f"{key}: values must be a list with at least one entry")
         if not all(_is_number(value) for value in spec["values"]):
@@ -65,7 +245,7 @@ def _check_levels(key: str, spec: Mapping[str, Any]) -> None:
     levels, kind = spec.get(LEVELS), spec["distribution"]
     if levels is None:
         return
-    if kind == "choice":
+    if kind == CHOICE:
         raise ConfigError(f"{key}: the levels of a choice are its values; leave levels out, or null to draw them")
     if isinstance(levels, bool) or not isinstance(levels, int) or levels < 2:
         raise ConfigError(
@@ -77,53 +257,6 @@ def _check_levels(key: str, spec: Mapping[str, Any]) -> None:
 
 def _is_number(value: Any) -> bool:
     return isinstance(value, int | float) and not isinstance(value, bool) and math.isfinite(value)
-
-
-def values_at(key: str, spec: Mapping[str, Any], unit: Array) -> list[Any]:
-    """Values at points of the unit interval, (point,); plain Python numbers."""
-    check_distribution(key, spec)
-    kind = spec["distribution"]
-    if kind == "choice":
-        options = spec["values"]
-        return [options[min(int(u * len(options)), len(options) - 1)] for u in unit]
-    low, high = spec["low"], spec["high"]
-    if kind == "uniform":
-        return [float(value) for value in low + (high - low) * unit]
-    if kind == "log_uniform":
-        return [float(value) for value in low * (high / low) ** unit]
-    if kind == "integers":
-        return [min(int(low + np.floor(u * (high - low + 1))), int(high)) for u in unit]
-    from scipy.stats import truncnorm
-
-    a, b = (low - spec["mean"]) / spec["std"], (high - spec["mean"]) / spec["std"]
-    return [float(value) for value in truncnorm.ppf(unit, a, b, loc=spec["mean"], scale=spec["std"])]
-
-
-def n_levels(key: str, spec: Mapping[str, Any]) -> int | None:
-    """Number of values that a key has in a grid; None for one that is drawn because it has none or null."""
-    check_distribution(key, spec)
-    if spec["distribution"] == "choice":
-        return None if LEVELS in spec else len(spec["values"])
-    levels: int | None = spec.get(LEVELS)
-    return levels
-
-
-def level_values(key: str, spec: Mapping[str, Any]) -> list[Any]:
-    """Values of a key that has levels, in order.
-
-    A choice has its values. Uniform and log-uniform ones have equal steps (ratios) from ``low`` to ``high``, both
-    included, whole numbers the nearest ones. A normal one has the medians of as many parts of equal probability.
-    """
-    n, kind = n_levels(key, spec), spec["distribution"]
-    if n is None:
-        raise ConfigError(f"{key}: a grid needs its levels, for instance levels: 4, or distribution: choice")
-    if kind == "choice":
-        return list(spec["values"])
-    if kind == "normal":
-        return values_at(key, spec, (np.arange(n) + 0.5) / n)
-    steps = np.geomspace if kind == "log_uniform" else np.linspace
-    values = steps(spec["low"], spec["high"], n)
-    return [round(float(value)) if kind == "integers" else float(value) for value in values]
 
 
 def design_points(design: str, n_points: int, n_dimensions: int, rng: np.random.Generator) -> Array:

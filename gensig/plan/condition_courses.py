@@ -5,7 +5,7 @@ from __future__ import annotations
 import math
 from collections.abc import Collection
 
-from gensig.dataset.distributions import check_distribution
+from gensig.dataset.distributions import read_distribution
 from gensig.errors import ConfigError
 from gensig.faults.registry import fault_parts
 from gensig.operation.courses import RandomWalk
@@ -80,9 +80,8 @@ def least_speed(config: Configuration, set_speed: float) -> float:
             f"operating.turns: the plan draws {drawn[0]}, so the slowest turn is not known; use duration_s"
         )
     if SPEED_KEY in vary:
-        spec = vary[SPEED_KEY]
-        check_distribution(f"plan.vary.{SPEED_KEY}", spec)
-        set_speed = to_si(SPEED_KEY, min(spec["values"]) if spec["distribution"] == "choice" else spec["low"])
+        drawn_speed = read_distribution(f"plan.vary.{SPEED_KEY}", vary[SPEED_KEY])
+        set_speed = to_si(SPEED_KEY, drawn_speed.least)
     course, ripple = read_course(operating, "speed_profile"), read_ripple(operating, "speed_ripple")
     factor = (1.0 if course is None else course.least) * (1.0 if ripple is None else 1.0 - ripple.share)
     if not set_speed * factor > 0.0:

@@ -8,7 +8,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from gensig.dataset.distributions import GRID, design_points, level_values, n_levels, values_at
+from gensig.dataset.distributions import GRID, Distribution, design_points, read_distribution
 from gensig.errors import ConfigError
 from gensig.faults.registry import COMPOUND, fault_parts, read_faults
 from gensig.geometry.tooth_profile import root_curve_point
@@ -23,22 +23,21 @@ OWN = ("of", CEILING)
 
 
 def draw_values(
-    config: Configuration, vary: Mapping[str, Any], points: NDArray[np.int64], rng: np.random.Generator, where: str
+    config: Configuration, vary: Mapping[str, Distribution], points: NDArray[np.int64], rng: np.random.Generator
 ) -> dict[str, list[Any]]:
     """Values of every varied key, (condition,) each.
 
-    In a grid a key with levels has that of the condition's point, the first key slowest. All others are drawn together
-    from one space-filling design.
+    In a grid a key with levels has that of the condition's point, the first key slowest. All others
+    are drawn together from one space-filling design.
     """
     design = config["plan"]["design"]
-    names = {key: f"{where}.vary.{key}" for key in vary}
-    crossed = [key for key in vary if design == GRID and n_levels(names[key], vary[key]) is not None]
+    crossed = [key for key in vary if design == GRID and vary[key].n_levels is not None]
     drawn = [key for key in vary if key not in crossed]
     unit = design_points(design, len(points), len(drawn), rng)
-    values = {key: values_at(names[key], vary[key], unit[:, k]) for k, key in enumerate(drawn)}
+    values = {key: vary[key].values_at(unit[:, k]) for k, key in enumerate(drawn)}
     step = 1
     for key in reversed(crossed):
-        levels = level_values(names[key], vary[key])
+        levels = vary[key].level_values()
         values[key] = [levels[point // step % len(levels)] for point in points.tolist()]
         step *= len(levels)
     return {key: values[key] for key in vary}
@@ -53,17 +52,20 @@ def fault_sizes(fault: Mapping[str, Any]) -> dict[str, float]:
     return {key: float(value) for key, value in numbers.items()}
 
 
-def fault_specs(config: Configuration, fault: Mapping[str, Any]) -> tuple[dict[str, Any], dict[str, tuple[int, str]]]:
+def fault_specs(
+    config: Configuration, fault: Mapping[str, Any]
+) -> tuple[dict[str, Distribution], dict[str, tuple[int, str]]]:
     """Distributions of a fault by name, and the part and key that each is of."""
     read_faults(fault)
-    specs: dict[str, Any] = {}
+    specs: dict[str, Distribution] = {}
     places: dict[str, tuple[int, str]] = {}
     for place, part in enumerate(fault_parts(fault)):
         for key, spec in (part.get("vary") or {}).items():
             if key not in part or key == "vary":
                 raise ConfigError(f"fault.vary: '{key}' is no key of fault={part['kind']}")
             name = f"parts.{place}.{key}" if fault["kind"] == COMPOUND else key
-            specs[name], places[name] = _for_gear(config, part, key, spec), (place, key)
+            specs[name] = read_distribution(f"fault.vary.{name}", _for_gear(config, part, key, spec))
+            places[name] = (place, key)
     return specs, places
 
 
@@ -73,7 +75,7 @@ def draw_faults(
     """One complete fault a condition, its severity distribution drawn; one design for all parts of a compound fault."""
     specs, places = fault_specs(config, fault)
     parts = [{key: value for key, value in part.items() if key != "vary"} for part in fault_parts(fault)]
-    drawn = draw_values(config, specs, points, rng, "fault")
+    drawn = draw_values(config, specs, points, rng)
     faults: list[dict[str, Any]] = []
     for condition in range(len(points)):
         own = [dict(plain) for plain in parts]

@@ -20,6 +20,7 @@ from gensig.options.configuration import Configuration, whole_number
 from gensig.plan.draws import draw_faults, draw_values
 from gensig.plan.growth_table import PAIRS_ONLY, LifeGears, unit_growth
 from gensig.record.machines import read_machine
+from gensig.record.options import read_plan_options
 from gensig.record.streams import Stream, stream
 from gensig.systems.base import Machine
 from gensig.systems.registry import LINE
@@ -206,7 +207,7 @@ def _checked_units(config: Configuration, options: LifeOptions) -> int:
 
 def _setpoints(config: Configuration, options: LifeOptions, n_units: int) -> list[dict[str, float]]:
     """Values of every set-point of every unit, those of a unit beside each other."""
-    vary = config["plan"]["vary"]
+    vary = read_plan_options(config).vary
     blocks = options.blocks
     if blocks is not None and (drawn := sorted({SPEED, TORQUE} & set(vary))):
         raise ConfigError(
@@ -215,7 +216,7 @@ def _setpoints(config: Configuration, options: LifeOptions, n_units: int) -> lis
     given = None if blocks is None else given_history(blocks, options.horizon)
     n_setpoints = options.n_setpoints if given is None else len(given.speed)
     points = np.arange(n_units * n_setpoints)
-    drawn_values = draw_values(config, vary, points, stream(config.seed, Stream.CONDITION), "plan")
+    drawn_values = draw_values(config, vary, points, stream(config.seed, Stream.CONDITION))
     found = [{key: float(values[k]) for key, values in drawn_values.items()} for k in points.tolist()]
     if given is not None:
         for k, values in enumerate(found):

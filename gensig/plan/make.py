@@ -12,7 +12,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from gensig.dataset.distributions import LEVELS, n_levels
+from gensig.dataset.distributions import Distribution
 from gensig.dataset.plan import Plan, record_ids, shard_places
 from gensig.dataset.schema import SCALES, SIGNALS
 from gensig.errors import ConfigError
@@ -86,7 +86,7 @@ def make_plan(config: Configuration) -> Plan:
     machine.check()
     signal_shapes(config, machine)  # refuses what the machine does not tell
     rng = stream(seed, Stream.CONDITION)
-    conditions = draw_values(config, options.vary, counts.condition_points, rng, "plan")
+    conditions = draw_values(config, options.vary, counts.condition_points, rng)
     faults = {
         name: draw_faults(config, fault, counts.fault_points, stream(seed, Stream.FAULT, index))
         for index, (name, fault) in enumerate(config["classes"].items())
@@ -199,21 +199,21 @@ def read_counts(config: Configuration) -> Counts:
 
 def _grid_size(config: Configuration, plan: PlanOptions) -> tuple[int, int]:
     """Points of the grid over the conditions, and the least number that the grids of all faults divide."""
-    for key, spec in plan.vary.items():
-        if n_levels(f"plan.vary.{key}", spec) is None and LEVELS not in spec:
+    for key, distribution in plan.vary.items():
+        if distribution.n_levels is None and not distribution.names_levels:
             raise ConfigError(
                 f"plan.vary.{key}: a grid needs its levels: give levels: 4 or so, distribution: choice, or "
                 "levels: null to draw it all the same"
             )
-    n_faults = [_n_points("fault", specs) for specs in _fault_varies(config).values()]
-    return _n_points("plan", plan.vary), math.lcm(*n_faults)
+    n_faults = [_n_points(vary) for vary in _fault_varies(config).values()]
+    return _n_points(plan.vary), math.lcm(*n_faults)
 
 
-def _n_points(where: str, vary: Mapping[str, Any]) -> int:
-    return math.prod(n_levels(f"{where}.vary.{key}", spec) or 1 for key, spec in vary.items())
+def _n_points(vary: Mapping[str, Distribution]) -> int:
+    return math.prod(distribution.n_levels or 1 for distribution in vary.values())
 
 
-def _fault_varies(config: Configuration) -> dict[str, dict[str, Any]]:
+def _fault_varies(config: Configuration) -> dict[str, dict[str, Distribution]]:
     """Distributions of the keys of each class."""
     return {name: fault_specs(config, fault)[0] for name, fault in config["classes"].items()}
 
@@ -223,8 +223,12 @@ def describe_design(config: Configuration) -> str:
     plan = read_plan_options(config)
     if not plan.is_grid:
         return plan.design
-    of_faults = {f"{name}.{key}": spec for name, vary in _fault_varies(config).items() for key, spec in vary.items()}
-    keys = {key: n_levels(key, spec) for key, spec in {**plan.vary, **of_faults}.items()}
+    of_faults = {
+        f"{name}.{key}": distribution
+        for name, vary in _fault_varies(config).items()
+        for key, distribution in vary.items()
+    }
+    keys = {key: distribution.n_levels for key, distribution in {**plan.vary, **of_faults}.items()}
     crossed = " x ".join(f"{key} {n}" for key, n in keys.items() if n is not None)
     drawn = ", ".join(key for key, n in keys.items() if n is None)
     return f"grid of {crossed or 'no key'}" + (f"; drawn: {drawn}" if drawn else "")

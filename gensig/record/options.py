@@ -4,9 +4,8 @@ from __future__ import annotations
 
 from collections.abc import Mapping
 from dataclasses import dataclass, fields
-from typing import Any
 
-from gensig.dataset.distributions import GRID
+from gensig.dataset.distributions import GRID, Distribution, read_distribution
 from gensig.errors import ConfigError
 from gensig.options.configuration import Configuration, Section, whole_number
 from gensig.systems.shaft_sensors import SWITCHES
@@ -83,7 +82,7 @@ class PlanOptions:
     n_repeats: int
     classes: tuple[str, ...]
     design: str
-    vary: Mapping[str, Any]
+    vary: Mapping[str, Distribution]
     sham: bool
 
     @property
@@ -113,7 +112,8 @@ def read_plan_options(config: Configuration) -> PlanOptions:
             whole_number(f"plan.{key}", plan[key], at_least=1)
     if plan["n_records"] is not None:
         whole_number("plan.n_records", plan["n_records"], at_least=len(plan["classes"]))
-    return plan.without("vary").read(PlanOptions, vary=plan["vary"])
+    vary = {key: read_distribution(f"plan.vary.{key}", spec) for key, spec in plan["vary"].items()}
+    return plan.without("vary").read(PlanOptions, vary=vary)
 
 
 def _check_keys(plan: Section) -> None:

@@ -12,7 +12,7 @@ from hypothesis import strategies as st
 from numpy.testing import assert_allclose
 from scipy.stats import qmc
 
-from gensig.dataset.distributions import check_distribution, design_points, level_values, n_levels, values_at
+from gensig.dataset.distributions import DISTRIBUTIONS, KEYS, design_points, read_distribution
 from gensig.errors import ConfigError
 
 SPECS = {
@@ -29,7 +29,7 @@ POINTS = (np.arange(4000) + 0.5) / 4000
 @given(st.sampled_from(sorted(SPECS)), st.lists(st.floats(0, 1), min_size=1, max_size=20))
 def test_values_stay_in_range(kind, points):
     spec = SPECS[kind]
-    values = values_at("key", spec, np.array(points))
+    values = read_distribution("key", spec).values_at(np.array(points))
     if kind == "choice":
         assert set(values) <= set(spec["values"])
     else:
@@ -40,14 +40,16 @@ def test_values_stay_in_range(kind, points):
 
 @pytest.mark.parametrize("kind", ["uniform", "log_uniform", "normal", "integers"])
 def test_values_rise_with_the_point_and_reach_both_ends(kind):
-    values = np.array(values_at("key", SPECS[kind], POINTS))
+    values = np.array(read_distribution("key", SPECS[kind]).values_at(POINTS))
     assert np.all(np.diff(values) >= 0)
     spec = SPECS[kind]
     assert_allclose([values[0], values[-1]], [spec["low"], spec["high"]], rtol=0.02, atol=0.02)
 
 
 def test_shapes():
-    uniform, log_uniform, normal, integers, choice = (np.array(values_at("key", SPECS[kind], POINTS)) for kind in SPECS)
+    uniform, log_uniform, normal, integers, choice = (
+        np.array(read_distribution("key", SPECS[kind]).values_at(POINTS)) for kind in SPECS
+    )
     assert_allclose([uniform.mean(), uniform.std()], [1.0, 4 / np.sqrt(12)], rtol=1e-3, atol=0)
     assert_allclose(np.median(log_uniform), 1.0, rtol=1e-3, atol=0)
     assert_allclose(normal.mean(), 1.0 + 2 * 0.0853, rtol=0.01, atol=0)  # cut at -1.5 and +2 sigma
@@ -75,7 +77,7 @@ def cut_normal_share(value, *, mean, std, low, high):
 
 @pytest.mark.parametrize("numbers", NORMALS)
 def test_a_cut_normal_has_the_normal_density_between_its_ends(numbers):
-    values = values_at("key", {"distribution": "normal", **numbers}, POINTS)
+    values = read_distribution("key", {"distribution": "normal", **numbers}).values_at(POINTS)
     assert_allclose([cut_normal_share(value, **numbers) for value in values], POINTS, rtol=0, atol=1e-8)
 
 
@@ -84,7 +86,7 @@ def test_a_cut_normal_stays_space_filling(design):
     """One value in each of 64 parts of equal probability: nothing is drawn and thrown away."""
     for numbers in NORMALS[:2]:
         points = design_points(design, 64, 1, np.random.default_rng(3))
-        values = values_at("key", {"distribution": "normal", **numbers}, points[:, 0])
+        values = read_distribution("key", {"distribution": "normal", **numbers}).values_at(points[:, 0])
         parts = [int(64 * cut_normal_share(value, **numbers)) for value in values]
         assert sorted(parts) == list(range(64))
 
@@ -108,17 +110,18 @@ class TestLevels:
         ],
     )  # fmt: skip
     def test_values(self, spec, levels):
-        assert n_levels("key", spec) == len(levels)
-        assert_allclose(level_values("key", spec), levels, rtol=1e-7, atol=1e-12)
+        assert read_distribution("key", spec).n_levels == len(levels)
+        assert_allclose(read_distribution("key", spec).level_values(), levels, rtol=1e-7, atol=1e-12)
 
     @pytest.mark.parametrize("kind", sorted(SPECS))
     def test_null_has_none(self, kind):
-        assert n_levels("key", {**SPECS[kind], "levels": None}) is None
+        assert read_distribution("key", {**SPECS[kind], "levels": None}).n_levels is None
 
     @pytest.mark.parametrize("kind", sorted(SPECS))
     def test_designs_that_draw_pass_over_them(self, kind):
         levels = None if kind == "choice" else 3
-        assert values_at("key", {**SPECS[kind], "levels": levels}, POINTS) == values_at("key", SPECS[kind], POINTS)
+        levelled = read_distribution("key", {**SPECS[kind], "levels": levels})
+        assert levelled.values_at(POINTS) == read_distribution("key", SPECS[kind]).values_at(POINTS)
 
 
 @pytest.mark.parametrize(
@@ -154,13 +157,13 @@ class TestLevels:
 )
 def test_mistakes_are_answered(spec, text):
     with pytest.raises(ConfigError, match=re.escape(text)) as caught:
-        check_distribution("operating.speed_rpm", spec)
+        read_distribution("operating.speed_rpm", spec)
     assert "operating.speed_rpm" in str(caught.value)
 
 
 def test_whole_numbers_need_whole_ends():
     with pytest.raises(ConfigError, match=r"0\.5"):
-        check_distribution("key", {"distribution": "integers", "low": 0.5, "high": 2.5})
+        read_distribution("key", {"distribution": "integers", "low": 0.5, "high": 2.5})
 
 
 @pytest.mark.parametrize("design", ["latin_hypercube", "sobol"])
@@ -201,3 +204,13 @@ def test_no_dimension_draws_nothing():
 def test_unknown_designs_list_the_known(n_dimensions):
     with pytest.raises(ConfigError, match=r"plan.design = 'factorial'; allowed: latin_hypercube, sobol, grid"):
         design_points("factorial", 4, n_dimensions, np.random.default_rng(0))
+
+
+def test_every_kind_has_its_class_and_keys():
+    assert set(DISTRIBUTIONS) == set(KEYS) == set(SPECS)
+
+
+@pytest.mark.parametrize("kind", sorted(DISTRIBUTIONS))
+def test_no_value_is_below_the_least(kind):
+    distribution = read_distribution("key", SPECS[kind])
+    assert min(distribution.values_at(POINTS)) >= distribution.least
