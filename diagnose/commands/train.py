@@ -111,13 +111,11 @@ def _train_one(config: Configuration) -> None:
 
 
 def _say_window(dataset: Dataset, settings: TrainSettings) -> None:
-    """One line where the data set asks for another length of windows than usual and nobody gave one."""
-    from diagnose.data.turns import wants_turns
-    from diagnose.data.window_choice import chosen_window
+    """Print one line where the data set asks for another length of windows than usual."""
+    from diagnose.studies.study import window_note
 
-    why = None if settings.window_samples or wants_turns(settings.model) else chosen_window(dataset)[1]
-    if why:
-        print(why, file=sys.stderr, flush=True)
+    if note := window_note(dataset, settings):
+        print(note, file=sys.stderr, flush=True)
 
 
 def _train_life(settings: TrainSettings, out: Path) -> None:

@@ -4,10 +4,12 @@ from __future__ import annotations
 
 from abc import ABC, abstractmethod
 from collections.abc import Sequence
+from typing import ClassVar
 
 import torch
 from torch import nn
 
+from diagnose.data.inputs import NetworkInput
 from diagnose.data.targets import GEARS
 from gensig.errors import ConfigError
 
@@ -20,8 +22,13 @@ class Network(nn.Module, ABC):
     Parameters
     ----------
     input_scale : (channel,) typical RMS of each channel, which the input is divided by; stored with the weights
+
+    Attributes
+    ----------
+    inputs : kind of input that the network reads; the only place where this is said
     """
 
+    inputs: ClassVar[type[NetworkInput]]
     input_scale: torch.Tensor
     head: nn.Module
     places: nn.Module | None

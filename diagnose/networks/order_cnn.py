@@ -3,12 +3,15 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
+from typing import ClassVar
 
 import torch
 from torch import nn
 from torch.nn.functional import pad, relu
 
+from diagnose.data.inputs import NetworkInput
 from diagnose.data.targets import GEARS
+from diagnose.data.turns import Turns
 from diagnose.networks.network import Network
 from gensig.errors import ConfigError
 
@@ -16,7 +19,7 @@ from gensig.errors import ConfigError
 class OrderCnn(Network):
     """Convolutions around the turn of either gear, compared with the gear's mean, and the maximum over its teeth.
 
-    The input is `diagnose.data.turns.packed_turns`: what each tooth adds to the mean passage, gear by gear, and that
+    The input is `diagnose.data.turns.Turns.packed`: what each tooth adds to the mean passage, gear by gear, and that
     passage. It is the same at every speed but for the frequency response. Responses of the first filters are compressed
     by the inverse hyperbolic sine: impacts of tooth engagement are 30 dB above what cracks and pits do between them.
 
@@ -32,6 +35,8 @@ class OrderCnn(Network):
     dropout : share of pooled features dropped in training
     heads : see `diagnose.settings.HEADS`
     """
+
+    inputs: ClassVar[type[NetworkInput]] = Turns
 
     def __init__(
         self,

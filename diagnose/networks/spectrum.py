@@ -4,10 +4,13 @@ from __future__ import annotations
 
 import math
 from collections.abc import Sequence
+from typing import ClassVar
 
 import torch
 from torch import nn
 
+from diagnose.data.inputs import NetworkInput
+from diagnose.data.window_input import Windows
 from diagnose.networks.network import Network
 from gensig.errors import ConfigError
 
@@ -46,6 +49,8 @@ class SpectrumCnn(Network):
     dropout : share of pooled features dropped in training
     heads : see `diagnose.settings.HEADS`
     """
+
+    inputs: ClassVar[type[NetworkInput]] = Windows
 
     def __init__(
         self,

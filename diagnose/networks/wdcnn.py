@@ -3,10 +3,13 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
+from typing import ClassVar
 
 import torch
 from torch import nn
 
+from diagnose.data.inputs import NetworkInput
+from diagnose.data.window_input import Windows
 from diagnose.networks.network import Network
 
 FIRST_KERNEL, FIRST_STRIDE, FIRST_PADDING = 64, 16, 24
@@ -35,6 +38,8 @@ class Wdcnn(Network):
     Source: Zhang, Peng, Li, Chen & Zhang (2017), "A new deep learning model for fault diagnosis with good anti-noise
     and domain adaptation ability on raw vibration signals", Sensors 17 (2), 425, table 2.
     """
+
+    inputs: ClassVar[type[NetworkInput]] = Windows
 
     def __init__(
         self,

@@ -51,15 +51,15 @@ def evaluate_model(
     DatasetError    if schema version, sampling rate, channels or classes do not fit the network
     ConfigError    for a protocol or subset that does not exist, another number of channels
     """
-    from diagnose.data.turns import load_inputs
     from diagnose.networks.calibration import calibration_scores
+    from diagnose.networks.registry import input_of
     from diagnose.scoring.metrics import over_records
     from diagnose.studies.study import score_predictions
     from diagnose.training.train import predict_windows
 
     task = _matching_task(description, dataset, channels)
     segments, part, shown = chosen_segments(task, description, protocol, subset)
-    windows = load_inputs(shown, segments, description.model)
+    windows = input_of(description.model).load(shown, segments)
     record, log_probability = over_records(predict_windows(model, windows), windows.record)
     scores = score_predictions(task, [(record, log_probability.argmax(axis=1))], description.n_bootstrap)
     return {

@@ -11,7 +11,6 @@ import numpy as np
 
 from diagnose.data.at_rate import at_rate
 from diagnose.data.lives import Lives, lives_of
-from diagnose.data.turns import load_inputs
 from diagnose.data.windows import Segments, Task, task_of
 from diagnose.recordings.evaluate import chosen_segments, fitting_channels
 from diagnose.scoring.life_scores import MEASURES, by_life, life_scores
@@ -63,6 +62,7 @@ def evaluate_life(
         is a snapshot of a life
     ConfigError    for a protocol or subset that does not exist, and a part in which no life failed
     """
+    from diagnose.networks.registry import input_of
     from diagnose.training.life_network import said_of_records
 
     task = _matching_task(description, dataset, channels)
@@ -77,7 +77,8 @@ def evaluate_life(
     if not lives.failed[segments.record].any():
         raise ConfigError(f"{dataset.folder}, {part}: no life failed, so that there is nothing to score")
     told = np.stack([np.asarray(dataset.column(name), dtype=float) for name in facts.told], axis=1)
-    record, share = said_of_records(model, load_inputs(shown, segments, description.model), told)
+    windows = input_of(description.model).load(shown, segments)
+    record, share = said_of_records(model, windows, told)
     prediction = LifePrediction(
         protocol=description.protocol,
         method=facts.method,

@@ -11,8 +11,8 @@ import torch
 from numpy.typing import NDArray
 from torch import nn
 
-from diagnose.data.turns import wants_turns
 from diagnose.data.windows import normalised
+from diagnose.networks.registry import input_of
 from diagnose.recordings.onnx_export import (
     INPUT,
     N_CHECKED,
@@ -60,8 +60,8 @@ def export_life_onnx(model: LifeNetwork, description: ModelDescription, facts: L
     ConfigError    for a model that looks at turns, or without the packages of the extra ``onnx``
     GensigError    for a network that cannot be written, or whose file does not answer like torch; no file is left
     """
-    if wants_turns(description.model):
-        raise ConfigError("this model looks at turns, which are made before the network: export one that reads windows")
+    if reason := input_of(description.model).why_not_exported:
+        raise ConfigError(reason)
     need_packages()
     fixed = copy.deepcopy(model).eval()
     fixed.ear = with_fixed_pooling(model.ear, description)

@@ -18,8 +18,8 @@ from numpy.typing import NDArray
 from torch import nn
 from torch.nn.functional import log_softmax
 
-from diagnose.data.turns import wants_turns
 from diagnose.data.windows import normalised
+from diagnose.networks.registry import input_of
 from gensig.errors import ConfigError, GensigError
 from gensig.version import __version__
 
@@ -89,8 +89,8 @@ def export_onnx(model: nn.Module, description: ModelDescription, file: Path) -> 
     ConfigError    for a model that looks at turns, or without the packages of the extra ``onnx``
     GensigError    for a network that cannot be written, or whose file does not answer like torch; no file is left
     """
-    if wants_turns(description.model):
-        raise ConfigError("this model looks at turns, which are made before the network: export one that reads windows")
+    if reason := input_of(description.model).why_not_exported:
+        raise ConfigError(reason)
     need_packages()
     whole = RawWindows(with_fixed_pooling(model, description), description.normalise).eval()
     examples = raw_examples(model, description)

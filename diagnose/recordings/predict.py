@@ -10,8 +10,8 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 from numpy.typing import NDArray
 
-from diagnose.data.turns import packed_turns, turn_set, wants_turns
-from diagnose.data.windows import Segments, WindowSet, plan_windows
+from diagnose.data.inputs import RecordedSignal
+from diagnose.data.windows import WindowSet
 from diagnose.networks.calibration import probabilities
 from diagnose.recordings.verdict import class_text, score_text, verdict
 from gensig.errors import ConfigError
@@ -149,11 +149,23 @@ def windows_of(
 ) -> tuple[WindowSet, Recording, tuple[str, ...], Tracked | None]:
     """Windows of a recording as the network takes them, the recording as read, its names of the channels, and over the
     shaft's angle where that is tracked."""
+    from diagnose.networks.registry import input_of
+
     recording, channels, tacho = _read(description, source)
     tracked = _tracked(recording, tacho, source) if source.is_tracked else None
     signal = _in_domain(recording, tracked, description, source)
     speed = source.speed_rpm if tracked is None else source.to_speed_rpm or tracked.speed_rpm
-    return _windows(signal, description, source.file, speed), recording, channels, tracked
+    recorded = RecordedSignal(
+        signal=signal,
+        sampling_rate=description.sampling_rate_hz,
+        speed_rpm=speed,
+        file=source.file,
+        window_samples=description.window_samples,
+        stride_samples=description.stride_samples,
+        normalise=description.normalise,
+    )
+    windows = input_of(description.model).of_recording(recorded)
+    return windows, recording, channels, tracked
 
 
 def summary(result: dict[str, Any]) -> str:
@@ -291,45 +303,11 @@ def _in_domain(
     return at_constant_speed(tracked, rate, played).astype(np.float32)
 
 
-def _windows(
-    signal: NDArray[np.float32], description: ModelDescription, file: str, speed_rpm: float | None
-) -> WindowSet:
-    """Windows, or turns, as those of a record of a data set; the label is not used."""
-    if wants_turns(description.model):
-        return _turns(signal, description, file, speed_rpm)
-    n_samples, rate = signal.shape[-1], description.sampling_rate_hz
-    if n_samples < description.window_samples:
-        raise ConfigError(
-            f"{file} is too short: {n_samples / rate:.3g} s, a window of the model is "
-            f"{description.window_samples / rate:.3g} s"
-        )
-    whole = Segments(record=np.array([0]), start=np.array([0]), stop=np.array([n_samples]))
-    segment, start = plan_windows(whole, description.window_samples, description.stride_samples)
-    return WindowSet(
-        signals=(signal,),
-        segment=segment,
-        start=start,
-        label=np.zeros_like(segment),
-        record=np.zeros_like(segment),
-        window_samples=description.window_samples,
-        normalise=description.normalise,
-    )
-
-
 def window_duration(description: ModelDescription, recording: Recording) -> float:
     """Seconds that one answer is about."""
-    if wants_turns(description.model):
-        return float(recording.acceleration.shape[-1] / recording.sampling_rate)
-    return description.window_samples / description.sampling_rate_hz
+    from diagnose.networks.registry import input_of
 
-
-def _turns(signal: NDArray[np.float32], description: ModelDescription, file: str, speed_rpm: float | None) -> WindowSet:
-    """The turns of the whole recording, for a network that reads them."""
-    if speed_rpm is None:
-        raise ConfigError(f"this model looks at turns and must know the speed: say --speed-rpm of {file}")
-    try:
-        turns = packed_turns(signal, description.sampling_rate_hz, speed_rpm, description.model)
-    except ValueError as error:
-        raise ConfigError(f"{file}: {error}") from None
-    nothing = np.zeros(1, dtype=np.int64)
-    return turn_set((turns,), nothing, nothing, description.normalise)
+    return input_of(description.model).seconds(
+        window=description.window_samples / description.sampling_rate_hz,
+        recording=float(recording.acceleration.shape[-1] / recording.sampling_rate),
+    )

@@ -31,10 +31,9 @@ from diagnose.data.lives import (
     life_segments,
     lives_of,
 )
-from diagnose.data.turns import check_turns, load_inputs, n_points, wants_turns
-from diagnose.data.windows import SUBSETS, Segments, Task, plan_windows
+from diagnose.data.windows import SUBSETS, Segments, Task
 from diagnose.networks.domain import Domain, fit_domain
-from diagnose.networks.registry import build_model, check_window
+from diagnose.networks.registry import build_model, check_window, input_of
 from diagnose.scoring.life_scores import (
     UNITS,
     Snapshots,
@@ -114,16 +113,13 @@ def plan_life_study(task: Task, settings: TrainSettings) -> tuple[tuple[str, ...
     """
     lives = lives_of(task)
     protocols, left_out = choose_life_protocols(task, lives, settings.protocols)
+    model = build_model(settings.model, n_channels=len(task.channel_names), n_classes=2)
+    inputs = input_of(settings.model)
     for protocol in protocols:
         for subset in SUBSETS:
             segments = life_segments(task, lives, protocol, subset)
-            if wants_turns(settings.model):
-                check_turns(task, segments, str(settings.model.get("name", "network")))
-            else:
-                plan_windows(segments, task.window_samples, task.stride_samples)
-    n_read = n_points(settings.model) if wants_turns(settings.model) else task.window_samples
-    model = build_model(settings.model, n_channels=len(task.channel_names), n_classes=2)
-    check_window(model, len(task.channel_names), n_read)
+            inputs.check(task, segments, str(settings.model.get("name", "network")))
+    check_window(model, len(task.channel_names), inputs.n_points(task.window_samples))
     device_of(settings.device)
     jobs = [Job(protocols=(protocol,), seed=seed) for protocol in protocols for seed in (None, *settings.seeds)]
     return protocols, left_out, jobs
@@ -235,7 +231,8 @@ def _baselines(
 def _networks(
     task: Task, settings: TrainSettings, lives: Lives, parts: dict[str, Segments], target: FloatArray, seed: int
 ) -> list[_Answer]:
-    windows = {name: load_inputs(task, part, settings.model, training=name == "train") for name, part in parts.items()}
+    load = input_of(settings.model).load
+    windows = {name: load(task, part, training=name == "train") for name, part in parts.items()}
     every = np.arange(target.size)
     weight = np.zeros(target.size)
     for part in ("train", "validation"):

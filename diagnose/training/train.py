@@ -138,7 +138,7 @@ def _loss(
     loss = cross_entropy(answers["classes"], label, weight=weight)
     if model.further:
         loss = loss + HEADS_WEIGHT * further_loss(answers, label, targets)
-    if "places" in answers and "place" in targets:
+    if "places" in answers and {"gear", "place"} <= set(targets):
         loss = loss + place_loss(answers["places"], label, targets["gear"], targets["place"], model.turns)
     return loss
 
