@@ -55,7 +55,7 @@ def evaluate_model(
     from diagnose.networks.registry import input_of
     from diagnose.scoring.metrics import over_records
     from diagnose.studies.study import score_predictions
-    from diagnose.training.train import predict_windows
+    from diagnose.training.classes import predict_windows
 
     task = _matching_task(description, dataset, channels)
     segments, part, shown = chosen_segments(task, description, protocol, subset)

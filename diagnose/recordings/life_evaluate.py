@@ -25,7 +25,7 @@ from diagnose.training.life_store import LifeFacts
 from gensig.errors import ConfigError, DatasetError
 
 if TYPE_CHECKING:
-    from diagnose.training.life_network import LifeNetwork
+    from diagnose.training.remaining_life import LifeNetwork
     from diagnose.training.store import ModelDescription
     from gensig.dataset.reader import Dataset
 
@@ -63,7 +63,7 @@ def evaluate_life(
     ConfigError    for a protocol or subset that does not exist, and a part in which no life failed
     """
     from diagnose.networks.registry import input_of
-    from diagnose.training.life_network import said_of_records
+    from diagnose.training.remaining_life import shares_of_records
 
     task = _matching_task(description, dataset, channels)
     lives = lives_of(task)
@@ -78,7 +78,7 @@ def evaluate_life(
         raise ConfigError(f"{dataset.folder}, {part}: no life failed, so that there is nothing to score")
     told = np.stack([np.asarray(dataset.column(name), dtype=float) for name in facts.told], axis=1)
     windows = input_of(description.model).load(shown, segments)
-    record, share = said_of_records(model, windows, told)
+    record, share = shares_of_records(model, windows, told)
     prediction = LifePrediction(
         protocol=description.protocol,
         method=facts.method,

@@ -28,8 +28,8 @@ from diagnose.recordings.onnx_export import (
 from gensig.errors import ConfigError, GensigError
 
 if TYPE_CHECKING:
-    from diagnose.training.life_network import LifeNetwork
     from diagnose.training.life_store import LifeFacts
+    from diagnose.training.remaining_life import LifeNetwork
     from diagnose.training.store import ModelDescription
 
 TOLD, OUTPUT = "told", "remaining_life_h"

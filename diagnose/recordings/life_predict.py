@@ -20,7 +20,7 @@ from gensig.errors import ConfigError
 
 if TYPE_CHECKING:
     from diagnose.networks.domain import Domain
-    from diagnose.training.life_network import LifeNetwork
+    from diagnose.training.remaining_life import LifeNetwork
     from diagnose.training.store import ModelDescription
 
 OPTIONS = {"speed_rpm": "--speed-rpm", "torque_nm": "--torque-nm", AGE: "--life-time-h"}
@@ -60,7 +60,7 @@ def predict_life(
     ConfigError    for what the network must know and is not told, and a recording that cannot be used
     """
     from diagnose.networks.domain import distances
-    from diagnose.training.life_network import said_of_windows
+    from diagnose.training.remaining_life import shares_of_windows
 
     _check_told(facts, source, torque_nm, life_time_h)
     windows, recording, channels, tracked = windows_of(description, source)
@@ -69,7 +69,7 @@ def predict_life(
     if speed is None:
         raise ConfigError(f"this model must know the speed of {source.file}: say --speed-rpm or --tacho")
     told = np.array([[float(values[name] or 0.0) for name in facts.told]])
-    by_window = said_of_windows(model, windows, told)
+    by_window = shares_of_windows(model, windows, told)
     level = facts.early_life_h
     share = float(np.clip(by_window.mean(), 0.0, 1.0))
     low, high = (float(end) for end in interval(np.array(share * level), facts.half_width_h, level))

@@ -14,8 +14,8 @@ from diagnose.data.windows import WindowSet
 from diagnose.networks.adaptation import HEALTHY, adapt_domain, adapt_network
 from diagnose.networks.domain import distances
 from diagnose.recordings.predict import SPEED_TOLERANCE, Source, windows_of
+from diagnose.training.classes import predict_windows
 from diagnose.training.store import load_domain, load_model, load_statistics, save_model
-from diagnose.training.train import predict_windows
 from gensig.errors import ConfigError, DatasetError
 
 

@@ -100,8 +100,8 @@ def predict_recording(
     from diagnose.networks.domain import distances
     from diagnose.networks.network import GEARS
     from diagnose.scoring.metrics import over_records
+    from diagnose.training.classes import predict_windows
     from diagnose.training.heads import predict_heads
-    from diagnose.training.train import predict_windows
 
     windows, recording, channels, tracked = windows_of(description, source)
     log_probability = predict_windows(model, windows)

@@ -14,7 +14,7 @@ from diagnose.data.lives import Lives
 from diagnose.data.protocols import MEANING
 from diagnose.report.figures import COLORS, save, subplots
 from diagnose.scoring.life_scores import BAND, MEASURES
-from diagnose.studies.life_study import AGE_ONLY, AND_AGE, LifePrediction
+from diagnose.studies.life_jobs import AGE_ONLY, AND_AGE, LifePrediction
 from gensig.text.page import Card, Section, Table, write_page
 
 FEW_LIVES = 10

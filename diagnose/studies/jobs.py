@@ -33,10 +33,11 @@ from diagnose.scoring.predictions import Prediction, Rows
 from diagnose.settings import TrainSettings
 from diagnose.studies.baseline_runs import baseline_predictions
 from diagnose.studies.novelty import NoveltyRun, fitted_runs, trained_runs
+from diagnose.training.classes import Classes, predict_windows, with_shuffled_labels
 from diagnose.training.heads import predict_heads
 from diagnose.training.sham import sham_method, sham_task
 from diagnose.training.tensorboard import epoch_log
-from diagnose.training.train import predict_windows, train_network, with_shuffled_labels
+from diagnose.training.train import train_network
 from gensig.errors import GensigError
 
 # Controls of a job beside the label shuffle, and the network that sees the level.
@@ -137,8 +138,7 @@ def _run_training(
         training = train_network(
             train,
             validation,
-            model_config=settings.model,
-            n_classes=n_classes,
+            target=Classes(n_classes=n_classes),
             settings=settings,
             seed=seed,
             on_epoch=on_epoch,
@@ -159,7 +159,7 @@ def _run_training(
         seed=seed,
         record=record,
         log_probability=log_probability,
-        detail=f"best epoch {training.best_epoch} of {len(training.validation_loss)}",
+        detail=training.detail,
         validation=Rows(record=held_out, log_probability=held_out_scores),
         windows=Rows(record=test.record, log_probability=by_window),
         weights={key: value.numpy() for key, value in training.model.state_dict().items()} if is_model else None,

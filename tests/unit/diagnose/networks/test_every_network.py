@@ -17,8 +17,8 @@ from diagnose.settings import settings_from
 from diagnose.studies import jobs
 from diagnose.studies.jobs import Job, run_jobs
 from diagnose.studies.study import settings_for, task_from
+from diagnose.training.classes import predict_windows
 from diagnose.training.store import load_model, model_description, save_model
-from diagnose.training.train import predict_windows
 from gensig.options.compose import compose
 
 OPTIONS = {

@@ -13,8 +13,8 @@ from numpy.testing import assert_allclose
 import gensig.dataset.reader
 from diagnose.cli import main
 from diagnose.data.windows import Segments, load_windows, task_of
+from diagnose.training.classes import predict_windows
 from diagnose.training.store import load_model
-from diagnose.training.train import predict_windows
 
 onnx = pytest.importorskip("onnx", reason="extra onnx")
 onnxruntime = pytest.importorskip("onnxruntime", reason="extra onnx")

@@ -23,8 +23,8 @@ from diagnose.data.windows import Segments, load_windows, task_of
 from diagnose.networks.domain import band_levels
 from diagnose.recordings.predict import Source, predict_recording
 from diagnose.recordings.verdict import class_text, score_text, verdict
+from diagnose.training.classes import predict_windows
 from diagnose.training.store import load_domain, load_model
-from diagnose.training.train import predict_windows
 
 RATE = 12800
 FAST = [
