@@ -76,11 +76,20 @@ def life_segments(task: Task, lives: Lives, protocol: str, subset: str) -> Segme
     ------
     ConfigError    for a subset without any
     """
-    found = subset_segments(task, protocol, subset)
-    kept = lives.name[found.record] != ""
-    if not kept.any():
+    found = kept_segments(subset_segments(task, protocol, subset), lives.name != "")
+    if not found.record.size:
         raise ConfigError(f"protocol {protocol}: its {subset} part has no snapshot of a life; leave the protocol out")
-    return Segments(record=found.record[kept], start=found.start[kept], stop=found.stop[kept])
+    return found
+
+
+def kept_segments(segments: Segments, kept: NDArray[np.bool_]) -> Segments:
+    """Stretches of the records that are kept, (record,) of the data set."""
+    chosen = kept[segments.record]
+    return Segments(
+        record=segments.record[chosen],
+        start=segments.start[chosen],
+        stop=segments.stop[chosen],
+    )
 
 
 def choose_life_protocols(

@@ -20,7 +20,14 @@ from diagnose.baselines.life_models import (
     operating_values,
     with_age,
 )
-from diagnose.data.lives import Lives, balanced_weights, early_level, life_segments, lives_of
+from diagnose.data.lives import (
+    Lives,
+    balanced_weights,
+    early_level,
+    kept_segments,
+    life_segments,
+    lives_of,
+)
 from diagnose.data.windows import SUBSETS, Segments, Task
 from diagnose.networks.domain import Domain, fit_domain
 from diagnose.networks.registry import input_of
@@ -115,7 +122,7 @@ def life_sets(task: Task, settings: TrainSettings, protocol: str) -> LifeSets:
     )
     known = lives.known(level)
     for subset in ("train", "validation"):
-        parts[subset] = _only(parts[subset], known)
+        parts[subset] = kept_segments(parts[subset], known)
     share = np.minimum(lives.remaining, level) / level
     return LifeSets(lives=lives, parts=parts, level=level, share=share)
 
@@ -248,13 +255,3 @@ def _networks(task: Task, settings: TrainSettings, sets: LifeSets, seed: int) ->
         network = _Network(training=training, domain=domain, told_range=ranges)
         found.append(_Answer(method=method, detail=training.detail, share=said, network=network))
     return found
-
-
-def _only(segments: Segments, kept: NDArray[np.bool_]) -> Segments:
-    """The stretches of the records that are kept, (record,) of the data set."""
-    chosen = kept[segments.record]
-    return Segments(
-        record=segments.record[chosen],
-        start=segments.start[chosen],
-        stop=segments.stop[chosen],
-    )

@@ -193,8 +193,8 @@ def _result(
         "phm_unit_h": level / UNITS,
         "coverage_wanted": settings.remaining_life.coverage,
         "intervals_hold": intervals_hold(n_calibration, settings.remaining_life.coverage),
-        "n_lives": {subset: _n_lives(lives, record, failed=True) for subset, record in parts.items()},
-        "n_lives_censored": {subset: _n_lives(lives, record, failed=False) for subset, record in parts.items()},
+        "n_lives": {subset: count_lives(lives, record, failed=True) for subset, record in parts.items()},
+        "n_lives_censored": {subset: count_lives(lives, record, failed=False) for subset, record in parts.items()},
         "n_records": {subset: int(record.size) for subset, record in parts.items()},
         "n_records_unknown": {
             subset: int((~lives.known(level)[record]).sum()) for subset, record in parts.items() if subset != "test"
@@ -210,7 +210,8 @@ def below_bound(lives: Lives, prediction: LifePrediction) -> float:
     return float(np.mean(prediction.said[censored] < bound)) if bound.size else 0.0
 
 
-def _n_lives(lives: Lives, record: IntArray, *, failed: bool) -> int:
+def count_lives(lives: Lives, record: IntArray, *, failed: bool) -> int:
+    """Number of lives of records, of those that failed or of the others."""
     return int(np.unique(lives.name[record[lives.failed[record] == failed]]).size)
 
 

@@ -1,6 +1,7 @@
 """Networks that look at turns, and what they are told beside the class: laws, a training, the way to disk and back."""
 
 import json
+from dataclasses import replace
 from types import SimpleNamespace
 
 import numpy as np
@@ -12,15 +13,17 @@ from numpy.testing import assert_allclose
 from diagnose.data.targets import fault_places, further_loss, place_loss, record_targets
 from diagnose.data.windows import subset_segments
 from diagnose.networks.registry import build_model, input_of
-from diagnose.recordings.evaluate import evaluate_model
-from diagnose.recordings.predict import Source, predict_recording, summary
+from diagnose.recordings.evaluate import evaluate_network
+from diagnose.recordings.predict import predict_recording
+from diagnose.recordings.registry import open_network
+from diagnose.recordings.source import Source
 from diagnose.scoring.metrics import balanced_accuracy, confusion_by_unit
 from diagnose.scoring.predictions import Prediction
 from diagnose.settings import settings_from
 from diagnose.studies.jobs import Job, run_jobs
 from diagnose.studies.study import plan_study, settings_for, task_from
 from diagnose.training.heads import head_scores, heads_notes, predict_heads
-from diagnose.training.store import load_model, model_description, save_model
+from diagnose.training.store import model_description, save_model
 from gensig.errors import ConfigError, DatasetError
 from gensig.options.compose import compose
 
@@ -187,26 +190,22 @@ def test_a_visible_fault_is_learnt_stored_judged_and_predicted(dataset, tmp_path
     assert len(heads_notes({"by_unit": {"heads": scores}})) == 1
 
     save_model(tmp_path / "m", found.weights, model_description(task, settings, found))
-    model, description = load_model(tmp_path / "m")
+    network = open_network(tmp_path / "m")
+    description = network.description
     assert description.model["heads"] == ["severity", "gear"]
-    judged = evaluate_model(model, description, dataset)
+    judged = evaluate_network(network, dataset).result
     assert judged["balanced_accuracy"]["mean"] > 0.8
 
     record = int(found.record[0])
     np.savez(tmp_path / "a.npz", acceleration=dataset.signals(record))
     speed = float(dataset.column("speed_rpm")[record])
     source = Source(file=str(tmp_path / "a.npz"), sampling_rate=12800.0, speed_rpm=speed)
-    result = predict_recording(model, description, None, source)
+    result = predict_recording(network, None, source)
     assert result["class"] == task.class_names[found.predicted[0]]
     assert_allclose(result["severity"], found.heads["severity"][0, found.predicted[0]], rtol=1e-3)
-    assert (result["gear"] != "none") == (", severity" in summary(result))
+    assert (result["gear"] != "none") == (", severity" in network.line(result))
     with pytest.raises(ConfigError, match="say --speed-rpm"):
-        predict_recording(
-            model,
-            description,
-            None,
-            Source(file=source.file, sampling_rate=12800.0),
-        )
+        predict_recording(network, None, replace(source, speed_rpm=None))
 
 
 def test_heads_that_are_right_have_no_error(dataset):

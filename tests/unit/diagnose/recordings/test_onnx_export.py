@@ -96,13 +96,13 @@ def fails(capsys, words, message):
 
 
 def test_a_file_that_answers_otherwise_is_removed(model, tmp_path, capsys, monkeypatch):
-    import diagnose.recordings.onnx_export
+    import diagnose.recordings.stored_classifier
 
-    class Louder(diagnose.recordings.onnx_export.RawWindows):
+    class Louder(diagnose.recordings.stored_classifier.RawWindows):
         def forward(self, acceleration):
             return 1.001 * super().forward(acceleration)
 
-    monkeypatch.setattr(diagnose.recordings.onnx_export, "RawWindows", Louder)
+    monkeypatch.setattr(diagnose.recordings.stored_classifier, "RawWindows", Louder)
     file = tmp_path / "m.onnx"
     fails(capsys, ["--to", "onnx", "--model", model, "--out", str(file)], "answered unlike torch by 0.001")
     assert not file.exists()
