@@ -65,7 +65,9 @@ def lives_of(task: Task) -> Lives:
         )
     for life in np.unique(name[used]):
         if np.unique(failed[used & (name == life)]).size > 1:
-            raise DatasetError(f"{dataset.folder}: life {life} has failed in some of its records and not in others")
+            raise DatasetError(
+                f"{dataset.folder}: life {life} has failed in some of its records and not in others",
+            )
     return Lives(name=np.where(used, name, ""), age=age, remaining=remaining, failed=failed == 1)
 
 
@@ -78,7 +80,9 @@ def life_segments(task: Task, lives: Lives, protocol: str, subset: str) -> Segme
     """
     found = kept_segments(subset_segments(task, protocol, subset), lives.name != "")
     if not found.record.size:
-        raise ConfigError(f"protocol {protocol}: its {subset} part has no snapshot of a life; leave the protocol out")
+        raise ConfigError(
+            f"protocol {protocol}: its {subset} part has no snapshot of a life; leave the protocol out",
+        )
     return found
 
 
@@ -113,7 +117,9 @@ def choose_life_protocols(
             left_out = {**left_out, protocol: reason}
     if not kept:
         reasons = "; ".join(f"{name}: {reason}" for name, reason in left_out.items())
-        raise ConfigError(f"{task.dataset.folder} has no protocol for task=remaining_life ({reasons})")
+        raise ConfigError(
+            f"{task.dataset.folder} has no protocol for task=remaining_life ({reasons})",
+        )
     return tuple(kept), left_out
 
 

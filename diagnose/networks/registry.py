@@ -101,7 +101,7 @@ def check_window(model: nn.Module, n_channels: int, window_samples: int) -> None
             model.eval()(torch.zeros(1, n_channels, window_samples))
     except RuntimeError:
         raise ConfigError(
-            f"window_samples={window_samples} is too short for this network; make it longer or choose another model"
+            f"window_samples={window_samples} is too short for this network; make it longer or choose another model",
         ) from None
 
 

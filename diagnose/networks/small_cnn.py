@@ -11,8 +11,7 @@ from torch import nn
 
 from diagnose.data.inputs import NetworkInput
 from diagnose.data.window_input import Windows
-from diagnose.networks.network import Network
-from gensig.errors import ConfigError
+from diagnose.networks.network import Network, check_blocks
 
 
 class SmallCnn(Network):
@@ -51,8 +50,7 @@ class SmallCnn(Network):
         heads: Sequence[str] = (),
     ) -> None:
         super().__init__(input_scale)
-        if not len(widths) == len(kernels) == len(strides) > 0:
-            raise ConfigError("model: widths, kernels and strides must be lists of the same length, one entry a block")
+        check_blocks(widths, kernels, strides)
         blocks: list[nn.Module] = []
         for n_in, n_out, kernel, stride in zip(
             (n_channels, *widths),

@@ -56,9 +56,20 @@ class Wdcnn(Network):
         layers: list[nn.Module] = []
         for index, (n_in, n_out) in enumerate(zip((n_channels, *widths), widths, strict=False)):
             if index == 0:
-                convolution = nn.Conv1d(n_in, n_out, FIRST_KERNEL, stride=FIRST_STRIDE, padding=FIRST_PADDING)
+                convolution = nn.Conv1d(
+                    n_in,
+                    n_out,
+                    FIRST_KERNEL,
+                    stride=FIRST_STRIDE,
+                    padding=FIRST_PADDING,
+                )
             else:
-                convolution = nn.Conv1d(n_in, n_out, 3, padding=0 if index == len(widths) - 1 else 1)
+                convolution = nn.Conv1d(
+                    n_in,
+                    n_out,
+                    3,
+                    padding=0 if index == len(widths) - 1 else 1,
+                )
             layers += [convolution, nn.BatchNorm1d(n_out), nn.ReLU(), nn.MaxPool1d(2)]
         self.blocks = nn.Sequential(*layers)
         self.hidden = nn.Sequential(

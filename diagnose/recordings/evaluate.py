@@ -10,7 +10,7 @@ from typing import TYPE_CHECKING, Any
 
 from diagnose.data.at_rate import at_rate
 from diagnose.data.windows import Segments, Task, all_segments, subset_segments, task_of
-from diagnose.recordings.stored_network import JudgedPart, Scores, StoredNetwork
+from diagnose.recordings.stored_network import Scores, StoredNetwork
 from diagnose.training.store import ModelDescription, data_fingerprint, schema_version
 from gensig.errors import ConfigError, DatasetError
 
@@ -68,12 +68,11 @@ def evaluate_network(
     """
     description = network.description
     task = _matching_task(network, dataset, channels)
-    segments, text, shown = chosen_segments(task, description, protocol, subset)
-    part = JudgedPart(task=task, shown=shown, segments=segments, text=text)
-    scores = network.scores(part)
+    segments, part, shown = chosen_segments(task, description, protocol, subset)
+    scores = network.scores(shown, segments, part)
     result = {
         "data": str(dataset.folder),
-        "part": text,
+        "part": part,
         **scores.counts,
         "class_names": list(task.class_names),
         "channel_names": list(shown.channel_names),
@@ -110,17 +109,19 @@ def _matching_task(
 
 
 def fitting_channels(
-    description: ModelDescription, dataset: Dataset, channels: Sequence[str] | None
+    description: ModelDescription,
+    dataset: Dataset,
+    channels: Sequence[str] | None,
 ) -> tuple[str, ...]:
     """Channels of a data set for those of a network; refuses another format, a lower rate and what it has not."""
     where = f"{dataset.folder} does not fit the model"
     if schema_version(dataset) != description.data_schema_version:
         raise DatasetError(
-            f"{where}: data schema {schema_version(dataset)}, trained on schema {description.data_schema_version}"
+            f"{where}: data schema {schema_version(dataset)}, trained on schema {description.data_schema_version}",
         )
     if dataset.sampling_rate < description.sampling_rate_hz * (1 - 1e-9):
         raise DatasetError(
-            f"{where}: sampled at {dataset.sampling_rate:g} Hz, trained at {description.sampling_rate_hz:g} Hz"
+            f"{where}: sampled at {dataset.sampling_rate:g} Hz, trained at {description.sampling_rate_hz:g} Hz",
         )
     if channels is not None and len(channels) != len(description.channel_names):
         raise ConfigError(
@@ -130,22 +131,31 @@ def fitting_channels(
     wanted = tuple(channels or description.channel_names)
     if missing := [name for name in wanted if name not in dataset.channel_names]:
         raise DatasetError(
-            f"{where}: it has no channel {', '.join(missing)} (it has {', '.join(dataset.channel_names)})"
+            f"{where}: it has no channel {', '.join(missing)} (it has {', '.join(dataset.channel_names)})",
         )
     return wanted
 
 
 def chosen_segments(
-    task: Task, description: ModelDescription, protocol: str | None, subset: str | None
+    task: Task,
+    description: ModelDescription,
+    protocol: str | None,
+    subset: str | None,
 ) -> tuple[Segments, str, Task]:
     """Stretches to judge, the part in words, and the task with the channels of that part."""
     own = data_fingerprint(task.dataset) == description.data_fingerprint
     if protocol is None and subset is not None and not own:
-        raise ConfigError(f"subset={subset} needs protocol=..., one of {', '.join(task.dataset.protocols)}")
+        raise ConfigError(
+            f"subset={subset} needs protocol=..., one of {', '.join(task.dataset.protocols)}",
+        )
     if protocol is None and own:
         protocol = description.protocol
     if protocol is None:
         return all_segments(task), "all records", task
     subset = subset or "test"
     note = " (the data set it was trained on)" if own else ""
-    return subset_segments(task, protocol, subset), f"{subset} part of {protocol}{note}", task.part(protocol, subset)
+    return (
+        subset_segments(task, protocol, subset),
+        f"{subset} part of {protocol}{note}",
+        task.part(protocol, subset),
+    )

@@ -18,7 +18,7 @@ from torch import nn
 
 from diagnose.data.windows import normalised
 from diagnose.networks.registry import input_of
-from diagnose.recordings.raw_windows import raw_examples, with_fixed_pooling
+from diagnose.recordings.raw_windows import RawWindows, raw_examples, with_fixed_pooling
 from diagnose.recordings.stored_network import StoredNetwork
 from gensig.errors import ConfigError, GensigError
 from gensig.version import __version__
@@ -37,7 +37,9 @@ def need_packages() -> None:
         import onnxruntime  # noqa: F401
         import onnxscript  # noqa: F401
     except ImportError as error:
-        raise ConfigError(f"export --to onnx needs the package {error.name}: pip install 'gensig[onnx]'") from None
+        raise ConfigError(
+            f"export --to onnx needs the package {error.name}: pip install 'gensig[onnx]'",
+        ) from None
 
 
 def export_onnx(network: StoredNetwork, file: Path) -> str:
@@ -62,14 +64,15 @@ def export_onnx(network: StoredNetwork, file: Path) -> str:
     windows = raw_examples(network.model, description)
     inputs = {INPUT: windows, **graph.further}
     two = {name: torch.from_numpy(values[:2]) for name, values in inputs.items()}
-    whole = graph.of_raw_windows(with_fixed_pooling(network.model, *two.values())).eval()
+    fixed = with_fixed_pooling(network.model, *two.values())
+    whole = RawWindows(fixed, description.normalise, graph.answer, graph.unit).eval()
     try:
         write_onnx(whole, two, graph.output, file)
         describe_onnx(file, description, graph.facts)
         found = answers_of(file, inputs, graph.output) / graph.unit
         taken = (normalised(windows, description.normalise), *graph.further.values())
         with torch.inference_mode():
-            expected = graph.answer(*map(torch.from_numpy, taken)).numpy().astype(float)
+            expected = graph.answer(network.model, *map(torch.from_numpy, taken)).numpy().astype(float)
         error = np.abs(found - expected) / np.maximum(np.abs(expected), 1.0)
         difference = float(np.max(error))
         if not difference <= TOLERANCE:
@@ -83,7 +86,11 @@ def export_onnx(network: StoredNetwork, file: Path) -> str:
     return graph.agreement.format(difference)
 
 
-def answers_of(file: Path, inputs: Mapping[str, NDArray[np.float32]], output: str) -> NDArray[np.float64]:
+def answers_of(
+    file: Path,
+    inputs: Mapping[str, NDArray[np.float32]],
+    output: str,
+) -> NDArray[np.float64]:
     """What onnxruntime makes of inputs (window, ...), in blocks of two sizes."""
     import onnxruntime
 
@@ -94,20 +101,30 @@ def answers_of(file: Path, inputs: Mapping[str, NDArray[np.float32]], output: st
     return np.concatenate([session.run([output], block)[0] for block in blocks]).astype(float)
 
 
-def write_onnx(whole: nn.Module, inputs: Mapping[str, torch.Tensor], output: str, file: Path) -> None:
+def write_onnx(
+    whole: nn.Module,
+    inputs: Mapping[str, torch.Tensor],
+    output: str,
+    file: Path,
+) -> None:
     """Write a network whose inputs (window, ...) have these names.
 
     Raises
     ------
     GensigError    for a network that cannot be written
     """
+    shapes = ({0: torch.export.Dim("window", min=1)},) * len(inputs)
     said = io.StringIO()
     loggers = [logging.getLogger(name) for name in ("torch.onnx", "onnxscript", "onnx_ir")]
     before = [logger.level for logger in loggers]
     try:
         for logger in loggers:
             logger.setLevel(logging.ERROR)
-        with warnings.catch_warnings(), contextlib.redirect_stdout(said), contextlib.redirect_stderr(said):
+        with (
+            warnings.catch_warnings(),
+            contextlib.redirect_stdout(said),
+            contextlib.redirect_stderr(said),
+        ):
             warnings.simplefilter("ignore")
             torch.onnx.export(
                 whole,
@@ -115,7 +132,7 @@ def write_onnx(whole: nn.Module, inputs: Mapping[str, torch.Tensor], output: str
                 str(file),
                 input_names=list(inputs),
                 output_names=[output],
-                dynamic_shapes={name: {0: torch.export.Dim("window", min=1)} for name in inputs},
+                dynamic_shapes=(shapes,),
                 dynamo=True,
                 external_data=False,
                 verbose=False,
@@ -150,6 +167,9 @@ def describe_onnx(file: Path, description: ModelDescription, answers: Mapping[st
     content = onnx.load(file)
     del content.metadata_props[:]
     for key, value in facts.items():
-        content.metadata_props.add(key=key, value=value if isinstance(value, str) else json.dumps(value))
+        content.metadata_props.add(
+            key=key,
+            value=value if isinstance(value, str) else json.dumps(value),
+        )
     onnx.checker.check_model(content)
     onnx.save(content, file)

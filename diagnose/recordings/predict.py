@@ -90,7 +90,10 @@ def predict_recording(
 
 
 def reasons_unlike(
-    description: ModelDescription, source: Source, tracked: Tracked | None, beyond: NDArray[np.bool_] | None
+    description: ModelDescription,
+    source: Source,
+    tracked: Tracked | None,
+    beyond: NDArray[np.bool_] | None,
 ) -> list[str]:
     """Reasons why a recording is out of distribution; empty if it is not."""
     reasons = []
@@ -106,7 +109,9 @@ def reasons_unlike(
         ]
         if outside:
             hint = in_hertz(outside[-1]) if low <= 60.0 * outside[-1] <= high else ""
-            reasons.append(f"{outside[-1]:g} r/min is outside the {low:.0f} to {high:.0f} r/min of the training{hint}")
+            reasons.append(
+                f"{outside[-1]:g} r/min is outside the {low:.0f} to {high:.0f} r/min of the training{hint}",
+            )
     if source.teeth is not None and description.n_teeth is not None and source.teeth != description.n_teeth:
         given, known = ("/".join(map(str, teeth)) for teeth in (source.teeth, description.n_teeth))
         reasons.append(f"the gears have {given} teeth, those of the training {known}")

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import copy
+from collections.abc import Callable
 from typing import TYPE_CHECKING
 
 import numpy as np
@@ -16,6 +17,33 @@ if TYPE_CHECKING:
     from diagnose.training.store import ModelDescription
 
 N_CHECKED = 6
+
+
+class RawWindows(nn.Module):
+    """A network behind the normalisation of its windows, as one graph.
+
+    Parameters
+    ----------
+    model : of normalised windows
+    normalise : as in `diagnose.data.windows.Task`
+    answer, unit : of `diagnose.recordings.stored_network.Graph`
+    """
+
+    def __init__(
+        self,
+        model: nn.Module,
+        normalise: str,
+        answer: Callable[..., torch.Tensor],
+        unit: float,
+    ) -> None:
+        super().__init__()
+        self.model, self.normalise, self.answer, self.unit = model, normalise, answer, unit
+
+    def forward(self, *inputs: torch.Tensor) -> torch.Tensor:
+        """Answer in its unit for (window, channel, sample) in m/s^2 and further inputs."""
+        acceleration, *further = inputs
+        windows = without_level(acceleration, self.normalise)
+        return self.unit * self.answer(self.model, windows, *further)
 
 
 def without_level(acceleration: torch.Tensor, normalise: str) -> torch.Tensor:
@@ -76,12 +104,18 @@ def with_fixed_pooling(model: nn.Module, *inputs: torch.Tensor) -> nn.Module:
         with torch.inference_mode():
             fixed(*inputs)
     except RuntimeError:
-        raise GensigError("this network does not take windows of acceleration; it cannot be written as ONNX") from None
+        raise GensigError(
+            "this network does not take windows of acceleration; it cannot be written as ONNX",
+        ) from None
     for hook in hooks:
         hook.remove()
     for name, module in pools.items():
         n_parts = module.output_size if isinstance(module.output_size, int) else module.output_size[0]
         parent, _, last = name.rpartition(".")
-        parts = EqualParts(lengths[module], int(n_parts), maximum=isinstance(module, nn.AdaptiveMaxPool1d))
+        parts = EqualParts(
+            lengths[module],
+            int(n_parts),
+            maximum=isinstance(module, nn.AdaptiveMaxPool1d),
+        )
         setattr(fixed.get_submodule(parent), last, parts)
     return fixed

@@ -71,13 +71,19 @@ class Source:
         if self.speed_rpm is not None and not 0.0 < self.speed_rpm < 1e6:
             raise ConfigError(f"--speed-rpm {self.speed_rpm:g} must be positive")
         if self.teeth is not None and not all(4 <= n_teeth <= 1000 for n_teeth in self.teeth):
-            raise ConfigError(f"--teeth {self.teeth[0]} {self.teeth[1]}: a gear has 4 to 1000 teeth")
+            raise ConfigError(
+                f"--teeth {self.teeth[0]} {self.teeth[1]}: a gear has 4 to 1000 teeth",
+            )
         if self.pulses_per_turn < 1:
             raise ConfigError(f"--pulses-per-turn {self.pulses_per_turn} must be at least 1")
         if self.to_speed_rpm is not None and not self.is_tracked:
-            raise ConfigError("--to-speed needs order tracking: give --tacho, or --teeth and --speed-rpm")
+            raise ConfigError(
+                "--to-speed needs order tracking: give --tacho, or --teeth and --speed-rpm",
+            )
         if Path(self.file).expanduser().is_dir():
-            raise ConfigError(f"{self.file} is a folder, not a recording; for a data set use diagnose evaluate")
+            raise ConfigError(
+                f"{self.file} is a folder, not a recording; for a data set use diagnose evaluate",
+            )
 
     @property
     def is_tracked(self) -> bool:
@@ -170,9 +176,21 @@ def _tracked(recording: Recording, tacho: NDArray[np.floating] | None, source: S
     if tacho is None or source.tacho is None:
         assert source.teeth is not None
         assert source.speed_rpm is not None
-        return track_by_mesh(recording, Teeth(driving=source.teeth[0], driven=source.teeth[1]), source.speed_rpm)
-    tracked = track_by_tacho(recording, tacho, source.tacho, pulses_per_turn=source.pulses_per_turn)
-    low, high = (1 - SPEED_TOLERANCE) * tracked.speed_range_rpm[0], (1 + SPEED_TOLERANCE) * tracked.speed_range_rpm[1]
+        return track_by_mesh(
+            recording,
+            Teeth(driving=source.teeth[0], driven=source.teeth[1]),
+            source.speed_rpm,
+        )
+    tracked = track_by_tacho(
+        recording,
+        tacho,
+        source.tacho,
+        pulses_per_turn=source.pulses_per_turn,
+    )
+    low, high = (
+        (1 - SPEED_TOLERANCE) * tracked.speed_range_rpm[0],
+        (1 + SPEED_TOLERANCE) * tracked.speed_range_rpm[1],
+    )
     if source.speed_rpm is not None and not low <= source.speed_rpm <= high:
         raise ConfigError(
             f"--tacho {source.tacho} gives {tracked.speed_rpm:.5g} r/min, --speed-rpm says {source.speed_rpm:g}; check "
@@ -181,13 +199,23 @@ def _tracked(recording: Recording, tacho: NDArray[np.floating] | None, source: S
     return tracked
 
 
-def _read(description: ModelDescription, source: Source) -> tuple[Recording, tuple[str, ...], NDArray[Any] | None]:
+def _read(
+    description: ModelDescription,
+    source: Source,
+) -> tuple[Recording, tuple[str, ...], NDArray[Any] | None]:
     """Recording with the network's channels in their order, what the file calls them, and the tachometer's."""
-    content = read_file(source.file, rate=source.sampling_rate, array=source.array, rate_option=RATE_OPTION)
+    content = read_file(
+        source.file,
+        rate=source.sampling_rate,
+        array=source.array,
+        rate_option=RATE_OPTION,
+    )
     tacho = None
     if source.tacho is not None:
         if source.tacho not in content.channels:
-            raise ConfigError(f"{content.file}: no channel {source.tacho}; it has {', '.join(content.channels)}")
+            raise ConfigError(
+                f"{content.file}: no channel {source.tacho}; it has {', '.join(content.channels)}",
+            )
         place = content.channels.index(source.tacho)
         tacho = content.values[place]
         names = tuple(name for name in content.channels if name != source.tacho)
@@ -196,15 +224,25 @@ def _read(description: ModelDescription, source: Source) -> tuple[Recording, tup
         content = replace(content, channels=names, values=np.delete(content.values, place, axis=0))
     chosen = _channels(content, description.channel_names, source.channels)
     needs_level = description.normalise == "none"
-    return recording_of(content, unit=source.unit, channels=chosen, needs_level=needs_level), chosen, tacho
+    return (
+        recording_of(content, unit=source.unit, channels=chosen, needs_level=needs_level),
+        chosen,
+        tacho,
+    )
 
 
-def _channels(content: RecordingFile, wanted: Sequence[str], given: Sequence[str] | None) -> tuple[str, ...]:
+def _channels(
+    content: RecordingFile,
+    wanted: Sequence[str],
+    given: Sequence[str] | None,
+) -> tuple[str, ...]:
     """Channels of the file for those of the network: as given, by name, or in order where no name says otherwise."""
     needs = f"the model takes {len(wanted)}, {', '.join(wanted)}"
     if given is not None:
         if len(given) != len(wanted):
-            raise ConfigError(f"--channels names {len(given)} channel(s); {needs}: name as many, in this order")
+            raise ConfigError(
+                f"--channels names {len(given)} channel(s); {needs}: name as many, in this order",
+            )
         return tuple(given)
     by_name = {without_unit(name): name for name in content.channels}
     if all(name in by_name for name in wanted):
@@ -218,7 +256,10 @@ def _channels(content: RecordingFile, wanted: Sequence[str], given: Sequence[str
 
 
 def _in_domain(
-    recording: Recording, tracked: Tracked | None, description: ModelDescription, source: Source
+    recording: Recording,
+    tracked: Tracked | None,
+    description: ModelDescription,
+    source: Source,
 ) -> NDArray[np.float32]:
     """(channel, sample) at the network's rate and one speed; refuses what holds less bandwidth than that."""
     found, rate, file = recording.sampling_rate, description.sampling_rate_hz, source.file
@@ -235,7 +276,9 @@ def _in_domain(
     if description.speed_rpm_range is not None and source.to_speed_rpm is not None:
         low, high = description.speed_rpm_range
         if not low <= played <= high:
-            raise ConfigError(f"--to-speed {played:g} must lie in the {low:.0f} to {high:.0f} r/min of the training")
+            raise ConfigError(
+                f"--to-speed {played:g} must lie in the {low:.0f} to {high:.0f} r/min of the training",
+            )
     as_fast = found * played / speed
     if as_fast < rate * (1 - RATE_TOLERANCE):
         raise ConfigError(

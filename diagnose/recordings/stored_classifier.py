@@ -4,22 +4,18 @@ from __future__ import annotations
 
 from collections.abc import Mapping
 from dataclasses import dataclass
-from functools import partial
 from pathlib import Path
 from typing import TYPE_CHECKING, Any, Self, final
 
 import numpy as np
-import torch
-from torch import nn
 from torch.nn.functional import log_softmax
 
 from diagnose.data.targets import GEARS
 from diagnose.networks.calibration import calibration_scores, probabilities
 from diagnose.networks.network import Network
 from diagnose.networks.registry import input_of
-from diagnose.recordings.raw_windows import without_level
 from diagnose.recordings.source import PreparedRecording, Source, tracking_text
-from diagnose.recordings.stored_network import Answer, Graph, JudgedPart, Scores, StoredNetwork
+from diagnose.recordings.stored_network import Answer, Graph, Scores, StoredNetwork
 from diagnose.recordings.verdict import class_text, score_text, verdict
 from diagnose.scoring.metrics import over_records
 from diagnose.training.classes import predict_windows
@@ -28,19 +24,8 @@ from diagnose.training.store import ModelDescription, data_fingerprint, load_mod
 from gensig.errors import ConfigError, DatasetError
 
 if TYPE_CHECKING:
+    from diagnose.data.windows import Segments, Task
     from gensig.dataset.reader import Dataset
-
-
-class RawWindows(nn.Module):
-    """A classifier behind the normalisation of its windows, as one graph."""
-
-    def __init__(self, model: nn.Module, normalise: str) -> None:
-        super().__init__()
-        self.model, self.normalise = model, normalise
-
-    def forward(self, acceleration: torch.Tensor) -> torch.Tensor:
-        """(window, class) log-probabilities of (window, channel, sample) in m/s^2."""
-        return log_softmax(self.model(without_level(acceleration, self.normalise)), dim=1)
 
 
 @final
@@ -119,12 +104,12 @@ class StoredClassifier(StoredNetwork):
             )
         return known
 
-    def scores(self, part: JudgedPart) -> Scores:
+    def scores(self, task: Task, segments: Segments, part: str) -> Scores:
         """Scores by record with intervals over units, confusion, recall and calibration."""
         from diagnose.studies.study import score_predictions
 
-        description, task = self.description, part.task
-        windows = input_of(description.model).load(part.shown, part.segments)
+        description = self.description
+        windows = input_of(description.model).load(task, segments)
         by_window = predict_windows(self.model, windows)
         record, log_probability = over_records(by_window, windows.record)
         units = np.asarray(task.dataset.column("unit_id"))[record]
@@ -159,8 +144,7 @@ class StoredClassifier(StoredNetwork):
         """Windows in m/s^2 in, log-probabilities out."""
         description = self.description
         return Graph(
-            of_raw_windows=partial(RawWindows, normalise=description.normalise),
-            answer=lambda windows: log_softmax(self.model(windows), dim=1),
+            answer=lambda model, windows: log_softmax(model(windows), dim=1),
             further={},
             output="log_probability",
             unit=1.0,

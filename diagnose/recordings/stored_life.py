@@ -4,19 +4,16 @@ from __future__ import annotations
 
 from collections.abc import Mapping
 from dataclasses import dataclass
-from functools import partial
 from pathlib import Path
 from typing import TYPE_CHECKING, Any, Self, final
 
 import numpy as np
-import torch
 from numpy.typing import NDArray
-from torch import nn
 
 from diagnose.networks.registry import input_of
-from diagnose.recordings.raw_windows import N_CHECKED, without_level
+from diagnose.recordings.raw_windows import N_CHECKED
 from diagnose.recordings.source import SPEED_TOLERANCE, PreparedRecording, Source
-from diagnose.recordings.stored_network import Answer, Graph, JudgedPart, Scores, StoredNetwork
+from diagnose.recordings.stored_network import Answer, Graph, Scores, StoredNetwork
 from diagnose.scoring.life_scores import MEASURES, by_life, interval, life_scores
 from diagnose.training.life_store import AGE, LifeFacts, load_life_model
 from diagnose.training.remaining_life import LifeNetwork, shares_of_records, shares_of_windows
@@ -24,22 +21,11 @@ from diagnose.training.store import ModelDescription
 from gensig.errors import ConfigError, DatasetError
 
 if TYPE_CHECKING:
+    from diagnose.data.windows import Segments, Task
     from gensig.dataset.reader import Dataset
 
 OPTIONS = {"torque_nm": "--torque-nm", AGE: "--life-time-h"}
 UNITS = {"torque_nm": "N m", AGE: "h"}
-
-
-class RawLife(nn.Module):
-    """A network of remaining lives behind the normalisation of its windows, as one graph."""
-
-    def __init__(self, model: nn.Module, normalise: str, early_life_h: float) -> None:
-        super().__init__()
-        self.model, self.normalise, self.level = model, normalise, early_life_h
-
-    def forward(self, acceleration: torch.Tensor, told: torch.Tensor) -> torch.Tensor:
-        """(window,) h, not cut, of (window, channel, sample) in m/s^2 and (window, column)."""
-        return self.level * self.model(without_level(acceleration, self.normalise), told)
 
 
 @final
@@ -134,7 +120,7 @@ class StoredLife(StoredNetwork):
             )
         return classes
 
-    def scores(self, part: JudgedPart) -> Scores:
+    def scores(self, task: Task, segments: Segments, part: str) -> Scores:
         """Scores by life, with the level and the intervals of the training."""
         from diagnose.data.lives import kept_segments, lives_of
         from diagnose.studies.life_jobs import LifePrediction
@@ -146,19 +132,19 @@ class StoredLife(StoredNetwork):
         )
         from diagnose.studies.study import BOOTSTRAP_SEED
 
-        facts, dataset = self.facts, part.task.dataset
-        lives = lives_of(part.task)
+        facts, dataset = self.facts, task.dataset
+        lives = lives_of(task)
         if missing := [name for name in facts.told if name not in dataset.column_names]:
             raise DatasetError(
-                f"{dataset.folder} does not fit the model, which is told {missing[0]}: it has no such column"
+                f"{dataset.folder} does not fit the model, which is told {missing[0]}: it has no such column",
             )
-        segments = kept_segments(part.segments, lives.name != "")
+        segments = kept_segments(segments, lives.name != "")
         if not lives.failed[segments.record].any():
             raise ConfigError(
-                f"{dataset.folder}, {part.text}: no life failed, so that there is nothing to score",
+                f"{dataset.folder}, {part}: no life failed, so that there is nothing to score",
             )
         columns = [np.asarray(dataset.column(name), dtype=float) for name in facts.told]
-        windows = input_of(self.description.model).load(part.shown, segments)
+        windows = input_of(self.description.model).load(task, segments)
         record, share = shares_of_records(self.model, windows, np.stack(columns, axis=1))
         prediction = LifePrediction(
             protocol=self.description.protocol,
@@ -168,7 +154,7 @@ class StoredLife(StoredNetwork):
             said=facts.early_life_h * share,
             half_width=facts.half_width_h,
             early_life=facts.early_life_h,
-            detail=part.text,
+            detail=part,
         )
         by_measure = by_life(scored_snapshots(lives, prediction))
         table = {name: row[None] for name, row in by_measure.items()}
@@ -177,7 +163,7 @@ class StoredLife(StoredNetwork):
         def write(folder: Path, result: dict[str, Any]) -> None:
             from diagnose.report.life_report import life_figure
 
-            write_life_predictions(folder / "predictions.csv", part.task, lives, [prediction])
+            write_life_predictions(folder / "predictions.csv", task, lives, [prediction])
             life_figure(folder / "remaining_life.png", lives, [prediction])
 
         return Scores(
@@ -218,12 +204,7 @@ class StoredLife(StoredNetwork):
         """Windows in m/s^2 and the columns beside them in, hours out."""
         facts = self.facts
         return Graph(
-            of_raw_windows=partial(
-                RawLife,
-                normalise=self.description.normalise,
-                early_life_h=facts.early_life_h,
-            ),
-            answer=self.model,
+            answer=lambda model, windows, told: model(windows, told),
             further={"told": _condition_examples(facts)},
             output="remaining_life_h",
             unit=facts.early_life_h,

@@ -42,24 +42,6 @@ class Answer:
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
-class JudgedPart:
-    """Part of a data set that a network is judged on.
-
-    Attributes
-    ----------
-    task : of the whole data set
-    shown : the task with the channels of this part
-    segments : stretches of the part
-    text : the part in words
-    """
-
-    task: Task
-    shown: Task
-    segments: Segments
-    text: str
-
-
-@dataclass(frozen=True, slots=True, kw_only=True)
 class Scores:
     """Scores of a network, as parts of ``metrics.json`` of an evaluation.
 
@@ -83,17 +65,15 @@ class Graph:
 
     Attributes
     ----------
-    of_raw_windows : makes the graph of a network
-    answer : torch's answer for normalised windows and further inputs
+    answer : answer of a network for normalised windows and further inputs
     further : name -> (window, ...) examples of inputs beside the windows
     output : name of the output
-    unit : of ``answer`` in the output
+    unit : that the answer is multiplied by in the graph
     unit_text : the same in words
     agreement : of the file with torch, in words with a place for the difference
     facts : metadata of the file
     """
 
-    of_raw_windows: Callable[[nn.Module], nn.Module]
     answer: Callable[..., torch.Tensor]
     further: Mapping[str, NDArray[np.float32]]
     output: str
@@ -152,8 +132,8 @@ class StoredNetwork(ABC):
         """
 
     @abstractmethod
-    def scores(self, part: JudgedPart) -> Scores:
-        """Scores on a part of a data set."""
+    def scores(self, task: Task, segments: Segments, part: str) -> Scores:
+        """Scores on stretches of a data set, the ``part`` in words."""
 
     @abstractmethod
     def lines(self, result: Mapping[str, Any]) -> list[str]:

@@ -162,7 +162,7 @@ def _run_training(
         detail=training.detail,
         validation=Rows(record=held_out, log_probability=held_out_scores),
         windows=Rows(record=test.record, log_probability=by_window),
-        weights={key: value.numpy() for key, value in training.model.state_dict().items()} if is_model else None,
+        weights=training.weights() if is_model else None,
         domain=domain,
         healthy=None if shuffled else healthy_statistics(training.model, train, task.class_names),
         best_epoch=training.best_epoch,

@@ -35,8 +35,8 @@ from diagnose.scoring.life_scores import conformal_half_width
 from diagnose.settings import TrainSettings
 from diagnose.studies.jobs import Job
 from diagnose.training.life_store import AGE, LifeFacts
-from diagnose.training.remaining_life import LifeNetwork, RemainingLife, shares_of_records
-from diagnose.training.train import Training, train_network
+from diagnose.training.remaining_life import RemainingLife, shares_of_records
+from diagnose.training.train import train_network
 
 FloatArray = NDArray[np.floating]
 IntArray = NDArray[np.integer]
@@ -79,35 +79,44 @@ class LifeSets:
 
     Attributes
     ----------
+    protocol : name of the split
     lives : of the data set
     parts : subset -> stretches; in training and validation those of known remaining life
     level : h, at which the remaining life is cut
     share : (record,) remaining life as a share of the level, of all records
+    calibration : validation records of lives that failed
+    coverage : of the intervals
     """
 
+    protocol: str
     lives: Lives
     parts: Mapping[str, Segments]
     level: float
     share: FloatArray
+    calibration: IntArray
+    coverage: float
 
-    def weight(self) -> FloatArray:
-        """(record,) weights by which every life of a subset counts the same; 0 in the test."""
-        weight = np.zeros(self.share.size)
-        for subset in ("train", "validation"):
-            record = self.parts[subset].record
-            weight[record] = balanced_weights(self.lives.name[record])
-        return weight
-
-    def calibration_records(self) -> IntArray:
-        """Validation records of lives that failed."""
-        record = self.parts["validation"].record
-        return record[self.lives.failed[record]]
-
-    def half_width(self, share: FloatArray, coverage: float) -> float:
-        """Half width in h of the intervals about shares of all records, at most the level."""
-        record = self.calibration_records()
-        error = self.level * np.abs(share[record] - self.share[record])
-        return min(conformal_half_width(error, self.lives.name[record], coverage), self.level)
+    def prediction(
+        self,
+        method: str,
+        detail: str,
+        share: FloatArray,
+        seed: int = 0,
+    ) -> LifePrediction:
+        """Test snapshots with a method's shares of the level, (record,), of all records."""
+        error = self.level * np.abs(share - self.share)[self.calibration]
+        life = self.lives.name[self.calibration]
+        record = np.sort(self.parts["test"].record)
+        return LifePrediction(
+            protocol=self.protocol,
+            method=method,
+            seed=seed,
+            record=record,
+            said=self.level * share[record],
+            half_width=min(conformal_half_width(error, life, self.coverage), self.level),
+            early_life=self.level,
+            detail=detail,
+        )
 
 
 def life_sets(task: Task, settings: TrainSettings, protocol: str) -> LifeSets:
@@ -123,89 +132,32 @@ def life_sets(task: Task, settings: TrainSettings, protocol: str) -> LifeSets:
     known = lives.known(level)
     for subset in ("train", "validation"):
         parts[subset] = kept_segments(parts[subset], known)
-    share = np.minimum(lives.remaining, level) / level
-    return LifeSets(lives=lives, parts=parts, level=level, share=share)
+    held_out = parts["validation"].record
+    return LifeSets(
+        protocol=protocol,
+        lives=lives,
+        parts=parts,
+        level=level,
+        share=np.minimum(lives.remaining, level) / level,
+        calibration=held_out[lives.failed[held_out]],
+        coverage=settings.remaining_life.coverage,
+    )
 
 
 def run_life_job(task: Task, settings: TrainSettings, job: Job) -> list[LifePrediction]:
-    """Predictions on the test part of a protocol: of the baselines, or with a seed those of the network."""
-    (protocol,), seed = job.protocols, job.seed or 0
-    sets = life_sets(task, settings, protocol)
+    """Predictions on the test part of a protocol, of the baselines or, with a seed, of networks."""
+    sets = life_sets(task, settings, job.protocols[0])
     if job.seed is None:
-        answers = _baselines(task, settings, sets)
-    else:
-        answers = _networks(task, settings, sets, seed)
-    record = np.sort(sets.parts["test"].record)
-    coverage = settings.remaining_life.coverage
-    predictions = []
-    for answer in answers:
-        prediction = LifePrediction(
-            protocol=protocol,
-            method=answer.method,
-            seed=seed,
-            record=record,
-            said=sets.level * answer.share[record],
-            half_width=sets.half_width(answer.share, coverage),
-            early_life=sets.level,
-            detail=answer.detail,
-        )
-        if answer.network is not None:
-            prediction = _with_network(prediction, answer.network, sets, coverage)
-        predictions.append(prediction)
-    return predictions
+        return _baselines(task, settings, sets)
+    return _networks(task, settings, sets, job.seed)
 
 
-@dataclass(frozen=True, slots=True, kw_only=True)
-class _Network:
-    """A training, its domain, and the range of each column beside the signal."""
-
-    training: Training[LifeNetwork]
-    domain: Domain
-    told_range: dict[str, tuple[float, float]]
-
-
-@dataclass(frozen=True, slots=True, kw_only=True)
-class _Answer:
-    """Shares of the level of one method, (record,), NaN in the training part."""
-
-    method: str
-    detail: str
-    share: FloatArray
-    network: _Network | None = None
-
-
-def _with_network(
-    prediction: LifePrediction,
-    network: _Network,
-    sets: LifeSets,
-    coverage: float,
-) -> LifePrediction:
-    """The prediction with all that goes on disk."""
-    facts = LifeFacts(
-        method=prediction.method,
-        early_life_h=prediction.early_life,
-        half_width_h=prediction.half_width,
-        coverage=coverage,
-        n_calibration_lives=int(np.unique(sets.lives.name[sets.calibration_records()]).size),
-        told=tuple(network.told_range),
-        told_range=network.told_range,
-    )
-    weights = network.training.model.state_dict()
-    return replace(
-        prediction,
-        facts=facts,
-        weights={name: value.numpy() for name, value in weights.items()},
-        domain=network.domain,
-        best_epoch=network.training.best_epoch,
-    )
-
-
-def _baselines(task: Task, settings: TrainSettings, sets: LifeSets) -> list[_Answer]:
+def _baselines(task: Task, settings: TrainSettings, sets: LifeSets) -> list[LifePrediction]:
     lives, parts, share = sets.lives, sets.parts, sets.share
     train = parts["train"].record
     usual = constant_regression(share[train], lives.name[train])
     detail = f"{usual:.2f} of the early level for all"
-    found = [_Answer(method=CONSTANT, detail=detail, share=np.full(share.size, usual))]
+    predictions = [sets.prediction(CONSTANT, detail, np.full(share.size, usual))]
     cache: Cache = {}
     clock = {name: age_table(lives, part) for name, part in parts.items()}
     heard = {
@@ -214,29 +166,38 @@ def _baselines(task: Task, settings: TrainSettings, sets: LifeSets) -> list[_Ans
     }
     tables: dict[str, dict[str, Table]] = {AGE_ONLY: clock, INDICATORS: heard}
     if settings.remaining_life.with_age:
-        tables[INDICATORS + AND_AGE] = {name: with_age(table, lives) for name, table in heard.items()}
+        aged = {name: with_age(table, lives) for name, table in heard.items()}
+        tables[INDICATORS + AND_AGE] = aged
     for method, table in tables.items():
         detail, predict = fit_regression(table["train"], table["validation"], lives, share)
-        said = np.full(share.size, np.nan)
+        answer = np.full(share.size, np.nan)
         for part in ("validation", "test"):
-            said[table[part].record] = np.clip(predict(table[part]), 0.0, 1.0)
-        found.append(_Answer(method=method, detail=detail, share=said))
-    return found
+            answer[table[part].record] = np.clip(predict(table[part]), 0.0, 1.0)
+        predictions.append(sets.prediction(method, detail, answer))
+    return predictions
 
 
-def _networks(task: Task, settings: TrainSettings, sets: LifeSets, seed: int) -> list[_Answer]:
-    load = input_of(settings.model).load
+def _networks(
+    task: Task,
+    settings: TrainSettings,
+    sets: LifeSets,
+    seed: int,
+) -> list[LifePrediction]:
+    load, lives = input_of(settings.model).load, sets.lives
     windows = {name: load(task, part, training=name == "train") for name, part in sets.parts.items()}
-    name = str(settings.model.get("name", "network"))
     columns, values = operating_names(task), operating_values(task, np.arange(sets.share.size))
-    conditions = {name: (columns, values)}
+    network = str(settings.model.get("name", "network"))
+    conditions = {network: (columns, values)}
     if settings.remaining_life.with_age:
-        aged = np.concatenate([values, sets.lives.age[:, None]], axis=1)
-        conditions[name + AND_AGE] = ((*columns, AGE), aged)
+        aged = np.concatenate([values, lives.age[:, None]], axis=1)
+        conditions[network + AND_AGE] = ((*columns, AGE), aged)
+    weight = np.zeros(sets.share.size)
+    for subset in ("train", "validation"):
+        record = sets.parts[subset].record
+        weight[record] = balanced_weights(lives.name[record])
     domain = fit_domain(windows["train"], windows["validation"])
-    weight = sets.weight()
     seen = np.unique(windows["train"].record)
-    found = []
+    predictions = []
     for method, (columns, values) in conditions.items():
         target = RemainingLife(conditions=values, share=sets.share, weight=weight)
         training = train_network(
@@ -246,12 +207,37 @@ def _networks(task: Task, settings: TrainSettings, sets: LifeSets, seed: int) ->
             settings=settings,
             seed=seed,
         )
-        said = np.full(sets.share.size, np.nan)
-        for part in ("validation", "test"):
-            record, share = shares_of_records(training.model, windows[part], values)
-            said[record] = share
-        low, high = values[seen].min(axis=0).tolist(), values[seen].max(axis=0).tolist()
-        ranges = dict(zip(columns, zip(low, high, strict=True), strict=True))
-        network = _Network(training=training, domain=domain, told_range=ranges)
-        found.append(_Answer(method=method, detail=training.detail, share=said, network=network))
-    return found
+        answer = np.full(sets.share.size, np.nan)
+        for subset in ("validation", "test"):
+            record, share = shares_of_records(training.model, windows[subset], values)
+            answer[record] = share
+        prediction = sets.prediction(method, training.detail, answer, seed)
+        predictions.append(
+            replace(
+                prediction,
+                facts=_facts(sets, prediction, columns, values[seen]),
+                weights=training.weights(),
+                domain=domain,
+                best_epoch=training.best_epoch,
+            )
+        )
+    return predictions
+
+
+def _facts(
+    sets: LifeSets,
+    prediction: LifePrediction,
+    columns: tuple[str, ...],
+    values: FloatArray,
+) -> LifeFacts:
+    """Facts of a network whose training records have these values (record, column)."""
+    low, high = values.min(axis=0).tolist(), values.max(axis=0).tolist()
+    return LifeFacts(
+        method=prediction.method,
+        early_life_h=sets.level,
+        half_width_h=prediction.half_width,
+        coverage=sets.coverage,
+        n_calibration_lives=int(np.unique(sets.lives.name[sets.calibration]).size),
+        told=columns,
+        told_range=dict(zip(columns, zip(low, high, strict=True), strict=True)),
+    )

@@ -5,7 +5,7 @@ from __future__ import annotations
 import csv
 import time
 from collections.abc import Callable, Sequence
-from dataclasses import asdict, replace
+from dataclasses import asdict, dataclass, replace
 from pathlib import Path
 from typing import Any
 
@@ -19,7 +19,6 @@ from diagnose.data.lives import (
     lives_of,
 )
 from diagnose.data.windows import SUBSETS, Task
-from diagnose.networks.registry import build_model, check_window, input_of
 from diagnose.scoring.life_scores import (
     UNITS,
     Snapshots,
@@ -32,9 +31,14 @@ from diagnose.scoring.life_scores import (
 from diagnose.settings import BOTH, TrainSettings
 from diagnose.studies.jobs import Job, run_jobs
 from diagnose.studies.life_jobs import AGE_ONLY, LifePrediction, run_life_job
-from diagnose.studies.study import BOOTSTRAP_SEED, METRICS_SCHEMA_VERSION, environment, n_cores
+from diagnose.studies.study import (
+    BOOTSTRAP_SEED,
+    METRICS_SCHEMA_VERSION,
+    check_network,
+    environment,
+    n_cores,
+)
 from diagnose.training.store import data_fingerprint, model_description, save_model
-from diagnose.training.train import device_of
 from gensig.errors import ConfigError
 
 FloatArray = NDArray[np.floating]
@@ -63,43 +67,51 @@ def check_life_settings(settings: TrainSettings) -> None:
         )
 
 
-def plan_life_study(
-    task: Task,
-    settings: TrainSettings,
-) -> tuple[tuple[str, ...], dict[str, str], list[Job]]:
-    """Protocols, why others wanted are left out, and the jobs, after checking that every subset can be used.
+@dataclass(frozen=True, slots=True, kw_only=True)
+class LifePlan:
+    """Protocols of a study, why others are left out, and the jobs."""
+
+    protocols: tuple[str, ...]
+    left_out: dict[str, str]
+    jobs: list[Job]
+
+
+def plan_life_study(task: Task, settings: TrainSettings) -> LifePlan:
+    """Plan of a study, after checking that every subset can be used.
 
     Raises
     ------
-    ConfigError    as `diagnose.data.lives.choose_life_protocols`, and for a window or a device that cannot be used
+    ConfigError    as `diagnose.data.lives.choose_life_protocols`, and for a window or a device
+        that cannot be used
     DatasetError    for a data set without lives
     """
     lives = lives_of(task)
     protocols, left_out = choose_life_protocols(task, lives, settings.protocols)
-    model = build_model(settings.model, n_channels=len(task.channel_names), n_classes=2)
-    inputs = input_of(settings.model)
-    for protocol in protocols:
-        for subset in SUBSETS:
-            segments = life_segments(task, lives, protocol, subset)
-            inputs.check(task, segments, str(settings.model.get("name", "network")))
-    check_window(model, len(task.channel_names), inputs.n_points(task.window_samples))
-    device_of(settings.device)
-    jobs = [Job(protocols=(protocol,), seed=seed) for protocol in protocols for seed in (None, *settings.seeds)]
-    return protocols, left_out, jobs
+    check_network(
+        task,
+        settings,
+        [life_segments(task, lives, name, subset) for name in protocols for subset in SUBSETS],
+    )
+    seeds = (None, *settings.seeds)
+    jobs = [Job(protocols=(name,), seed=seed) for name in protocols for seed in seeds]
+    return LifePlan(protocols=protocols, left_out=left_out, jobs=jobs)
 
 
 def run_life_study(
     task: Task,
     settings: TrainSettings,
     folder: Path,
+    plan: LifePlan,
     *,
-    protocols: Sequence[str],
-    left_out: dict[str, str],
-    jobs: Sequence[Job],
     on_done: Callable[[str], None] = lambda line: None,
 ) -> tuple[dict[str, Any], list[LifePrediction]]:
-    """Run the jobs, write ``predictions.csv`` and ``models/<protocol>-<method>-seed<k>`` into `folder`, and return what
-    goes into ``metrics.json``, and the predictions."""
+    """Content of ``metrics.json``, and the predictions.
+
+    Parameters
+    ----------
+    folder : exists; receives ``predictions.csv`` and ``models/<protocol>-<method>-seed<k>``
+    on_done : is given one line for each finished piece
+    """
     started = time.perf_counter()
 
     def report(found: list[LifePrediction]) -> None:
@@ -109,7 +121,7 @@ def run_life_study(
     predictions: list[LifePrediction] = run_jobs(
         task,
         settings,
-        jobs,
+        plan.jobs,
         n_workers=n_workers,
         on_done=report,
         run=run_life_job,
@@ -133,8 +145,8 @@ def run_life_study(
         "channel_names": list(task.channel_names),
         "model": str(settings.model.get("name", "network")),
         "settings": {**asdict(settings), "model": dict(settings.model)},
-        "protocols": {name: _result(task, settings, lives, name, predictions) for name in protocols},
-        "protocols_left_out": left_out,
+        "protocols": {name: _result(task, settings, lives, name, predictions) for name in plan.protocols},
+        "protocols_left_out": plan.left_out,
         "duration_s": round(time.perf_counter() - started, 1),
         "environment": environment(),
     }

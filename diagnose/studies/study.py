@@ -21,6 +21,7 @@ from diagnose.data.window_choice import chosen_window
 from diagnose.data.windows import (
     NORMALISATIONS,
     SUBSETS,
+    Segments,
     Task,
     check_names,
     subset_segments,
@@ -77,12 +78,11 @@ def plan_study(task: Task, settings: TrainSettings) -> tuple[tuple[str, ...], li
     wanted, _ = choose_protocols(task, settings.protocols)
     protocols = tuple(sorted(wanted, key=lambda name: (is_leaky(name), wanted.index(name))))
     labels = task.labels()
-    model = build_model(settings.model, n_channels=len(task.channel_names), n_classes=len(task.class_names))
-    inputs = input_of(settings.model)
+    parts: list[Segments] = []
     for protocol in protocols:
         for subset in SUBSETS:
             segments = subset_segments(task, protocol, subset)
-            inputs.check(task, segments, str(settings.model.get("name", "network")))
+            parts.append(segments)
             present = np.unique(labels[segments.record])
             if protocol not in OPEN_PROTOCOLS and subset != "validation" and present.size < 2:
                 name = task.class_names[int(present[0])]
@@ -91,8 +91,7 @@ def plan_study(task: Task, settings: TrainSettings) -> tuple[tuple[str, ...], li
             check_open_protocol(task, protocol)
     if "healthy_only" in protocols:
         check_window_for_autoencoder(task.window_samples)
-    check_window(model, len(task.channel_names), inputs.n_points(task.window_samples))
-    device_of(settings.device)
+    check_network(task, settings, parts)
     if settings.tensorboard:
         need_tensorboard()
     closed = tuple(name for name in protocols if name not in OPEN_PROTOCOLS)
@@ -104,6 +103,22 @@ def plan_study(task: Task, settings: TrainSettings) -> tuple[tuple[str, ...], li
             first = min(settings.seeds)
             jobs += [Job(protocols=(protocol,), seed=first + k, shuffled=True) for k in range(settings.n_seeds_control)]
     return protocols, jobs + control_jobs(task, settings, [name for name in closed if not is_leaky(name)])
+
+
+def check_network(task: Task, settings: TrainSettings, parts: Sequence[Segments]) -> None:
+    """Refuse a network or a device that cannot be trained on every one of these parts.
+
+    Raises
+    ------
+    ConfigError    for parameters, stretches or windows that do not fit, and a missing device
+    """
+    n_channels = len(task.channel_names)
+    model = build_model(settings.model, n_channels=n_channels, n_classes=len(task.class_names))
+    inputs, name = input_of(settings.model), str(settings.model.get("name", "network"))
+    for segments in parts:
+        inputs.check(task, segments, name)
+    check_window(model, n_channels, inputs.n_points(task.window_samples))
+    device_of(settings.device)
 
 
 def task_from(dataset: Any, settings: TrainSettings) -> Task:

@@ -79,7 +79,9 @@ class Classes(LearningTarget[Network]):
 
     def record_loss(self, answers: FloatArray, windows: WindowSet) -> float:
         """Cross-entropy of record predictions, each class present counting the same."""
-        return record_loss(answers, windows)
+        by_record, label = _over_labelled_records(answers, windows)
+        losses = -by_record[np.arange(label.size), label]
+        return float(np.mean([losses[label == present].mean() for present in np.unique(label)]))
 
     def temperature(self, answers: FloatArray, windows: WindowSet) -> float:
         """Temperature with the least cross-entropy over the records."""
@@ -101,13 +103,6 @@ def _log_probabilities(model: nn.Module, signals: torch.Tensor) -> FloatArray:
     with torch.inference_mode():
         blocks = [log_softmax(model(block.to(device)), dim=1) for block in signals.split(CACHED)]
     return torch.cat(blocks).cpu().numpy().astype(float)
-
-
-def record_loss(log_probability: FloatArray, windows: WindowSet) -> float:
-    """Cross-entropy of record predictions, each class present counting the same."""
-    by_record, label = _over_labelled_records(log_probability, windows)
-    losses = -by_record[np.arange(label.size), label]
-    return float(np.mean([losses[label == present].mean() for present in np.unique(label)]))
 
 
 def _over_labelled_records(

@@ -5,10 +5,11 @@ from __future__ import annotations
 import copy
 from collections.abc import Callable
 from dataclasses import dataclass
-from typing import Generic
+from typing import Any, Generic
 
 import numpy as np
 import torch
+from numpy.typing import NDArray
 
 from diagnose.data.windows import WindowSet, input_scale
 from diagnose.settings import TrainSettings
@@ -34,6 +35,10 @@ class Training(Generic[Model]):
     best_epoch: int
     validation_loss: tuple[float, ...]
     temperature: float
+
+    def weights(self) -> dict[str, NDArray[Any]]:
+        """Name -> array of the best epoch's weights."""
+        return {name: value.numpy() for name, value in self.model.state_dict().items()}
 
     @property
     def detail(self) -> str:

@@ -16,7 +16,7 @@ from diagnose.scoring.metrics import balanced_accuracy, confusion_by_unit
 from diagnose.settings import settings_from
 from diagnose.studies.jobs import Job, run_jobs
 from diagnose.studies.study import plan_study, task_from
-from diagnose.training.classes import Classes, predict_windows, record_loss
+from diagnose.training.classes import Classes, predict_windows
 from diagnose.training.store import load_model, model_description, save_model
 from diagnose.training.train import device_of, train_network
 from gensig.errors import ConfigError, DatasetError
@@ -148,7 +148,10 @@ def test_the_last_epoch_stands_beside_the_best_one(task):
     training = trained(wrong)
     assert training.best_epoch < len(training.validation_loss)
     assert training.last_model is not None
-    losses = [record_loss(predict_windows(model, train), train) for model in (training.model, training.last_model)]
+    losses = [
+        Classes(n_classes=2).record_loss(predict_windows(model, train), train)
+        for model in (training.model, training.last_model)
+    ]
     assert losses[1] < 0.8 * losses[0]
     training = trained(validation)
     assert (training.last_model is None) == (training.best_epoch == len(training.validation_loss))

@@ -96,13 +96,13 @@ def fails(capsys, words, message):
 
 
 def test_a_file_that_answers_otherwise_is_removed(model, tmp_path, capsys, monkeypatch):
-    import diagnose.recordings.stored_classifier
+    import diagnose.recordings.onnx_export
 
-    class Louder(diagnose.recordings.stored_classifier.RawWindows):
-        def forward(self, acceleration):
-            return 1.001 * super().forward(acceleration)
+    class Louder(diagnose.recordings.onnx_export.RawWindows):
+        def forward(self, *inputs):
+            return 1.001 * super().forward(*inputs)
 
-    monkeypatch.setattr(diagnose.recordings.stored_classifier, "RawWindows", Louder)
+    monkeypatch.setattr(diagnose.recordings.onnx_export, "RawWindows", Louder)
     file = tmp_path / "m.onnx"
     fails(capsys, ["--to", "onnx", "--model", model, "--out", str(file)], "answered unlike torch by 0.001")
     assert not file.exists()
