@@ -18,6 +18,7 @@ from gensig.signals.mesh_motion import in_hertz
 
 if TYPE_CHECKING:
     from diagnose.data.tracking import Tracked
+    from diagnose.data.windows import WindowSet
     from diagnose.networks.domain import Domain
     from diagnose.training.store import ModelDescription
 
@@ -49,8 +50,6 @@ def predict_recording(
     ConfigError    for a recording that cannot be read, is too short or too slowly sampled, or
         whose channels do not fit, and for what the network must know of it
     """
-    from diagnose.networks.domain import distances
-
     description = network.description
     network.check(source)
     prepared = prepare_recording(description, source)
@@ -63,10 +62,7 @@ def predict_recording(
     ]
     beyond = None
     if domain is not None:
-        distance = distances(domain, windows)
-        beyond = distance > domain.threshold
-        for row, far, is_beyond in zip(rows, distance, beyond, strict=True):
-            row |= {"distance": float(far), "beyond": bool(is_beyond)}
+        beyond = _with_distances(rows, domain, windows)
     reasons = reasons_unlike(description, source, tracked, beyond) + answer.reasons
     n_teeth = description.n_teeth
     return {
@@ -87,6 +83,21 @@ def predict_recording(
         "trained_n_teeth": None if n_teeth is None else list(n_teeth),
         **answer.training,
     }
+
+
+def _with_distances(
+    rows: list[dict[str, Any]],
+    domain: Domain,
+    windows: WindowSet,
+) -> NDArray[np.bool_]:
+    """(window,) bool of windows beyond the domain; their distances are written into the rows."""
+    from diagnose.networks.domain import distances
+
+    distance = distances(domain, windows)
+    beyond = distance > domain.threshold
+    for row, far, is_beyond in zip(rows, distance, beyond, strict=True):
+        row |= {"distance": float(far), "beyond": bool(is_beyond)}
+    return beyond
 
 
 def reasons_unlike(

@@ -134,10 +134,7 @@ class StoredLife(StoredNetwork):
 
         facts, dataset = self.facts, task.dataset
         lives = lives_of(task)
-        if missing := [name for name in facts.told if name not in dataset.column_names]:
-            raise DatasetError(
-                f"{dataset.folder} does not fit the model, which is told {missing[0]}: it has no such column",
-            )
+        self._check_columns(dataset)
         segments = kept_segments(segments, lives.name != "")
         if not lives.failed[segments.record].any():
             raise ConfigError(
@@ -183,6 +180,14 @@ class StoredLife(StoredNetwork):
             },
             write=write,
         )
+
+    def _check_columns(self, dataset: Dataset) -> None:
+        """Refuse a data set without a column that the network takes beside the signal."""
+        absent = [name for name in self.facts.told if name not in dataset.column_names]
+        if absent:
+            raise DatasetError(
+                f"{dataset.folder} does not fit the model, which is told {absent[0]}: it has no such column"
+            )
 
     def lines(self, result: Mapping[str, Any]) -> list[str]:
         """Part, channels, every measure, and the coverage that was wanted."""

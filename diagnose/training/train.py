@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import copy
-from collections.abc import Callable
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 from typing import Any, Generic
 
@@ -13,7 +13,7 @@ from numpy.typing import NDArray
 
 from diagnose.data.windows import WindowSet, input_scale
 from diagnose.settings import TrainSettings
-from diagnose.training.target import LearningTarget, Model
+from diagnose.training.target import IntArray, LearningTarget, Model
 from gensig.errors import ConfigError, SimulationError
 
 
@@ -81,25 +81,16 @@ def train_network(
         model.to(device)  # weights are drawn on the processor: the same ones on every device
         n_drawn = windows_an_epoch(train, settings.epoch_fraction)
         n_batches = max(n_drawn // settings.batch_size, 1)
-        optimizer, schedule = _optimizer(model, settings, n_batches)
+        descent = _Descent(model, settings, n_batches)
         held_out = torch.from_numpy(validation.cut(np.arange(len(validation))))
         losses: list[float] = []
         best_weights, best_epoch = copy.deepcopy(model.state_dict()), 0
         for epoch in range(1, settings.epochs + 1):
-            model.train()
-            total = 0.0
-            for batch in np.array_split(rng.permutation(len(train))[:n_drawn], n_batches):
-                signals = torch.from_numpy(train.cut(batch, rng)).to(device)
-                optimizer.zero_grad()
-                loss = target.loss(model, signals, train, batch)
-                loss.backward()
-                optimizer.step()
-                schedule.step()
-                total += float(loss.detach())
-            model.eval()
+            batches = np.array_split(rng.permutation(len(train))[:n_drawn], n_batches)
+            training_loss = _epoch(target, model, train, batches, rng, descent)
             answers = target.answers(model, held_out, validation)
             losses.append(target.record_loss(answers, validation))
-            on_epoch(epoch, total / n_batches, losses[-1])
+            on_epoch(epoch, training_loss, losses[-1])
             if np.isfinite(losses[-1]) and losses[-1] <= min(losses):
                 best_weights, best_epoch = copy.deepcopy(model.state_dict()), epoch
                 best_answers = answers
@@ -107,7 +98,9 @@ def train_network(
                 break
     if best_epoch == 0:
         raise SimulationError("the training diverged from its first epoch; reduce learning_rate")
-    last_model = copy.deepcopy(model).cpu().eval() if best_epoch < len(losses) else None
+    last_model = None
+    if best_epoch < len(losses):
+        last_model = copy.deepcopy(model).cpu().eval()
     model.load_state_dict(best_weights)
     return Training(
         model=model.cpu().eval(),
@@ -118,21 +111,46 @@ def train_network(
     )
 
 
-def _optimizer(
-    model: torch.nn.Module,
-    settings: TrainSettings,
-    n_batches: int,
-) -> tuple[torch.optim.Optimizer, torch.optim.lr_scheduler.LRScheduler]:
-    """AdamW, and a learning rate that rises and falls once over all epochs."""
-    rate, decay = settings.learning_rate, settings.weight_decay
-    optimizer = torch.optim.AdamW(model.parameters(), lr=rate, weight_decay=decay)
-    schedule = torch.optim.lr_scheduler.OneCycleLR(
-        optimizer,
-        max_lr=rate,
-        total_steps=settings.epochs * n_batches,
-        pct_start=0.15,
-    )
-    return optimizer, schedule
+class _Descent:
+    """AdamW with a learning rate that rises and falls once over all epochs."""
+
+    def __init__(self, model: torch.nn.Module, settings: TrainSettings, n_batches: int) -> None:
+        rate, decay = settings.learning_rate, settings.weight_decay
+        self.optimizer = torch.optim.AdamW(model.parameters(), lr=rate, weight_decay=decay)
+        self.schedule = torch.optim.lr_scheduler.OneCycleLR(
+            self.optimizer,
+            max_lr=rate,
+            total_steps=settings.epochs * n_batches,
+            pct_start=0.15,
+        )
+
+    def step(self, loss: torch.Tensor) -> None:
+        """Move the weights down the gradient of one batch."""
+        self.optimizer.zero_grad()
+        loss.backward()
+        self.optimizer.step()
+        self.schedule.step()
+
+
+def _epoch(
+    target: LearningTarget[Model],
+    model: Model,
+    train: WindowSet,
+    batches: Sequence[IntArray],
+    rng: np.random.Generator,
+    descent: _Descent,
+) -> float:
+    """Mean loss over the batches of an epoch, each followed by a step."""
+    model.train()
+    device = next(model.parameters()).device
+    total = 0.0
+    for batch in batches:
+        signals = torch.from_numpy(train.cut(batch, rng)).to(device)
+        loss = target.loss(model, signals, train, batch)
+        descent.step(loss)
+        total += float(loss.detach())
+    model.eval()
+    return total / len(batches)
 
 
 def device_of(name: str) -> torch.device:
