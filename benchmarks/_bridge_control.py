@@ -20,8 +20,8 @@ from diagnose.data.windows import Segments, WindowSet, plan_windows
 from diagnose.networks.adaptation import HEALTHY, METHODS, adapt_domain, adapt_network
 from diagnose.networks.domain import distances
 from diagnose.recordings.machine import together
+from diagnose.training.classes import predict_windows
 from diagnose.training.store import ModelDescription, load_domain, load_model, load_statistics
-from diagnose.training.train import predict_windows
 from gensig.cli import main as gensig_main
 from gensig.errors import ConfigError
 from gensig.systems.registry import SIDES

@@ -22,8 +22,8 @@ from diagnose.networks.adaptation import (
     statistics_of,
 )
 from diagnose.scoring.metrics import balanced_accuracy, confusion_by_unit, over_records
+from diagnose.training.classes import predict_windows
 from diagnose.training.store import load_model, load_statistics
-from diagnose.training.train import predict_windows
 from gensig.dataset.reader import Dataset
 
 FloatArray = NDArray[np.floating]

@@ -2,9 +2,8 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping
 from dataclasses import replace
-from typing import TYPE_CHECKING, Any, final
+from typing import TYPE_CHECKING, final
 
 import numpy as np
 from numpy.typing import NDArray
@@ -12,6 +11,7 @@ from numpy.typing import NDArray
 from diagnose.baselines.base import Baseline, Input, MethodText, Parts, Role, Source
 from diagnose.baselines.estimators import ChosenModel, choose_model
 from diagnose.baselines.features import INDICATORS, Cache, FeatureTable, indicators, known_rotation
+from diagnose.data.inputs import NetworkInput
 from diagnose.data.windows import Segments, Task, WindowSet, read_signal
 from diagnose.networks.domain import band_levels
 
@@ -27,17 +27,13 @@ def has_twin(dataset: Dataset) -> bool:
     return TWIN in getattr(dataset, "signal_names", ())
 
 
-def oracle_windows(
-    task: Task, segments: Segments, model_config: Mapping[str, Any], *, training: bool = False
-) -> WindowSet:
+def oracle_windows(task: Task, segments: Segments, inputs: NetworkInput, *, training: bool = False) -> WindowSet:
     """Inputs of a network (2 x channel, sample): the record, then the record less its twin, both by the same divisor.
 
     Under ``normalise=rms`` that is the twin's RMS over the stretch, channel by channel. Record and difference say what
     record and twin say; no kernel has to learn to subtract.
     """
-    from diagnose.data.turns import load_inputs
-
-    windows = load_inputs(task, segments, model_config, training=training, read=_record_and_difference)
+    windows = inputs.load(task, segments, training=training, read=_record_and_difference)
     return replace(windows, normalise="none")
 
 

@@ -49,7 +49,7 @@ def run(words: Sequence[str]) -> int:
     out = Path(arguments.out)
     refuse_existing(out)
     from diagnose.recordings.machine import adapt_model
-    from diagnose.recordings.predict import Source
+    from diagnose.recordings.source import Source
 
     sources = [
         Source(

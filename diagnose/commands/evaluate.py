@@ -49,54 +49,23 @@ def run(words: Sequence[str]) -> int:
     out = Path(values["out"]) if "out" in values else None
     if out is not None:
         refuse_existing(out)
-    from diagnose.recordings.evaluate import evaluate_model, write_evaluation
-    from diagnose.training.store import load_model, read_description
+    from diagnose.recordings.evaluate import evaluate_network
+    from diagnose.recordings.registry import open_network
     from gensig.dataset.reader import open_dataset
 
-    if read_description(values["model_dir"]).remaining_life is not None:
-        _evaluate_life(values, out)
-        return 0
-    model, description = load_model(values["model_dir"])
-    dataset = open_dataset(values["data"])
-    protocol, subset = values.get("protocol"), values.get("subset")
-    channels = _channels(values)
-    result = evaluate_model(model, description, dataset, protocol=protocol, subset=subset, channels=channels)
-    print(f"{result['n_records']} records of {result['n_units']} unit(s): {result['part']}")
-    print(f"channels {', '.join(result['channel_names'])}")
-    for name in ("balanced_accuracy", "macro_f1"):
-        score = result[name]
-        spread = "no 95 % interval: too few machines"
-        if score["low"] is not None:
-            spread = f"95 % interval over units {score['low']:.3f} to {score['high']:.3f}"
-        print(f"{name} {score['mean']:.3f}, {spread}")
-    for name, share in result["recall"].items():
-        print(f"recall {name} {share:.3f}")
-    if out is not None:
-        out.mkdir(parents=True, exist_ok=True)
-        write_evaluation(out, result)
-    return 0
-
-
-def _evaluate_life(values: Mapping[str, str], out: Path | None) -> None:
-    from diagnose.recordings.life_evaluate import evaluate_life, life_lines, write_life_evaluation
-    from diagnose.training.life_store import load_life_model
-    from gensig.dataset.reader import open_dataset
-
-    model, description, facts = load_life_model(values["model_dir"])
-    protocol, subset = values.get("protocol"), values.get("subset")
-    found = evaluate_life(
-        model,
-        description,
-        facts,
+    network = open_network(values["model_dir"])
+    evaluation = evaluate_network(
+        network,
         open_dataset(values["data"]),
-        protocol=protocol,
-        subset=subset,
+        protocol=values.get("protocol"),
+        subset=values.get("subset"),
         channels=_channels(values),
     )
-    print("\n".join(life_lines(found[0])))
+    print("\n".join(network.lines(evaluation.result)))
     if out is not None:
         out.mkdir(parents=True, exist_ok=True)
-        write_life_evaluation(out, *found)
+        evaluation.write(out)
+    return 0
 
 
 def _channels(values: Mapping[str, str]) -> list[str] | None:

@@ -45,26 +45,10 @@ def run(words: Sequence[str]) -> int:
     if not out.parent.is_dir():
         raise DatasetError(f"--out {out}: there is no folder {out.parent}")
     from diagnose.recordings.onnx_export import export_onnx, need_packages
-    from diagnose.training.store import load_model, read_description
+    from diagnose.recordings.registry import open_network
 
     need_packages()
-    if read_description(arguments.model).remaining_life is not None:
-        _export_life(arguments.model, out)
-        return 0
-    model, description = load_model(arguments.model)
-    difference = export_onnx(model, description, out)
+    agreement = export_onnx(open_network(arguments.model), out)
     size = out.stat().st_size / 1e3
-    print(f"{out}: {size:.0f} kB, log-probabilities within {difference:.1g} of torch's on windows of many levels")
+    print(f"{out}: {size:.0f} kB, {agreement} on windows of many levels")
     return 0
-
-
-def _export_life(folder: str, out: Path) -> None:
-    from diagnose.recordings.life_onnx import export_life_onnx
-    from diagnose.training.life_store import load_life_model
-
-    model, description, facts = load_life_model(folder)
-    difference = export_life_onnx(model, description, facts, out)
-    size = out.stat().st_size / 1e3
-    print(
-        f"{out}: {size:.0f} kB, hours within {difference:.1g} of the early level of torch's on windows of many levels"
-    )

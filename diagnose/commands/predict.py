@@ -2,15 +2,10 @@
 
 from __future__ import annotations
 
-from argparse import ArgumentParser, Namespace
-from collections.abc import Callable, Sequence
-from typing import TYPE_CHECKING, Any
+from argparse import ArgumentParser
+from collections.abc import Sequence
 
 from diagnose.commands.parser import Parser, verb_parser
-from gensig.errors import ConfigError
-
-if TYPE_CHECKING:
-    from diagnose.recordings.predict import Source
 
 HELP = """\
 Class probabilities of one recording, or how long the machine still runs, with a flag for what is unlike the training
@@ -62,9 +57,12 @@ def add_arguments(parser: ArgumentParser) -> None:
 
 
 def run(words: Sequence[str]) -> int:
-    """Print class probabilities; the exit status tells of a recording unlike the training data."""
+    """Print the answers; the exit status tells of a recording unlike the training data."""
     arguments = parser().parse_intermixed_args(words)
-    from diagnose.recordings.predict import Source
+    from diagnose.recordings.predict import predict_recording
+    from diagnose.recordings.registry import open_network
+    from diagnose.recordings.source import Source
+    from diagnose.training.store import load_domain
 
     sources = [
         Source(
@@ -79,55 +77,21 @@ def run(words: Sequence[str]) -> int:
             channels=None if arguments.channels is None else tuple(arguments.channels),
             unit=arguments.unit,
             array=arguments.array,
+            torque_nm=arguments.torque_nm,
+            life_time_h=arguments.life_time_h,
         )
         for recording in arguments.recording
     ]
-    answers = _answers(arguments)
+    network = open_network(arguments.model)
+    domain = load_domain(arguments.model, network.description)
     results = []
     for source in sources:
-        result, line = answers(source)
+        result = predict_recording(network, domain, source)
         results.append({"model": arguments.model, **result})
         if not arguments.json:
-            print(line, flush=True)
+            print(network.line(result), flush=True)
     if arguments.json:
         import json
 
         print(json.dumps(results[0] if len(results) == 1 else results, indent=2, allow_nan=False))
     return OUT_OF_DISTRIBUTION if any(result["out_of_distribution"] for result in results) else 0
-
-
-def _answers(arguments: Namespace) -> Callable[[Source], tuple[dict[str, Any], str]]:
-    """What answers for a recording: everything that is said of it, and the line for people."""
-    from diagnose.recordings.predict import predict_recording, summary
-    from diagnose.training.store import load_domain, load_model, read_description
-
-    if read_description(arguments.model).remaining_life is not None:
-        return _life_answers(arguments)
-    for option in ("torque_nm", "life_time_h"):
-        if getattr(arguments, option) is not None:
-            raise ConfigError(f"--{option.replace('_', '-')} is for models of remaining life; leave it out")
-    model, description = load_model(arguments.model)
-    domain = load_domain(arguments.model, description)
-
-    def answer(source: Source) -> tuple[dict[str, Any], str]:
-        result = predict_recording(model, description, domain, source)
-        return result, summary(result)
-
-    return answer
-
-
-def _life_answers(arguments: Namespace) -> Callable[[Source], tuple[dict[str, Any], str]]:
-    """The same of a remaining life."""
-    from diagnose.recordings.life_predict import life_summary, predict_life
-    from diagnose.training.life_store import load_life_model
-    from diagnose.training.store import load_domain
-
-    model, description, facts = load_life_model(arguments.model)
-    domain = load_domain(arguments.model, description)
-    told = {"torque_nm": arguments.torque_nm, "life_time_h": arguments.life_time_h}
-
-    def answer(source: Source) -> tuple[dict[str, Any], str]:
-        result = predict_life(model, description, facts, domain, source, **told)
-        return result, life_summary(result)
-
-    return answer

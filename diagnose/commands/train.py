@@ -4,7 +4,8 @@ from __future__ import annotations
 
 import sys
 from argparse import ArgumentParser
-from collections.abc import Sequence
+from collections.abc import Callable, Mapping, Sequence
+from contextlib import AbstractContextManager
 from pathlib import Path
 from typing import TYPE_CHECKING
 
@@ -13,8 +14,8 @@ from gensig.errors import ConfigError
 from gensig.options.configuration import Configuration
 
 if TYPE_CHECKING:
+    from diagnose.data.windows import Task
     from diagnose.settings import TrainSettings
-    from gensig.dataset.reader import Dataset
 
 HELP = """\
 Train a network and its baselines on splits of a data set and write a report. Default protocols: by_unit,
@@ -45,8 +46,17 @@ def parser() -> Parser:
 def add_arguments(parser: ArgumentParser) -> None:
     """What can be typed behind the verb."""
     parser.add_argument("overrides", nargs="*", metavar="key=value", help="see above")
-    parser.add_argument("-m", "--multirun", action="store_true", help="one run for each combination of values a,b")
-    parser.add_argument("--config-dir", metavar="DIR", help="folder with groups and options of your own")
+    parser.add_argument(
+        "-m",
+        "--multirun",
+        action="store_true",
+        help="one run for each combination of values a,b",
+    )
+    parser.add_argument(
+        "--config-dir",
+        metavar="DIR",
+        help="folder with groups and options of your own",
+    )
 
 
 def run(words: Sequence[str]) -> int:
@@ -81,65 +91,75 @@ def _expand(overrides: Sequence[str], config_dir: str | None) -> list[Configurat
 
 
 def _train_one(config: Configuration) -> None:
+    """Run the study of one configuration."""
     from diagnose.settings import settings_from
 
     settings = settings_from(config)
     out = Path(settings.out)
     refuse_existing(out)
-    if settings.task == "remaining_life":
-        _train_life(settings, out)
-        return
-    from diagnose.data.protocols import choose_protocols
-    from diagnose.progress import progress
-    from diagnose.report.novelty_report import novelty_tables
-    from diagnose.report.page import result_table, without_interval, write_report
-    from diagnose.studies.study import plan_study, run_study, settings_for, task_from
-    from gensig.dataset.reader import open_dataset
-
-    task = task_from(open_dataset(settings.data), settings)
-    _say_window(task.dataset, settings)
-    settings = settings_for(task.dataset, settings)
-    protocols, jobs = plan_study(task, settings)
-    for name, reason in choose_protocols(task, settings.protocols)[1].items():
-        print(f"protocol {name} is left out: {reason}", file=sys.stderr, flush=True)
-    out.mkdir(parents=True, exist_ok=True)
-    with progress(len(jobs)) as on_done:
-        metrics = run_study(task, settings, out, protocols=protocols, jobs=jobs, on_done=on_done)
-    page = write_report(out, metrics)
-    print("\n".join([*result_table(metrics), *novelty_tables(metrics["novelty"]), *without_interval(metrics)]))
+    page, lines = STUDIES[settings.task](settings, out)
+    print("\n".join(lines))
     print(f"report: {page}")
 
 
-def _say_window(dataset: Dataset, settings: TrainSettings) -> None:
-    """One line where the data set asks for another length of windows than usual and nobody gave one."""
-    from diagnose.data.turns import wants_turns
-    from diagnose.data.window_choice import chosen_window
+def _study_classes(settings: TrainSettings, out: Path) -> tuple[Path, list[str]]:
+    """Page and tables of a study that tells classes apart."""
+    from diagnose.data.protocols import choose_protocols
+    from diagnose.report.novelty_report import novelty_tables
+    from diagnose.report.page import result_table, without_interval, write_report
+    from diagnose.studies.study import plan_study, run_study
 
-    why = None if settings.window_samples or wants_turns(settings.model) else chosen_window(dataset)[1]
-    if why:
-        print(why, file=sys.stderr, flush=True)
+    task, settings = _opened(settings)
+    protocols, jobs = plan_study(task, settings)
+    with _started(out, len(jobs), choose_protocols(task, settings.protocols)[1]) as on_done:
+        metrics = run_study(task, settings, out, protocols=protocols, jobs=jobs, on_done=on_done)
+    page = write_report(out, metrics)
+    tables = [*result_table(metrics), *novelty_tables(metrics["novelty"])]
+    return page, tables + without_interval(metrics)
 
 
-def _train_life(settings: TrainSettings, out: Path) -> None:
+def _study_lives(settings: TrainSettings, out: Path) -> tuple[Path, list[str]]:
+    """Page and tables of a study of remaining lives."""
     from diagnose.data.lives import lives_of
-    from diagnose.progress import progress
     from diagnose.report.life_report import life_tables, write_life_report
     from diagnose.studies.life_study import check_life_settings, plan_life_study, run_life_study
-    from diagnose.studies.study import settings_for, task_from
-    from gensig.dataset.reader import open_dataset
 
     check_life_settings(settings)
+    task, settings = _opened(settings)
+    plan = plan_life_study(task, settings)
+    with _started(out, len(plan.jobs), plan.left_out) as on_done:
+        metrics, predictions = run_life_study(task, settings, out, plan, on_done=on_done)
+    page = write_life_report(out, metrics, lives_of(task), predictions)
+    return page, life_tables(metrics)
+
+
+# Task, one of `diagnose.settings.TASKS` -> its study, which writes into a folder.
+STUDIES = {"classes": _study_classes, "remaining_life": _study_lives}
+
+
+def _opened(settings: TrainSettings) -> tuple[Task, TrainSettings]:
+    """Task on the data set, and the settings with what the data set decides.
+
+    A line on stderr says where windows get another length than usual.
+    """
+    from diagnose.studies.study import settings_for, task_from, window_note
+    from gensig.dataset.reader import open_dataset
+
     task = task_from(open_dataset(settings.data), settings)
-    _say_window(task.dataset, settings)
-    settings = settings_for(task.dataset, settings)
-    protocols, left_out, jobs = plan_life_study(task, settings)
+    if note := window_note(task.dataset, settings):
+        print(note, file=sys.stderr, flush=True)
+    return task, settings_for(task.dataset, settings)
+
+
+def _started(
+    out: Path,
+    n_jobs: int,
+    left_out: Mapping[str, str],
+) -> AbstractContextManager[Callable[[str], None]]:
+    """Progress of a study, whose folder now exists and whose missing protocols are named."""
+    from diagnose.progress import progress
+
     for name, reason in left_out.items():
         print(f"protocol {name} is left out: {reason}", file=sys.stderr, flush=True)
     out.mkdir(parents=True, exist_ok=True)
-    with progress(len(jobs)) as on_done:
-        metrics, predictions = run_life_study(
-            task, settings, out, protocols=protocols, left_out=left_out, jobs=jobs, on_done=on_done
-        )
-    page = write_life_report(out, metrics, lives_of(task), predictions)
-    print("\n".join(life_tables(metrics)))
-    print(f"report: {page}")
+    return progress(n_jobs)

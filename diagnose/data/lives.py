@@ -65,7 +65,9 @@ def lives_of(task: Task) -> Lives:
         )
     for life in np.unique(name[used]):
         if np.unique(failed[used & (name == life)]).size > 1:
-            raise DatasetError(f"{dataset.folder}: life {life} has failed in some of its records and not in others")
+            raise DatasetError(
+                f"{dataset.folder}: life {life} has failed in some of its records and not in others",
+            )
     return Lives(name=np.where(used, name, ""), age=age, remaining=remaining, failed=failed == 1)
 
 
@@ -76,11 +78,22 @@ def life_segments(task: Task, lives: Lives, protocol: str, subset: str) -> Segme
     ------
     ConfigError    for a subset without any
     """
-    found = subset_segments(task, protocol, subset)
-    kept = lives.name[found.record] != ""
-    if not kept.any():
-        raise ConfigError(f"protocol {protocol}: its {subset} part has no snapshot of a life; leave the protocol out")
-    return Segments(record=found.record[kept], start=found.start[kept], stop=found.stop[kept])
+    found = kept_segments(subset_segments(task, protocol, subset), lives.name != "")
+    if not found.record.size:
+        raise ConfigError(
+            f"protocol {protocol}: its {subset} part has no snapshot of a life; leave the protocol out",
+        )
+    return found
+
+
+def kept_segments(segments: Segments, kept: NDArray[np.bool_]) -> Segments:
+    """Stretches of the records that are kept, (record,) of the data set."""
+    chosen = kept[segments.record]
+    return Segments(
+        record=segments.record[chosen],
+        start=segments.start[chosen],
+        stop=segments.stop[chosen],
+    )
 
 
 def choose_life_protocols(
@@ -104,7 +117,9 @@ def choose_life_protocols(
             left_out = {**left_out, protocol: reason}
     if not kept:
         reasons = "; ".join(f"{name}: {reason}" for name, reason in left_out.items())
-        raise ConfigError(f"{task.dataset.folder} has no protocol for task=remaining_life ({reasons})")
+        raise ConfigError(
+            f"{task.dataset.folder} has no protocol for task=remaining_life ({reasons})",
+        )
     return tuple(kept), left_out
 
 

@@ -1,140 +1,187 @@
-"""Records in the angle domain: one turn of either gear instead of windows of time, for networks that ask for it."""
+"""Turns of both gears as the input of a network: records in the angle domain instead of time."""
 
 from __future__ import annotations
 
-from collections.abc import Mapping, Sequence
-from dataclasses import replace
-from typing import Any
+from collections.abc import Mapping
+from dataclasses import dataclass, replace
+from typing import Any, ClassVar, Self, final
 
 import numpy as np
 from numpy.typing import NDArray
 
+from diagnose.data.inputs import NetworkInput, RecordedSignal
 from diagnose.data.targets import fault_places, record_targets
-from diagnose.data.windows import Read, Segments, Task, WindowSet, load_windows, read_signal
+from diagnose.data.windows import Read, Segments, Task, WindowSet, read_signal
 from gensig.errors import ConfigError, DatasetError
 from gensig.signals.separation import separate_gears
 
-N_TEETH, PER_TOOTH = "n_teeth", "samples_per_tooth"
+N_TEETH, PER_TOOTH = "n_teeth", "samples_per_tooth"  # of a network's configuration
 
 
-def wants_turns(model_config: Mapping[str, Any]) -> bool:
-    """Whether a network of this configuration reads turns rather than windows of time."""
-    return PER_TOOTH in model_config
+@final
+@dataclass(frozen=True, slots=True, kw_only=True)
+class Turns(NetworkInput):
+    """Turns of the driving and the driven gear and the mean passage of a tooth, end to end.
 
-
-def completed(model_config: Mapping[str, Any], attributes: Mapping[str, Any], heads: Sequence[str]) -> dict[str, Any]:
-    """The configuration with its further heads and, where the network needs them, the data set's tooth counts.
-
-    Raises
-    ------
-    ConfigError    if the data set does not say them
-    """
-    config = {**model_config, "heads": list(heads)} if heads else dict(model_config)
-    if not wants_turns(model_config):
-        return config
-    try:
-        teeth = [int(attributes[f"n_teeth_{gear}"]) for gear in ("pinion", "wheel")]
-    except KeyError as error:
-        raise ConfigError(f"the data set does not say {error.args[0]}, which this model needs: model=cnn") from None
-    return {**config, N_TEETH: teeth}
-
-
-def check_turns(task: Task, segments: Segments, name: str) -> None:
-    """Refuse stretches that hold no turn of the driving gear, before anything is read.
-
-    Raises
-    ------
-    ConfigError    with the shortest one
-    """
-    speed = np.asarray(task.dataset.column("speed_rpm"), dtype=float)[segments.record]
-    turns = (segments.stop - segments.start) / task.dataset.sampling_rate * speed / 60
-    if turns.min() < 1:
-        raise ConfigError(
-            f"a stretch holds {turns.min():.2g} turns of the pinion, and model {name} needs "
-            "a whole one: leave the protocol out, make longer records or choose another model"
-        )
-
-
-def load_inputs(
-    task: Task,
-    segments: Segments,
-    model_config: Mapping[str, Any],
-    *,
-    training: bool = False,
-    read: Read | None = None,
-) -> WindowSet:
-    """What a network reads of a subset: `load_windows`, or for a network that wants them the turns of each stretch.
-
-    Parameters
+    Attributes
     ----------
-    task, segments : which signals
-    model_config : with `completed`
-    training : add the turns of either half of each stretch: the same teeth with other noise
-    read : in place of `diagnose.data.windows.read_signal`
+    n_teeth : of the driving and the driven gear
+    samples_per_tooth : of the turns
     """
-    if not wants_turns(model_config):
-        windows = load_windows(task, segments, read=read)
-        return replace(windows, targets=record_targets(task.dataset, windows.record))
-    speed = np.asarray(task.dataset.column("speed_rpm"), dtype=float)
-    turns, index, passages = [], [], []
-    n_teeth = model_config[N_TEETH]
-    for position, row in enumerate(zip(segments.record, segments.start, segments.stop, strict=True)):
-        record, start, stop = (int(value) for value in row)
-        signal = (read or read_signal)(task, record, start, stop)
-        middle, parts = (stop - start) // 2, [(signal, 0)]
-        per_sample = float(speed[record]) / 60 * n_teeth[0] / task.dataset.sampling_rate
-        for first in (0, middle) if training else ():
-            parts.append((signal[:, first : first + middle], first))
-        for part, first in parts:
-            try:
-                turns.append(packed_turns(part, task.dataset.sampling_rate, float(speed[record]), model_config))
-            except ValueError as error:
-                if part is signal:
-                    raise DatasetError(f"record {record}: {error}; this model needs longer records") from None
-                continue  # half a stretch may be too short
-            index.append(position)
-            passages.append((start + first) * per_sample)
-    records = segments.record[np.array(index)]
-    targets = record_targets(task.dataset, records)
-    targets["place"] = fault_places(task.dataset, records, np.array(passages), n_teeth)
-    windows = turn_set(tuple(turns), task.labels()[records], records, task.normalise)
-    return replace(windows, targets=targets)
 
+    n_teeth: tuple[int, int]
+    samples_per_tooth: int
 
-def packed_turns(
-    signal: NDArray[np.floating], sampling_rate: float, speed_rpm: float, model_config: Mapping[str, Any]
-) -> NDArray[np.float32]:
-    """Turns of both gears and the mean passage of one recording, one after the other.
-
-    Parameters
-    ----------
-    signal : (channel, sample) m/s^2
-    sampling_rate : Hz
-    speed_rpm : of the driving gear, constant
-    model_config : ``n_teeth`` and ``samples_per_tooth`` of the network
-
-    Returns
-    -------
-    (channel, point) float32 in the signal's unit, ``samples_per_tooth`` times all teeth and one
-
-    Raises
-    ------
-    ValueError    for less than a turn of the driving gear
-    """
-    first, second = model_config[N_TEETH]
-    found = separate_gears(
-        signal, sampling_rate, speed_rpm / 60 * first, (first, second), samples_per_tooth=model_config[PER_TOOTH]
+    has_window_length: ClassVar[bool] = False
+    why_not_exported: ClassVar[str | None] = (
+        "this model looks at turns, which are made before the network: export one that reads windows"
     )
-    return np.concatenate([found.driving, found.driven, found.mesh], axis=-1).astype(np.float32)
+
+    @classmethod
+    def completed(
+        cls,
+        model_config: Mapping[str, Any],
+        attributes: Mapping[str, Any],
+    ) -> dict[str, Any]:
+        """The configuration with the tooth counts of the data set."""
+        try:
+            teeth = [int(attributes[f"n_teeth_{gear}"]) for gear in ("pinion", "wheel")]
+        except KeyError as error:
+            raise ConfigError(
+                f"the data set does not say {error.args[0]}, which this model needs: model=cnn",
+            ) from None
+        return {**model_config, N_TEETH: teeth}
+
+    @classmethod
+    def of(cls, model_config: Mapping[str, Any]) -> Self:
+        """Turns of the tooth counts and the samples a tooth that the configuration gives."""
+        driving, driven = model_config[N_TEETH]
+        return cls(n_teeth=(driving, driven), samples_per_tooth=model_config[PER_TOOTH])
+
+    def check(self, task: Task, segments: Segments, network: str) -> None:
+        """Refuse stretches that hold no turn of the driving gear, with the shortest one."""
+        speed = np.asarray(task.dataset.column("speed_rpm"), dtype=float)[segments.record]
+        turns = (segments.stop - segments.start) / task.dataset.sampling_rate * speed / 60
+        if turns.min() < 1:
+            raise ConfigError(
+                f"a stretch holds {turns.min():.2g} turns of the pinion, and model {network} "
+                "needs a whole one: leave the protocol out, make longer records or choose another model"
+            )
+
+    def n_points(self, window_samples: int) -> int:
+        """Points of the packed turns, whatever the length of a window."""
+        return int(self.samples_per_tooth * (sum(self.n_teeth) + 1))
+
+    def load(
+        self,
+        task: Task,
+        segments: Segments,
+        *,
+        training: bool = False,
+        read: Read = read_signal,
+    ) -> WindowSet:
+        """Turns of each stretch; in training also of either half: the same teeth, other noise.
+
+        Raises
+        ------
+        DatasetError    for a stretch without a whole turn
+        """
+        rate = task.dataset.sampling_rate
+        speed = np.asarray(task.dataset.column("speed_rpm"), dtype=float)
+        turns: list[NDArray[np.float32]] = []
+        records: list[int] = []
+        passages: list[float] = []
+        for row in zip(segments.record, segments.start, segments.stop, strict=True):
+            record, start, stop = (int(value) for value in row)
+            signal = read(task, record, start, stop)
+            for first, part in _parts(signal, halves=training):
+                try:
+                    packed = self.packed(part, rate, float(speed[record]))
+                except ValueError as error:
+                    if part is signal:
+                        raise DatasetError(
+                            f"record {record}: {error}; this model needs longer records",
+                        ) from None
+                    continue  # half a stretch may be too short
+                turns.append(packed)
+                records.append(record)
+                passages_per_sample = float(speed[record]) / 60 * self.n_teeth[0] / rate
+                passages.append((start + first) * passages_per_sample)
+        record_of = np.array(records)
+        targets = record_targets(task.dataset, record_of)
+        targets["place"] = fault_places(task.dataset, record_of, np.array(passages), self.n_teeth)
+        windows = _turn_set(tuple(turns), task.labels()[record_of], record_of, task.normalise)
+        return replace(windows, targets=targets)
+
+    def of_recording(self, recording: RecordedSignal) -> WindowSet:
+        """Turns of a whole recording.
+
+        Raises
+        ------
+        ConfigError    for a speed that nobody knows, or less than a turn
+        """
+        file, speed_rpm = recording.file, recording.speed_rpm
+        if speed_rpm is None:
+            raise ConfigError(
+                f"this model looks at turns and must know the speed: say --speed-rpm of {file}",
+            )
+        try:
+            turns = self.packed(recording.signal, recording.sampling_rate, speed_rpm)
+        except ValueError as error:
+            raise ConfigError(f"{file}: {error}") from None
+        nothing = np.zeros(1, dtype=np.int64)
+        return _turn_set((turns,), nothing, nothing, recording.normalise)
+
+    def seconds(self, *, window: float, recording: float) -> float:
+        """Seconds of the whole recording."""
+        return recording
+
+    def packed(
+        self,
+        signal: NDArray[np.floating],
+        sampling_rate: float,
+        speed_rpm: float,
+    ) -> NDArray[np.float32]:
+        """Turns of both gears and the mean passage of one recording, one after the other.
+
+        Parameters
+        ----------
+        signal : (channel, sample) m/s^2
+        sampling_rate : Hz
+        speed_rpm : of the driving gear, constant
+
+        Returns
+        -------
+        (channel, point) float32 in the signal's unit, `n_points` of them
+
+        Raises
+        ------
+        ValueError    for less than a turn of the driving gear
+        """
+        found = separate_gears(
+            signal,
+            sampling_rate,
+            speed_rpm / 60 * self.n_teeth[0],
+            self.n_teeth,
+            samples_per_tooth=self.samples_per_tooth,
+        )
+        packed = np.concatenate([found.driving, found.driven, found.mesh], axis=-1)
+        return packed.astype(np.float32)
 
 
-def n_points(model_config: Mapping[str, Any]) -> int:
-    """Points of `packed_turns`."""
-    return int(model_config[PER_TOOTH] * (sum(model_config[N_TEETH]) + 1))
+def _parts(signal: NDArray[np.float32], *, halves: bool) -> list[tuple[int, NDArray[np.float32]]]:
+    """First sample and signal of the whole and, where wanted, of its two halves."""
+    if not halves:
+        return [(0, signal)]
+    middle = signal.shape[-1] // 2
+    return [(0, signal), (0, signal[:, :middle]), (middle, signal[:, middle : 2 * middle])]
 
 
-def turn_set(
-    turns: tuple[NDArray[np.float32], ...], label: NDArray[Any], record: NDArray[Any], normalise: str
+def _turn_set(
+    turns: tuple[NDArray[np.float32], ...],
+    label: NDArray[Any],
+    record: NDArray[Any],
+    normalise: str,
 ) -> WindowSet:
     """Packed turns as windows that fill their signal."""
     return WindowSet(

@@ -3,20 +3,23 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
+from typing import ClassVar
 
 import torch
 from torch import nn
 from torch.nn.functional import pad, relu
 
+from diagnose.data.inputs import NetworkInput
 from diagnose.data.targets import GEARS
-from diagnose.networks.network import Network
+from diagnose.data.turns import Turns
+from diagnose.networks.network import Network, check_blocks
 from gensig.errors import ConfigError
 
 
 class OrderCnn(Network):
     """Convolutions around the turn of either gear, compared with the gear's mean, and the maximum over its teeth.
 
-    The input is `diagnose.data.turns.packed_turns`: what each tooth adds to the mean passage, gear by gear, and that
+    The input is `diagnose.data.turns.Turns.packed`: what each tooth adds to the mean passage, gear by gear, and that
     passage. It is the same at every speed but for the frequency response. Responses of the first filters are compressed
     by the inverse hyperbolic sine: impacts of tooth engagement are 30 dB above what cracks and pits do between them.
 
@@ -32,6 +35,8 @@ class OrderCnn(Network):
     dropout : share of pooled features dropped in training
     heads : see `diagnose.settings.HEADS`
     """
+
+    inputs: ClassVar[type[NetworkInput]] = Turns
 
     def __init__(
         self,
@@ -50,8 +55,7 @@ class OrderCnn(Network):
         heads: Sequence[str] = (),
     ) -> None:
         super().__init__(input_scale)
-        if not len(widths) == len(kernels) == len(strides) > 0:
-            raise ConfigError("model: widths, kernels and strides must be lists of the same length, one entry a block")
+        check_blocks(widths, kernels, strides)
         if any(kernel % 2 == 0 for kernel in kernels):
             raise ConfigError("model: kernels must be odd, so that a turn stays as long as it is")
         self.n_points = [teeth * samples_per_tooth for teeth in (*n_teeth, 1)]
@@ -80,7 +84,9 @@ class OrderCnn(Network):
         *turns, mesh = windows.split(self.n_points, dim=-1)
         looked_at = [(turns[gear], self.n_teeth[gear]) for gear in self.gears]
         parts = [torch.cat([turn, mesh.repeat(1, 1, n_teeth)], dim=1) for turn, n_teeth in looked_at]
-        for index, (convolution, norm) in enumerate(zip(self.convolutions, self.norms, strict=True)):
+        for index, (convolution, norm) in enumerate(
+            zip(self.convolutions, self.norms, strict=True),
+        ):
             parts = [convolution(_around(part, self.kernels[index])) for part in parts]
             if index == 0:
                 parts = [torch.asinh(self.compression * part) for part in parts]

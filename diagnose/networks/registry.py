@@ -2,86 +2,22 @@
 
 from __future__ import annotations
 
-import math
 from collections.abc import Callable, Mapping, Sequence
 from typing import Any
 
 import torch
 from torch import nn
 
+from diagnose.data.inputs import NetworkInput
 from diagnose.networks.network import Network
 from diagnose.networks.order_cnn import OrderCnn
+from diagnose.networks.small_cnn import SmallCnn
 from diagnose.networks.spectrum import SpectrumCnn
 from diagnose.networks.wdcnn import Wdcnn
 from gensig.errors import ConfigError
 
-
-class SmallCnn(Network):
-    """One-dimensional convolutional network with a wide, strided first kernel.
-
-    The first kernel spans a mesh period rather than a few samples, as in Zhang, Peng, Li, Chen & Zhang (2017), "A new
-    deep learning model for fault diagnosis with good anti-noise and domain adaptation ability on raw vibration
-    signals", Sensors 17 (2), 425. Pooling over the window takes the mean and the maximum: a fault shows once a turn.
-
-    Parameters
-    ----------
-    n_channels, n_classes : of the data
-    input_scale : (channel,) typical RMS of each channel, which the input is divided by; stored with the weights
-    widths : channels after each block, the first block included
-    kernels : kernel of each block, in its input samples
-    strides : stride of each block
-    dropout : share of pooled features dropped in training
-    heads : see `diagnose.settings.HEADS`
-    """
-
-    def __init__(
-        self,
-        *,
-        n_channels: int,
-        n_classes: int,
-        input_scale: Sequence[float],
-        widths: Sequence[int],
-        kernels: Sequence[int],
-        strides: Sequence[int],
-        dropout: float,
-        heads: Sequence[str] = (),
-    ) -> None:
-        super().__init__(input_scale)
-        if not len(widths) == len(kernels) == len(strides) > 0:
-            raise ConfigError("model: widths, kernels and strides must be lists of the same length, one entry a block")
-        blocks: list[nn.Module] = []
-        for n_in, n_out, kernel, stride in zip((n_channels, *widths), widths, kernels, strides, strict=False):
-            convolution = nn.Conv1d(n_in, n_out, kernel, stride=stride, padding=kernel // 2, bias=False)
-            if not blocks:
-                _start_as_band_passes(convolution.weight)
-            blocks += [convolution, nn.BatchNorm1d(n_out), nn.ReLU()]
-        self.blocks = nn.Sequential(*blocks)
-        self.head = nn.Sequential(nn.Dropout(dropout), nn.Linear(2 * widths[-1], n_classes))
-        self.add_heads(heads, 2 * widths[-1], n_classes)
-
-    def look(self, windows: torch.Tensor) -> tuple[torch.Tensor, None]:
-        """Mean and maximum over the window of the last block."""
-        maps = self.blocks(windows)
-        return torch.cat([maps.mean(dim=-1), maps.amax(dim=-1)], dim=1), None
-
-
-def _start_as_band_passes(weight: torch.Tensor) -> None:
-    """Fill (filter, channel, sample) with windowed cosines, evenly spaced in frequency, of random phase and size.
-
-    Random kernels all hear the mesh tones first, and learning to listen elsewhere takes most of a training. After the
-    initialisation of SincNet: Ravanelli & Bengio (2018), "Speaker recognition from raw waveform with SincNet".
-    """
-    n_filters, n_channels, kernel = weight.shape
-    sample = torch.arange(kernel) - (kernel - 1) / 2
-    frequency = (torch.arange(n_filters) + 0.5) / (2 * n_filters)
-    phase = 2 * math.pi * torch.rand(n_filters, n_channels, 1)
-    carrier = torch.cos(2 * math.pi * frequency[:, None, None] * sample + phase)
-    size = torch.randn(n_filters, n_channels, 1) / math.sqrt(n_channels * kernel)
-    with torch.no_grad():
-        weight.copy_(2 * size * carrier * torch.hann_window(kernel, periodic=False))
-
-
-MODELS: dict[str, Callable[..., Network]] = {
+# Kind in a configuration -> network; each declares what it reads as its ``inputs``.
+MODELS: dict[str, type[Network]] = {
     "small_cnn": SmallCnn,
     "wdcnn": Wdcnn,
     "spectrum_cnn": SpectrumCnn,
@@ -90,23 +26,67 @@ MODELS: dict[str, Callable[..., Network]] = {
 
 
 def build_model(
-    config: Mapping[str, Any], *, n_channels: int, n_classes: int, input_scale: Sequence[float] | None = None
+    config: Mapping[str, Any],
+    *,
+    n_channels: int,
+    n_classes: int,
+    input_scale: Sequence[float] | None = None,
 ) -> Network:
-    """Network of a configuration: ``kind`` names an entry of `MODELS`, ``name`` is only shown, the rest are parameters.
+    """Network of a configuration, whose ``kind`` names an entry of `MODELS`.
+
+    Parameters
+    ----------
+    config : beside ``kind`` and ``name``, which is only shown, it holds parameters
+    n_channels, n_classes : of the data
+    input_scale : (channel,) what inputs are divided by; 1 where None
 
     Raises
     ------
     ConfigError    for an unknown kind or parameters that it does not take
     """
+    make: Callable[..., Network] = _network_class(config)
     parameters = {key: value for key, value in config.items() if key not in ("kind", "name")}
     scale = [1.0] * n_channels if input_scale is None else input_scale
-    kind = config.get("kind")
-    if kind not in MODELS:
-        raise ConfigError(f"no model kind '{kind}'; there is {', '.join(MODELS)}")
     try:
-        return MODELS[kind](n_channels=n_channels, n_classes=n_classes, input_scale=scale, **parameters)
+        return make(n_channels=n_channels, n_classes=n_classes, input_scale=scale, **parameters)
     except (TypeError, ValueError, RuntimeError) as error:
-        raise ConfigError(f"model {kind}: {' '.join(str(error).split())}") from None
+        reason = " ".join(str(error).split())
+        raise ConfigError(f"model {config['kind']}: {reason}") from None
+
+
+def input_of(config: Mapping[str, Any]) -> NetworkInput:
+    """What the network of a completed configuration reads.
+
+    Raises
+    ------
+    ConfigError    for an unknown kind
+    """
+    return _network_class(config).inputs.of(config)
+
+
+def has_window_length(config: Mapping[str, Any]) -> bool:
+    """True if the length of windows matters to the network of a configuration, completed or not.
+
+    Raises
+    ------
+    ConfigError    for an unknown kind
+    """
+    return _network_class(config).inputs.has_window_length
+
+
+def completed(
+    config: Mapping[str, Any],
+    attributes: Mapping[str, Any],
+    heads: Sequence[str],
+) -> dict[str, Any]:
+    """Configuration with its further heads, and with what its input takes of a data set.
+
+    Raises
+    ------
+    ConfigError    for an unknown kind, or a data set whose attributes lack what the input needs
+    """
+    with_heads = {**config, "heads": list(heads)} if heads else dict(config)
+    return _network_class(config).inputs.completed(with_heads, attributes)
 
 
 def check_window(model: nn.Module, n_channels: int, window_samples: int) -> None:
@@ -121,5 +101,18 @@ def check_window(model: nn.Module, n_channels: int, window_samples: int) -> None
             model.eval()(torch.zeros(1, n_channels, window_samples))
     except RuntimeError:
         raise ConfigError(
-            f"window_samples={window_samples} is too short for this network; make it longer or choose another model"
+            f"window_samples={window_samples} is too short for this network; make it longer or choose another model",
         ) from None
+
+
+def _network_class(config: Mapping[str, Any]) -> type[Network]:
+    """Entry of `MODELS` that a configuration names.
+
+    Raises
+    ------
+    ConfigError    for an unknown kind
+    """
+    kind = config.get("kind")
+    if kind not in MODELS:
+        raise ConfigError(f"no model kind '{kind}'; there is {', '.join(MODELS)}")
+    return MODELS[kind]

@@ -4,11 +4,14 @@ from __future__ import annotations
 
 import math
 from collections.abc import Sequence
+from typing import ClassVar
 
 import torch
 from torch import nn
 
-from diagnose.networks.network import Network
+from diagnose.data.inputs import NetworkInput
+from diagnose.data.window_input import Windows
+from diagnose.networks.network import Network, check_blocks
 from gensig.errors import ConfigError
 
 
@@ -26,7 +29,9 @@ def log_spectrum(windows: torch.Tensor, floor: float) -> torch.Tensor:
     """
     n = windows.shape[-1]
     taper = torch.hann_window(n, dtype=windows.dtype, device=windows.device)
-    magnitude = torch.fft.rfft(windows * taper).abs() / math.sqrt(3 * n / 8)  # 3/8: mean square of the taper
+    magnitude = torch.fft.rfft(windows * taper).abs() / math.sqrt(
+        3 * n / 8,
+    )  # 3/8: mean square of the taper
     return torch.log(magnitude + floor)
 
 
@@ -47,6 +52,8 @@ class SpectrumCnn(Network):
     heads : see `diagnose.settings.HEADS`
     """
 
+    inputs: ClassVar[type[NetworkInput]] = Windows
+
     def __init__(
         self,
         *,
@@ -62,18 +69,34 @@ class SpectrumCnn(Network):
         heads: Sequence[str] = (),
     ) -> None:
         super().__init__(input_scale)
-        if not len(widths) == len(kernels) == len(strides) > 0:
-            raise ConfigError("model: widths, kernels and strides must be lists of the same length, one entry a block")
+        check_blocks(widths, kernels, strides)
         if not floor > 0:
             raise ConfigError(f"model: floor must be greater than 0, not {floor!r}")
         self.floor = float(floor)
         blocks: list[nn.Module] = []
-        for n_in, n_out, kernel, stride in zip((n_channels, *widths), widths, kernels, strides, strict=False):
-            convolution = nn.Conv1d(n_in, n_out, kernel, stride=stride, padding=kernel // 2, bias=False)
+        for n_in, n_out, kernel, stride in zip(
+            (n_channels, *widths),
+            widths,
+            kernels,
+            strides,
+            strict=False,
+        ):
+            convolution = nn.Conv1d(
+                n_in,
+                n_out,
+                kernel,
+                stride=stride,
+                padding=kernel // 2,
+                bias=False,
+            )
             blocks += [convolution, nn.BatchNorm1d(n_out), nn.ReLU()]
         self.blocks = nn.Sequential(*blocks)
         self.mean, self.maximum = nn.AdaptiveAvgPool1d(n_bands), nn.AdaptiveMaxPool1d(n_bands)
-        self.head = nn.Sequential(nn.Flatten(), nn.Dropout(dropout), nn.Linear(2 * widths[-1] * n_bands, n_classes))
+        self.head = nn.Sequential(
+            nn.Flatten(),
+            nn.Dropout(dropout),
+            nn.Linear(2 * widths[-1] * n_bands, n_classes),
+        )
         self.add_heads(heads, 2 * widths[-1] * n_bands, n_classes)
 
     def look(self, windows: torch.Tensor) -> tuple[torch.Tensor, None]:

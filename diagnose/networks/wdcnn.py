@@ -3,10 +3,13 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
+from typing import ClassVar
 
 import torch
 from torch import nn
 
+from diagnose.data.inputs import NetworkInput
+from diagnose.data.window_input import Windows
 from diagnose.networks.network import Network
 
 FIRST_KERNEL, FIRST_STRIDE, FIRST_PADDING = 64, 16, 24
@@ -36,6 +39,8 @@ class Wdcnn(Network):
     and domain adaptation ability on raw vibration signals", Sensors 17 (2), 425, table 2.
     """
 
+    inputs: ClassVar[type[NetworkInput]] = Windows
+
     def __init__(
         self,
         *,
@@ -51,9 +56,20 @@ class Wdcnn(Network):
         layers: list[nn.Module] = []
         for index, (n_in, n_out) in enumerate(zip((n_channels, *widths), widths, strict=False)):
             if index == 0:
-                convolution = nn.Conv1d(n_in, n_out, FIRST_KERNEL, stride=FIRST_STRIDE, padding=FIRST_PADDING)
+                convolution = nn.Conv1d(
+                    n_in,
+                    n_out,
+                    FIRST_KERNEL,
+                    stride=FIRST_STRIDE,
+                    padding=FIRST_PADDING,
+                )
             else:
-                convolution = nn.Conv1d(n_in, n_out, 3, padding=0 if index == len(widths) - 1 else 1)
+                convolution = nn.Conv1d(
+                    n_in,
+                    n_out,
+                    3,
+                    padding=0 if index == len(widths) - 1 else 1,
+                )
             layers += [convolution, nn.BatchNorm1d(n_out), nn.ReLU(), nn.MaxPool1d(2)]
         self.blocks = nn.Sequential(*layers)
         self.hidden = nn.Sequential(

@@ -13,9 +13,9 @@ import numpy as np
 from diagnose.data.windows import WindowSet
 from diagnose.networks.adaptation import HEALTHY, adapt_domain, adapt_network
 from diagnose.networks.domain import distances
-from diagnose.recordings.predict import SPEED_TOLERANCE, Source, windows_of
+from diagnose.recordings.source import SPEED_TOLERANCE, Source, prepare_recording
+from diagnose.training.classes import predict_windows
 from diagnose.training.store import load_domain, load_model, load_statistics, save_model
-from diagnose.training.train import predict_windows
 from gensig.errors import ConfigError, DatasetError
 
 
@@ -46,7 +46,7 @@ def adapt_model(folder: str | Path, sources: Sequence[Source], method: str, out:
         raise DatasetError(f"{folder} stores no healthy statistics (no class {HEALTHY}, or too old); train it again")
     for source in sources:
         _check_speed(source, description.speed_rpm_range)
-    parts = [windows_of(description, source)[0] for source in sources]
+    parts = [prepare_recording(description, source).windows for source in sources]
     windows = together(parts)
     adapted = adapt_network(model, statistics, windows, method)
     domain = load_domain(folder, description)

@@ -14,7 +14,7 @@ from diagnose.data.lives import Lives
 from diagnose.data.protocols import MEANING
 from diagnose.report.figures import COLORS, save, subplots
 from diagnose.scoring.life_scores import BAND, MEASURES
-from diagnose.studies.life_study import AGE_ONLY, AND_AGE, LifePrediction
+from diagnose.studies.life_jobs import AGE_ONLY, AND_AGE, LifePrediction
 from gensig.text.page import Card, Section, Table, write_page
 
 FEW_LIVES = 10
@@ -154,7 +154,11 @@ def _card(name: str, result: Mapping[str, Any], model: str) -> Card:
     methods = result["methods"]
     score, better = methods[model]["rmse_h"], methods[model]["gain_over_age_only_h"]
     clock = methods[AGE_ONLY]["rmse_h"]["mean"]
-    found = "better than" if better["low"] > 0 else "worse than" if better["high"] < 0 else "not told from"
+    found = "not told from"
+    if better["low"] > 0:
+        found = "better than"
+    elif better["high"] < 0:
+        found = "worse than"
     held = methods[model]["coverage"]["mean"]
     indicators = methods["indicators"]["rmse_h"]["mean"]
     return Card(

@@ -6,7 +6,7 @@ Each piece runs with one thread, in a spawned process or, when there is one core
 from __future__ import annotations
 
 import multiprocessing
-from collections.abc import Callable, Iterator, Mapping, Sequence
+from collections.abc import Callable, Iterator, Sequence
 from concurrent.futures import ProcessPoolExecutor, as_completed
 from concurrent.futures.process import BrokenProcessPool
 from contextlib import contextmanager
@@ -21,24 +21,28 @@ from diagnose.baselines.base import Role, Source
 from diagnose.baselines.features import Cache
 from diagnose.baselines.oracle import oracle_windows
 from diagnose.baselines.registry import baseline_names
+from diagnose.data.inputs import NetworkInput
 from diagnose.data.protocols import HEALTHY_ONLY, OPEN_PROTOCOLS
-from diagnose.data.turns import load_inputs, wants_turns
+from diagnose.data.window_input import Windows
 from diagnose.data.windows import SUBSETS, Task, WindowSet, subset_segments
 from diagnose.networks.adaptation import healthy_statistics
 from diagnose.networks.domain import Domain, fit_domain
+from diagnose.networks.registry import input_of
 from diagnose.scoring.metrics import over_records
 from diagnose.scoring.predictions import Prediction, Rows
 from diagnose.settings import TrainSettings
 from diagnose.studies.baseline_runs import baseline_predictions
 from diagnose.studies.novelty import NoveltyRun, fitted_runs, trained_runs
+from diagnose.training.classes import Classes, predict_windows, with_shuffled_labels
 from diagnose.training.heads import predict_heads
 from diagnose.training.sham import sham_method, sham_task
 from diagnose.training.tensorboard import epoch_log
-from diagnose.training.train import predict_windows, train_network, with_shuffled_labels
+from diagnose.training.train import train_network
 from gensig.errors import GensigError
 
 # Controls of a job beside the label shuffle, and the network that sees the level.
 PROBE, ORACLE, SHAM, LEVEL_KEPT = "probe", "oracle", "sham", "level_kept"
+WINDOWS = Windows()
 # Names of trained controls in metrics.json; those of `SHAM` and `LEVEL_KEPT` are their own.
 LABEL_SHUFFLE, ORACLE_NETWORK = "label_shuffle", "oracle_network"
 
@@ -107,8 +111,10 @@ def run_job(task: Task, settings: TrainSettings, job: Job) -> list[Outcome]:
         name = job.protocols[0]
         if job.seed is None:
             return [*fitted_runs(task, settings, name, _windows(task, name))]
-        heard = None if name == HEALTHY_ONLY else settings.model  # the autoencoder hears time
-        return [*trained_runs(settings, name, job.seed, _windows(task, name, "", heard))]
+        inputs = input_of(settings.model)
+        if name == HEALTHY_ONLY:
+            inputs = WINDOWS  # of the autoencoder
+        return [*trained_runs(settings, name, job.seed, _windows(task, name, "", inputs))]
     if job.control == SHAM:
         task = _sham(task, settings)
     if job.seed is not None:
@@ -120,7 +126,8 @@ def _run_training(
     task: Task, settings: TrainSettings, protocol: str, seed: int, shuffled: bool, control: str
 ) -> Prediction:
     n_classes = len(task.class_names)
-    train, validation, test = (_windows(task, protocol, control, settings.model)[subset] for subset in SUBSETS)
+    sets = _windows(task, protocol, control, input_of(settings.model))
+    train, validation, test = (sets[subset] for subset in SUBSETS)
     if shuffled:
         rng = np.random.default_rng([seed, 2])
         train = with_shuffled_labels(train, n_classes, rng)
@@ -131,8 +138,7 @@ def _run_training(
         training = train_network(
             train,
             validation,
-            model_config=settings.model,
-            n_classes=n_classes,
+            target=Classes(n_classes=n_classes),
             settings=settings,
             seed=seed,
             on_epoch=on_epoch,
@@ -153,10 +159,10 @@ def _run_training(
         seed=seed,
         record=record,
         log_probability=log_probability,
-        detail=f"best epoch {training.best_epoch} of {len(training.validation_loss)}",
+        detail=training.detail,
         validation=Rows(record=held_out, log_probability=held_out_scores),
         windows=Rows(record=test.record, log_probability=by_window),
-        weights={key: value.numpy() for key, value in training.model.state_dict().items()} if is_model else None,
+        weights=training.weights() if is_model else None,
         domain=domain,
         healthy=None if shuffled else healthy_statistics(training.model, train, task.class_names),
         best_epoch=training.best_epoch,
@@ -198,24 +204,28 @@ def _names_of_baselines(settings: TrainSettings, control: str) -> tuple[str, ...
 
 
 # Windows of the protocol a process works on; jobs come protocol by protocol.
-_loaded: dict[tuple[str, str, bool, bool], dict[str, WindowSet]] = {}
+_loaded: dict[tuple[str, str, bool, NetworkInput], dict[str, WindowSet]] = {}
 _domains: dict[str, Domain] = {}
 _shams: dict[str, Task] = {}
 _work: dict[str, Any] = {}
 
 
 def _windows(
-    task: Task, protocol: str, control: str = "", model_config: Mapping[str, Any] | None = None
+    task: Task,
+    protocol: str,
+    control: str = "",
+    inputs: NetworkInput = WINDOWS,
 ) -> dict[str, WindowSet]:
-    """Windows of time, or what a network of this configuration reads."""
-    config = model_config or {}
-    key = (str(task.dataset.folder), protocol, control == ORACLE, wants_turns(config))
+    """Windows of time, or the inputs that a network reads, of each subset."""
+    key = (str(task.dataset.folder), protocol, control == ORACLE, inputs)
     if key not in _loaded:
         _loaded.clear()
-        load = oracle_windows if control == ORACLE else load_inputs
+        load = partial(oracle_windows, inputs=inputs) if control == ORACLE else inputs.load
         _loaded[key] = {
             name: load(
-                task.part(protocol, name), subset_segments(task, protocol, name), config, training=name == "train"
+                task.part(protocol, name),
+                subset_segments(task, protocol, name),
+                training=name == "train",
             )
             for name in SUBSETS
         }

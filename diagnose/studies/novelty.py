@@ -21,7 +21,8 @@ from diagnose.networks.domain import MOST_WINDOWS, distances, fit_domain, neighb
 from diagnose.scoring.metrics import over_records
 from diagnose.settings import TrainSettings
 from diagnose.training.autoencoder import fit_autoencoder, reconstruction_error
-from diagnose.training.train import predict_windows, train_network
+from diagnose.training.classes import Classes, predict_windows
+from diagnose.training.train import train_network
 
 FloatArray = NDArray[np.floating]
 IntArray = NDArray[np.integer]
@@ -148,8 +149,7 @@ def _classifier_runs(
     training = train_network(
         known["train"],
         known["validation"],
-        model_config=settings.model,
-        n_classes=classes.size,
+        target=Classes(n_classes=classes.size),
         settings=settings,
         seed=seed,
     )
@@ -167,8 +167,9 @@ def _classifier_runs(
         found.setdefault("energy", {})[subset] = over_records(energy[:, None], windows.record)
         found.setdefault("nearest_features", {})[subset] = over_records(distance[:, None], windows.record)
     predicted = classes[log_probability.argmax(axis=1)]
-    text = f"best epoch {training.best_epoch} of {len(training.validation_loss)}"
-    return [replace(_run(protocol, name, text, found[name], seed=seed), predicted=predicted) for name in found]
+    return [
+        replace(_run(protocol, name, training.detail, found[name], seed=seed), predicted=predicted) for name in found
+    ]
 
 
 def network_outputs(model: nn.Module, windows: WindowSet, chosen: IntArray) -> tuple[FloatArray, FloatArray]:

@@ -10,26 +10,25 @@ import time
 from collections.abc import Callable, Sequence
 from dataclasses import asdict, replace
 from pathlib import Path
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 from numpy.typing import NDArray
 
 from diagnose.data.at_rate import at_rate
 from diagnose.data.protocols import OPEN_PROTOCOLS, channels_to_cross, choose_protocols
-from diagnose.data.turns import check_turns, completed, n_points, wants_turns
 from diagnose.data.window_choice import chosen_window
 from diagnose.data.windows import (
     NORMALISATIONS,
     SUBSETS,
+    Segments,
     Task,
     check_names,
-    plan_windows,
     subset_segments,
     task_of,
 )
 from diagnose.networks.calibration import calibration_scores
-from diagnose.networks.registry import build_model, check_window
+from diagnose.networks.registry import build_model, check_window, completed, has_window_length, input_of
 from diagnose.scoring.metrics import (
     SCORES,
     confusion_by_unit,
@@ -56,6 +55,9 @@ from diagnose.training.train import device_of
 from gensig.errors import ConfigError
 from gensig.version import __version__
 
+if TYPE_CHECKING:
+    from gensig.dataset.reader import Dataset
+
 METRICS_SCHEMA_VERSION = 1
 BOOTSTRAP_SEED = 20240607
 
@@ -76,13 +78,11 @@ def plan_study(task: Task, settings: TrainSettings) -> tuple[tuple[str, ...], li
     wanted, _ = choose_protocols(task, settings.protocols)
     protocols = tuple(sorted(wanted, key=lambda name: (is_leaky(name), wanted.index(name))))
     labels = task.labels()
+    parts: list[Segments] = []
     for protocol in protocols:
         for subset in SUBSETS:
             segments = subset_segments(task, protocol, subset)
-            if wants_turns(settings.model):
-                check_turns(task, segments, str(settings.model.get("name", "network")))
-            else:
-                plan_windows(segments, task.window_samples, task.stride_samples)
+            parts.append(segments)
             present = np.unique(labels[segments.record])
             if protocol not in OPEN_PROTOCOLS and subset != "validation" and present.size < 2:
                 name = task.class_names[int(present[0])]
@@ -91,10 +91,7 @@ def plan_study(task: Task, settings: TrainSettings) -> tuple[tuple[str, ...], li
             check_open_protocol(task, protocol)
     if "healthy_only" in protocols:
         check_window_for_autoencoder(task.window_samples)
-    model = build_model(settings.model, n_channels=len(task.channel_names), n_classes=len(task.class_names))
-    n_read = n_points(settings.model) if wants_turns(settings.model) else task.window_samples
-    check_window(model, len(task.channel_names), n_read)
-    device_of(settings.device)
+    check_network(task, settings, parts)
     if settings.tensorboard:
         need_tensorboard()
     closed = tuple(name for name in protocols if name not in OPEN_PROTOCOLS)
@@ -106,6 +103,22 @@ def plan_study(task: Task, settings: TrainSettings) -> tuple[tuple[str, ...], li
             first = min(settings.seeds)
             jobs += [Job(protocols=(protocol,), seed=first + k, shuffled=True) for k in range(settings.n_seeds_control)]
     return protocols, jobs + control_jobs(task, settings, [name for name in closed if not is_leaky(name)])
+
+
+def check_network(task: Task, settings: TrainSettings, parts: Sequence[Segments]) -> None:
+    """Refuse a network or a device that cannot be trained on every one of these parts.
+
+    Raises
+    ------
+    ConfigError    for parameters, stretches or windows that do not fit, and a missing device
+    """
+    n_channels = len(task.channel_names)
+    model = build_model(settings.model, n_channels=n_channels, n_classes=len(task.class_names))
+    inputs, name = input_of(settings.model), str(settings.model.get("name", "network"))
+    for segments in parts:
+        inputs.check(task, segments, name)
+    check_window(model, n_channels, inputs.n_points(task.window_samples))
+    device_of(settings.device)
 
 
 def task_from(dataset: Any, settings: TrainSettings) -> Task:
@@ -124,6 +137,18 @@ def task_from(dataset: Any, settings: TrainSettings) -> Task:
     )
     crossed = channels_to_cross(dataset.channel_names, settings.channels, settings.test_channels)
     return replace(task, cross_channels=crossed)
+
+
+def window_note(dataset: Dataset, settings: TrainSettings) -> str | None:
+    """Line on windows of another length than usual; None where they are usual, given or not read.
+
+    Parameters
+    ----------
+    dataset : at the rate that is trained at
+    """
+    if settings.window_samples or not has_window_length(settings.model):
+        return None
+    return chosen_window(dataset)[1]
 
 
 def settings_for(dataset: Any, settings: TrainSettings) -> TrainSettings:

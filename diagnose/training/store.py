@@ -59,6 +59,11 @@ class ModelDescription:
     test_score: dict[str, Any] | None = None  # see `diagnose.studies.study.test_score`; models of before have none
     remaining_life: dict[str, Any] | None = None  # see `diagnose.training.life_store`; None for a classifier
 
+    @property
+    def task(self) -> str:
+        """Task of the training, one of `diagnose.settings.TASKS`."""
+        return "classes" if self.remaining_life is None else "remaining_life"
+
     def __post_init__(self) -> None:
         if not 0 < self.temperature < float("inf"):
             raise ValueError(f"temperature must be greater than 0, not {self.temperature!r}")

@@ -17,6 +17,7 @@ from diagnose.baselines.probe import (
     probed_columns,
 )
 from diagnose.cli import main
+from diagnose.data.window_input import Windows
 from diagnose.data.windows import load_windows, subset_segments, task_of
 from diagnose.report.control_sections import controls_section, oracle_verdict, verdict
 from diagnose.scoring.metrics import ratio_with_interval
@@ -52,7 +53,7 @@ def make_settings(*overrides):
 def test_record_and_difference_have_one_divisor_which_is_the_twins(normalise):
     dataset = FakeDataset(**SMALL, n_channels=2, twins=True)
     task = make_task(dataset, normalise=normalise)
-    windows = oracle_windows(task, subset_segments(task, "by_unit", "test"), {})
+    windows = oracle_windows(task, subset_segments(task, "by_unit", "test"), Windows())
     plain = load_windows(task, subset_segments(task, "by_unit", "test"))
     cut = windows.cut(np.array([0]))[0]
     record, start = int(windows.record[0]), int(windows.start[0])
@@ -68,7 +69,7 @@ def test_what_the_oracle_sees_of_a_healthy_record_is_noise():
     """Law: twice the noise is left of a healthy record, more of a faulty one."""
     dataset = FakeDataset(**SMALL, twins=True, noise=0.5)
     task = make_task(dataset, normalise="none")
-    windows = oracle_windows(task, subset_segments(task, "by_unit", "train"), {})
+    windows = oracle_windows(task, subset_segments(task, "by_unit", "train"), Windows())
     power = windows.cut(np.arange(len(windows)))[:, 1].var(axis=1)
     np.testing.assert_allclose(power[windows.label == 0].mean(), 2 * 0.5**2, rtol=0.05, atol=0)
     assert power[windows.label == 3].mean() > 0.55

@@ -27,7 +27,7 @@ from diagnose.networks.adaptation import (
 )
 from diagnose.networks.domain import distances, fit_domain
 from diagnose.networks.registry import build_model
-from diagnose.training.train import predict_windows
+from diagnose.training.classes import predict_windows
 from gensig.errors import ConfigError, DatasetError
 from gensig.options.compose import compose
 

@@ -16,8 +16,9 @@ from diagnose.scoring.metrics import balanced_accuracy, confusion_by_unit
 from diagnose.settings import settings_from
 from diagnose.studies.jobs import Job, run_jobs
 from diagnose.studies.study import plan_study, task_from
+from diagnose.training.classes import Classes, predict_windows
 from diagnose.training.store import load_model, model_description, save_model
-from diagnose.training.train import device_of, predict_windows, record_loss, train_network
+from diagnose.training.train import device_of, train_network
 from gensig.errors import ConfigError, DatasetError
 from gensig.options.compose import compose
 
@@ -127,7 +128,7 @@ def test_same_seed_same_weights(name, task):
     sets = [load_windows(task, subset_segments(task, "by_unit", part)) for part in ("train", "validation")]
 
     def weights(seed):
-        model = train_network(*sets, model_config=settings.model, n_classes=2, settings=settings, seed=seed).model
+        model = train_network(*sets, target=Classes(n_classes=2), settings=settings, seed=seed).model
         return torch.cat([value.flatten().double() for value in model.state_dict().values()])
 
     first = weights(3)
@@ -142,12 +143,15 @@ def test_the_last_epoch_stands_beside_the_best_one(task):
     wrong = dataclasses.replace(validation, label=1 - validation.label)
 
     def trained(held_out):
-        return train_network(train, held_out, model_config=settings.model, n_classes=2, settings=settings, seed=0)
+        return train_network(train, held_out, target=Classes(n_classes=2), settings=settings, seed=0)
 
     training = trained(wrong)
     assert training.best_epoch < len(training.validation_loss)
     assert training.last_model is not None
-    losses = [record_loss(predict_windows(model, train), train) for model in (training.model, training.last_model)]
+    losses = [
+        Classes(n_classes=2).record_loss(predict_windows(model, train), train)
+        for model in (training.model, training.last_model)
+    ]
     assert losses[1] < 0.8 * losses[0]
     training = trained(validation)
     assert (training.last_model is None) == (training.best_epoch == len(training.validation_loss))

@@ -12,7 +12,8 @@ from diagnose.networks.registry import build_model
 from diagnose.settings import settings_from
 from diagnose.studies.jobs import Job, run_jobs
 from diagnose.studies.study import plan_study, score_predictions, task_from
-from diagnose.training.train import train_network, with_shuffled_labels
+from diagnose.training.classes import Classes, with_shuffled_labels
+from diagnose.training.train import train_network
 from gensig.errors import ConfigError
 from gensig.options.compose import compose
 
@@ -68,7 +69,7 @@ def test_same_seed_same_weights_and_another_seed_others(study):
     sets = [load_windows(task, subset_segments(task, "by_unit", name)) for name in ("train", "validation")]
 
     def weights(seed):
-        model = train_network(*sets, model_config=settings.model, n_classes=2, settings=settings, seed=seed).model
+        model = train_network(*sets, target=Classes(n_classes=2), settings=settings, seed=seed).model
         return torch.cat([value.flatten().double() for value in model.state_dict().values()])
 
     before = torch.random.get_rng_state()

@@ -13,8 +13,8 @@ from numpy.testing import assert_allclose
 import gensig.dataset.reader
 from diagnose.cli import main
 from diagnose.data.windows import Segments, load_windows, task_of
+from diagnose.training.classes import predict_windows
 from diagnose.training.store import load_model
-from diagnose.training.train import predict_windows
 
 onnx = pytest.importorskip("onnx", reason="extra onnx")
 onnxruntime = pytest.importorskip("onnxruntime", reason="extra onnx")
@@ -99,8 +99,8 @@ def test_a_file_that_answers_otherwise_is_removed(model, tmp_path, capsys, monke
     import diagnose.recordings.onnx_export
 
     class Louder(diagnose.recordings.onnx_export.RawWindows):
-        def forward(self, acceleration):
-            return 1.001 * super().forward(acceleration)
+        def forward(self, *inputs):
+            return 1.001 * super().forward(*inputs)
 
     monkeypatch.setattr(diagnose.recordings.onnx_export, "RawWindows", Louder)
     file = tmp_path / "m.onnx"

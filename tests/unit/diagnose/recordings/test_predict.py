@@ -21,10 +21,12 @@ import gensig.dataset.reader
 from diagnose.cli import main
 from diagnose.data.windows import Segments, load_windows, task_of
 from diagnose.networks.domain import band_levels
-from diagnose.recordings.predict import Source, predict_recording
+from diagnose.recordings.predict import predict_recording
+from diagnose.recordings.registry import open_network
+from diagnose.recordings.source import Source
 from diagnose.recordings.verdict import class_text, score_text, verdict
+from diagnose.training.classes import predict_windows
 from diagnose.training.store import load_domain, load_model
-from diagnose.training.train import predict_windows
 
 RATE = 12800
 FAST = [
@@ -66,8 +68,9 @@ def levels_model(tmp_path_factory):
 
 
 def predicted(model, file, **options):
-    network, description = load_model(model)
-    return predict_recording(network, description, load_domain(model, description), Source(file=str(file), **options))
+    network = open_network(model)
+    source = Source(file=str(file), **options)
+    return predict_recording(network, load_domain(model, network.description), source)
 
 
 def array(path, signal, rate=RATE):
@@ -344,7 +347,7 @@ def test_models_that_are_none_are_refused(model, tmp_path, capsys):
 
 def test_predict_loads_neither_numba_nor_the_physics():
     code = (
-        "import sys, diagnose.recordings.predict, diagnose.training.store, diagnose.networks.domain\n"
+        "import sys, diagnose.recordings.predict, diagnose.recordings.registry, diagnose.networks.domain\n"
         "bad = [n for n in sys.modules if n == 'numba' or re.match('gensig.(mesh|geometry|faults|dynamics|systems|"
         "sensing|twin)', n)]\n"
         "assert not bad, bad"

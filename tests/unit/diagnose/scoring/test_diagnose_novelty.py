@@ -23,7 +23,8 @@ from diagnose.studies.novelty_metrics import (
 )
 from diagnose.studies.study import plan_study, task_from
 from diagnose.training.autoencoder import WindowAutoencoder, fit_autoencoder, reconstruction_error
-from diagnose.training.train import predict_windows, train_network
+from diagnose.training.classes import Classes, predict_windows
+from diagnose.training.train import train_network
 from gensig.errors import ConfigError
 from gensig.options.compose import compose
 
@@ -171,7 +172,7 @@ def test_features_and_outputs_are_those_of_the_last_layer():
     settings = settings_of()
     task = task_from(OpenDataset(), settings)
     train, validation = (load_windows(task, subset_segments(task, "by_unit", part)) for part in ("train", "validation"))
-    model = train_network(train, validation, model_config=settings.model, n_classes=4, settings=settings, seed=0).model
+    model = train_network(train, validation, target=Classes(n_classes=4), settings=settings, seed=0).model
     every = np.arange(len(validation))
     features, logits = network_outputs(model, validation, every)
     layer = model.head[-1]

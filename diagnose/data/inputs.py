@@ -1,0 +1,113 @@
+"""Kinds of input that a network reads of a record: the interface of windows, turns and others."""
+
+from __future__ import annotations
+
+from abc import ABC, abstractmethod
+from collections.abc import Mapping
+from dataclasses import dataclass
+from typing import Any, ClassVar, Self
+
+import numpy as np
+from numpy.typing import NDArray
+
+from diagnose.data.windows import Read, Segments, Task, WindowSet, read_signal
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class RecordedSignal:
+    """A recording at the rate of a network, and how the records of its training were cut.
+
+    Attributes
+    ----------
+    signal : (channel, sample) m/s^2
+    sampling_rate : Hz
+    speed_rpm : of the driving shaft; None where nobody knows it
+    file : name of the recording, for messages
+    window_samples, stride_samples, normalise : as in `diagnose.data.windows.Task`
+    """
+
+    signal: NDArray[np.float32]
+    sampling_rate: float
+    speed_rpm: float | None
+    file: str
+    window_samples: int
+    stride_samples: int
+    normalise: str
+
+
+class NetworkInput(ABC):
+    """Kind of input of a network, with the values that its configuration gives.
+
+    A network names its kind once, in `diagnose.networks.network.Network.inputs`. Studies,
+    predictions and exports ask the value that `diagnose.networks.registry.input_of` reads.
+
+    Attributes
+    ----------
+    has_window_length : True if ``window_samples`` and ``stride_samples`` decide how it is cut
+    why_not_exported : reason in one line why no ONNX file can make it of m/s^2; None if one can
+    """
+
+    has_window_length: ClassVar[bool]
+    why_not_exported: ClassVar[str | None]
+
+    @classmethod
+    @abstractmethod
+    def completed(
+        cls,
+        model_config: Mapping[str, Any],
+        attributes: Mapping[str, Any],
+    ) -> dict[str, Any]:
+        """Configuration of a network with what its input takes of a data set's attributes.
+
+        Raises
+        ------
+        ConfigError    if the data set does not say it
+        """
+
+    @classmethod
+    @abstractmethod
+    def of(cls, model_config: Mapping[str, Any]) -> Self:
+        """Input of a completed configuration, of a study or of a stored network."""
+
+    @abstractmethod
+    def check(self, task: Task, segments: Segments, network: str) -> None:
+        """Refuse stretches that hold no input, before anything is read.
+
+        Raises
+        ------
+        ConfigError    with the name of the network where it matters
+        """
+
+    @abstractmethod
+    def n_points(self, window_samples: int) -> int:
+        """Points of one input along its last axis, for windows of a study's length."""
+
+    @abstractmethod
+    def load(
+        self,
+        task: Task,
+        segments: Segments,
+        *,
+        training: bool = False,
+        read: Read = read_signal,
+    ) -> WindowSet:
+        """Inputs of stretches of a data set, with labels and further targets.
+
+        Parameters
+        ----------
+        training : whether a kind may add inputs that only a training profits from
+        read : signal of a stretch
+        """
+
+    @abstractmethod
+    def of_recording(self, recording: RecordedSignal) -> WindowSet:
+        """Inputs of a recording, whose record and label are 0.
+
+        Raises
+        ------
+        ConfigError    for a recording that holds none
+        """
+
+    @abstractmethod
+    def seconds(self, *, window: float, recording: float) -> float:
+        """Seconds that one input is about, of a window's and a whole recording's."""

@@ -1,0 +1,288 @@
+"""A recording as a network takes it: channels chosen, speed followed, resampled and cut."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass, replace
+from pathlib import Path
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from diagnose.data.inputs import RecordedSignal
+from diagnose.data.windows import WindowSet
+from diagnose.networks.registry import input_of
+from gensig.errors import ConfigError
+from gensig.signals.recording import (
+    Recording,
+    RecordingFile,
+    read_file,
+    recording_of,
+    without_unit,
+)
+from gensig.signals.resampling import rate_change
+
+if TYPE_CHECKING:
+    from diagnose.data.tracking import Tracked
+    from diagnose.training.store import ModelDescription
+
+RATE_OPTION = "--sampling-rate"
+RATE_TOLERANCE = 1e-3
+SPEED_TOLERANCE = 0.02  # assumed: how well a user knows the speed
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class Source:
+    """A recording as the user describes it; None where the file tells or nothing is known.
+
+    Attributes
+    ----------
+    file : see `gensig.signals.recording.read_file`
+    sampling_rate : Hz
+    speed_rpm : r/min of the driving shaft, compared with the speeds of the training records
+    teeth : of the driving and the driven gear, compared with those of the training records
+    tacho : name of a channel with the pulses of the driving shaft
+    pulses_per_turn : of it
+    as_recorded : no order tracking, whatever is known
+    to_speed_rpm : r/min that an order-tracked recording is played at; None is its own mean
+    channels : names in the file, in the order of the network's
+    unit : m/s2 or g
+    array : name in a .npz, HDF5 or MATLAB file
+    torque_nm : N m of the driving shaft, for remaining lives
+    life_time_h : h since the machine was new, for remaining lives with the age
+    """
+
+    file: str
+    sampling_rate: float | None = None
+    speed_rpm: float | None = None
+    teeth: tuple[int, int] | None = None
+    tacho: str | None = None
+    pulses_per_turn: int = 1
+    as_recorded: bool = False
+    to_speed_rpm: float | None = None
+    channels: tuple[str, ...] | None = None
+    unit: str = "m/s2"
+    array: str | None = None
+    torque_nm: float | None = None
+    life_time_h: float | None = None
+
+    def __post_init__(self) -> None:
+        if self.speed_rpm is not None and not 0.0 < self.speed_rpm < 1e6:
+            raise ConfigError(f"--speed-rpm {self.speed_rpm:g} must be positive")
+        if self.teeth is not None and not all(4 <= n_teeth <= 1000 for n_teeth in self.teeth):
+            raise ConfigError(
+                f"--teeth {self.teeth[0]} {self.teeth[1]}: a gear has 4 to 1000 teeth",
+            )
+        if self.pulses_per_turn < 1:
+            raise ConfigError(f"--pulses-per-turn {self.pulses_per_turn} must be at least 1")
+        if self.to_speed_rpm is not None and not self.is_tracked:
+            raise ConfigError(
+                "--to-speed needs order tracking: give --tacho, or --teeth and --speed-rpm",
+            )
+        if Path(self.file).expanduser().is_dir():
+            raise ConfigError(
+                f"{self.file} is a folder, not a recording; for a data set use diagnose evaluate",
+            )
+
+    @property
+    def is_tracked(self) -> bool:
+        """True if enough is known to follow the speed."""
+        by_mesh = self.teeth is not None and self.speed_rpm is not None
+        return (self.tacho is not None or by_mesh) and not self.as_recorded
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class PreparedRecording:
+    """A recording with its inputs for a network.
+
+    Attributes
+    ----------
+    windows : inputs as the network takes them
+    recording : as read, at its own rate
+    channels : names in the file, in the order of the network's
+    tracked : the recording over the shaft's angle; None without order tracking
+    speed_rpm : r/min at which the inputs are; None where nobody knows it
+    duration_s : that one input is about
+    """
+
+    windows: WindowSet
+    recording: Recording
+    channels: tuple[str, ...]
+    tracked: Tracked | None
+    speed_rpm: float | None
+    duration_s: float
+
+
+def prepare_recording(description: ModelDescription, source: Source) -> PreparedRecording:
+    """Inputs of a recording for a network.
+
+    Raises
+    ------
+    ConfigError    for a recording that cannot be read, is too short or too slowly sampled, or
+        whose channels do not fit
+    """
+    recording, channels, tacho = _read(description, source)
+    tracked = _tracked(recording, tacho, source) if source.is_tracked else None
+    rate = description.sampling_rate_hz
+    speed = source.speed_rpm if tracked is None else source.to_speed_rpm or tracked.speed_rpm
+    recorded = RecordedSignal(
+        signal=_in_domain(recording, tracked, description, source),
+        sampling_rate=rate,
+        speed_rpm=speed,
+        file=source.file,
+        window_samples=description.window_samples,
+        stride_samples=description.stride_samples,
+        normalise=description.normalise,
+    )
+    inputs = input_of(description.model)
+    n_recorded = recording.acceleration.shape[-1]
+    return PreparedRecording(
+        windows=inputs.of_recording(recorded),
+        recording=recording,
+        channels=channels,
+        tracked=tracked,
+        speed_rpm=speed,
+        duration_s=inputs.seconds(
+            window=description.window_samples / rate,
+            recording=float(n_recorded / recording.sampling_rate),
+        ),
+    )
+
+
+def tracking_facts(tracked: Tracked, source: Source) -> dict[str, Any]:
+    """Order tracking of a recording: its kind and the speeds."""
+    return {
+        "by": tracked.by,
+        "speed_rpm": tracked.speed_rpm,
+        "speed_range_rpm": list(tracked.speed_range_rpm),
+        "played_at_rpm": source.to_speed_rpm or tracked.speed_rpm,
+    }
+
+
+def tracking_text(tracking: Mapping[str, Any] | None) -> str:
+    """Order tracking in words, from its facts; empty without any."""
+    if not tracking:
+        return ""
+    low, high = tracking["speed_range_rpm"]
+    return f" (speed by {tracking['by']}, {low:.5g} to {high:.5g} r/min, played at {tracking['played_at_rpm']:.5g})"
+
+
+def _tracked(recording: Recording, tacho: NDArray[np.floating] | None, source: Source) -> Tracked:
+    """The recording over the angle of the driving shaft."""
+    from diagnose.data.tracking import track_by_mesh, track_by_tacho
+    from gensig.signals.mesh_motion import Teeth
+
+    if tacho is None or source.tacho is None:
+        assert source.teeth is not None
+        assert source.speed_rpm is not None
+        return track_by_mesh(
+            recording,
+            Teeth(driving=source.teeth[0], driven=source.teeth[1]),
+            source.speed_rpm,
+        )
+    tracked = track_by_tacho(
+        recording,
+        tacho,
+        source.tacho,
+        pulses_per_turn=source.pulses_per_turn,
+    )
+    low, high = (
+        (1 - SPEED_TOLERANCE) * tracked.speed_range_rpm[0],
+        (1 + SPEED_TOLERANCE) * tracked.speed_range_rpm[1],
+    )
+    if source.speed_rpm is not None and not low <= source.speed_rpm <= high:
+        raise ConfigError(
+            f"--tacho {source.tacho} gives {tracked.speed_rpm:.5g} r/min, --speed-rpm says {source.speed_rpm:g}; check "
+            "--pulses-per-turn, or leave --speed-rpm out"
+        )
+    return tracked
+
+
+def _read(
+    description: ModelDescription,
+    source: Source,
+) -> tuple[Recording, tuple[str, ...], NDArray[Any] | None]:
+    """Recording with the network's channels in their order, what the file calls them, and the tachometer's."""
+    content = read_file(
+        source.file,
+        rate=source.sampling_rate,
+        array=source.array,
+        rate_option=RATE_OPTION,
+    )
+    tacho = None
+    if source.tacho is not None:
+        if source.tacho not in content.channels:
+            raise ConfigError(
+                f"{content.file}: no channel {source.tacho}; it has {', '.join(content.channels)}",
+            )
+        place = content.channels.index(source.tacho)
+        tacho = content.values[place]
+        names = tuple(name for name in content.channels if name != source.tacho)
+        if not names:
+            raise ConfigError(f"{content.file}: there is no channel beside {source.tacho}")
+        content = replace(content, channels=names, values=np.delete(content.values, place, axis=0))
+    chosen = _channels(content, description.channel_names, source.channels)
+    needs_level = description.normalise == "none"
+    return (
+        recording_of(content, unit=source.unit, channels=chosen, needs_level=needs_level),
+        chosen,
+        tacho,
+    )
+
+
+def _channels(
+    content: RecordingFile,
+    wanted: Sequence[str],
+    given: Sequence[str] | None,
+) -> tuple[str, ...]:
+    """Channels of the file for those of the network: as given, by name, or in order where no name says otherwise."""
+    needs = f"the model takes {len(wanted)}, {', '.join(wanted)}"
+    if given is not None:
+        if len(given) != len(wanted):
+            raise ConfigError(
+                f"--channels names {len(given)} channel(s); {needs}: name as many, in this order",
+            )
+        return tuple(given)
+    by_name = {without_unit(name): name for name in content.channels}
+    if all(name in by_name for name in wanted):
+        return tuple(by_name[name] for name in wanted)
+    has = f"{content.file} has {len(content.channels)} channel(s), {', '.join(content.channels)}"
+    if len(content.channels) != len(wanted):
+        raise ConfigError(f"{has}; {needs}: choose with --channels, in this order")
+    if content.named and len(wanted) > 1:
+        raise ConfigError(f"{has}; {needs}: say which is which with --channels, in this order")
+    return content.channels
+
+
+def _in_domain(
+    recording: Recording,
+    tracked: Tracked | None,
+    description: ModelDescription,
+    source: Source,
+) -> NDArray[np.float32]:
+    """(channel, sample) at the network's rate and one speed; refuses what holds less bandwidth than that."""
+    found, rate, file = recording.sampling_rate, description.sampling_rate_hz, source.file
+    if found < rate * (1 - RATE_TOLERANCE):
+        raise ConfigError(
+            f"{file} has {found:g} samples a second and so nothing above {found / 2:g} Hz; the model was trained at "
+            f"{rate:g}: measure faster, or train a model with sampling_rate_hz={found:g} or below"
+        )
+    if tracked is None:
+        return rate_change(found, rate).apply(recording.acceleration).astype(np.float32)
+    from diagnose.data.tracking import at_constant_speed
+
+    speed, played = tracked.speed_rpm, source.to_speed_rpm or tracked.speed_rpm
+    if description.speed_rpm_range is not None and source.to_speed_rpm is not None:
+        low, high = description.speed_rpm_range
+        if not low <= played <= high:
+            raise ConfigError(
+                f"--to-speed {played:g} must lie in the {low:.0f} to {high:.0f} r/min of the training",
+            )
+    as_fast = found * played / speed
+    if as_fast < rate * (1 - RATE_TOLERANCE):
+        raise ConfigError(
+            f"{file}: {found:g} samples a second at {speed:.4g} r/min, played at {played:g}, are {as_fast:.5g}; "
+            f"the model was trained at {rate:g}: give a --to-speed of {speed * rate / found:.4g} or more"
+        )
+    return at_constant_speed(tracked, rate, played).astype(np.float32)

@@ -1,0 +1,168 @@
+"""A stored classifier: probabilities of a recording, scores on a data set, its graph."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from dataclasses import dataclass
+from pathlib import Path
+from typing import TYPE_CHECKING, Any, Self, final
+
+import numpy as np
+from torch.nn.functional import log_softmax
+
+from diagnose.data.targets import GEARS
+from diagnose.networks.calibration import calibration_scores, probabilities
+from diagnose.networks.network import Network
+from diagnose.networks.registry import input_of
+from diagnose.recordings.source import PreparedRecording, Source, tracking_text
+from diagnose.recordings.stored_network import Answer, Graph, Scores, StoredNetwork
+from diagnose.recordings.verdict import class_text, score_text, verdict
+from diagnose.scoring.metrics import over_records
+from diagnose.training.classes import predict_windows
+from diagnose.training.heads import predict_heads
+from diagnose.training.store import ModelDescription, data_fingerprint, load_model
+from gensig.errors import ConfigError, DatasetError
+
+if TYPE_CHECKING:
+    from diagnose.data.windows import Segments, Task
+    from gensig.dataset.reader import Dataset
+
+
+@final
+@dataclass(frozen=True, slots=True, kw_only=True)
+class StoredClassifier(StoredNetwork):
+    """A network that tells classes apart."""
+
+    model: Network
+    description: ModelDescription
+
+    @classmethod
+    def load(cls, folder: str | Path) -> Self:
+        """Classifier of a folder."""
+        model, description = load_model(folder)
+        return cls(model=model, description=description)
+
+    def check(self, source: Source) -> None:
+        """Refuse torque and age, which no classifier takes."""
+        for name in ("torque_nm", "life_time_h"):
+            if getattr(source, name) is not None:
+                option = name.replace("_", "-")
+                raise ConfigError(f"--{option} is for models of remaining life; leave it out")
+
+    def answer(self, source: Source, prepared: PreparedRecording) -> Answer:
+        """Class, probabilities, and severity and gear as far as the network has such heads."""
+        description, windows = self.description, prepared.windows
+        log_probability = predict_windows(self.model, windows)
+        _, by_record = over_records(log_probability, windows.record)
+        overall = probabilities(by_record, description.temperature)[0]
+        names, speeds = description.class_names, description.speed_rpm_range
+        by_class = dict(zip(names, overall.tolist(), strict=True))
+        heads = {name: values[0] for name, values in predict_heads(self.model, windows).items()}
+        severity, gear = heads.get("severity"), heads.get("gear")
+        return Answer(
+            record={
+                **verdict(by_class, description.test_score),
+                "probabilities": by_class,
+                "severity": None if severity is None else float(severity[overall.argmax()]),
+                "gear": None if gear is None else GEARS[int(gear.argmax())],
+            },
+            windows=[
+                {"probabilities": dict(zip(names, row.tolist(), strict=True))} for row in probabilities(log_probability)
+            ],
+            conditions={
+                "adaptation": description.adaptation,
+                "speed_rpm": source.speed_rpm,
+            },
+            training={"trained_speed_rpm": None if speeds is None else list(speeds)},
+        )
+
+    def line(self, result: Mapping[str, Any]) -> str:
+        """Class and the one behind it, speed, and how far the model can be relied on."""
+        said = f"{result['recording']}: {class_text(result)}"
+        is_faulty = result["gear"] not in (None, "none")
+        if result["severity"] is not None and is_faulty and not result["undecided"]:
+            said += f", severity {result['severity']:.2f} on the {result['gear']}"
+        said += tracking_text(result["order_tracking"])
+        n_windows, beyond = result["n_windows"], result["n_windows_beyond"]
+        if result["out_of_distribution"]:
+            reasons = "; ".join(result["reasons"])
+            return f"{said}; OUT OF DISTRIBUTION, do not rely on the class: {reasons}"
+        if beyond is None:
+            flag = "no out-of-distribution flag: the model stores none, train it again"
+        else:
+            flag = f"like the training data ({beyond} of {n_windows} windows beyond it)"
+        return f"{said}; {flag}; {score_text(result)}"
+
+    def classes_of(self, dataset: Dataset) -> tuple[str, ...]:
+        """Classes of the training, which must be those of the data set unless it is the same."""
+        known, offered = self.description.class_names, tuple(dataset.class_names)
+        is_same = data_fingerprint(dataset) == self.description.data_fingerprint
+        if set(known) - set(offered) or (set(offered) - set(known) and not is_same):
+            raise DatasetError(
+                f"{dataset.folder} does not fit the model: its classes are {', '.join(offered)}, "
+                f"the model knows {', '.join(known)}"
+            )
+        return known
+
+    def scores(self, task: Task, segments: Segments, part: str) -> Scores:
+        """Scores by record with intervals over units, confusion, recall and calibration."""
+        from diagnose.studies.study import score_predictions
+
+        description = self.description
+        windows = input_of(description.model).load(task, segments)
+        by_window = predict_windows(self.model, windows)
+        record, log_probability = over_records(by_window, windows.record)
+        units = np.asarray(task.dataset.column("unit_id"))[record]
+        predicted = [(record, log_probability.argmax(axis=1))]
+        label, temperature = task.labels()[record], description.temperature
+        return Scores(
+            counts={"n_records": int(record.size), "n_units": int(np.unique(units).size)},
+            method={},
+            values={
+                "calibration": calibration_scores([log_probability], [label], [temperature]),
+                **score_predictions(task, predicted, description.n_bootstrap),
+            },
+            write=_write_confusion,
+        )
+
+    def lines(self, result: Mapping[str, Any]) -> list[str]:
+        """Part, channels, both scores and the recall of each class."""
+        lines = [
+            f"{result['n_records']} records of {result['n_units']} unit(s): {result['part']}",
+            f"channels {', '.join(result['channel_names'])}",
+        ]
+        for name in ("balanced_accuracy", "macro_f1"):
+            score = result[name]
+            spread = "no 95 % interval: too few machines"
+            if score["low"] is not None:
+                low, high = score["low"], score["high"]
+                spread = f"95 % interval over units {low:.3f} to {high:.3f}"
+            lines.append(f"{name} {score['mean']:.3f}, {spread}")
+        return lines + [f"recall {name} {share:.3f}" for name, share in result["recall"].items()]
+
+    def graph(self) -> Graph:
+        """Windows in m/s^2 in, log-probabilities out."""
+        description = self.description
+        return Graph(
+            answer=lambda model, windows: log_softmax(model(windows), dim=1),
+            further={},
+            output="log_probability",
+            unit=1.0,
+            unit_text="a log-probability",
+            agreement="log-probabilities within {:.1g} of torch's",
+            facts={
+                "class_names": list(description.class_names),
+                "temperature": description.temperature,
+                "probability": "softmax over classes of the mean log_probability over the windows "
+                "of a record / temperature",
+            },
+        )
+
+
+def _write_confusion(folder: Path, result: dict[str, Any]) -> None:
+    """Write ``confusion.png``."""
+    from diagnose.report.figures import confusion_figure
+
+    title = f"{result['model']}, {result['part']}"
+    path = folder / "confusion.png"
+    confusion_figure(path, result["confusion"], result["class_names"], title)

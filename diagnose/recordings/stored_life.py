@@ -1,0 +1,247 @@
+"""A stored network of remaining lives: hours that are left of a machine, scores, its graph."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from dataclasses import dataclass
+from pathlib import Path
+from typing import TYPE_CHECKING, Any, Self, final
+
+import numpy as np
+from numpy.typing import NDArray
+
+from diagnose.networks.registry import input_of
+from diagnose.recordings.raw_windows import N_CHECKED
+from diagnose.recordings.source import SPEED_TOLERANCE, PreparedRecording, Source
+from diagnose.recordings.stored_network import Answer, Graph, Scores, StoredNetwork
+from diagnose.scoring.life_scores import MEASURES, by_life, interval, life_scores
+from diagnose.training.life_store import AGE, LifeFacts, load_life_model
+from diagnose.training.remaining_life import LifeNetwork, shares_of_records, shares_of_windows
+from diagnose.training.store import ModelDescription
+from gensig.errors import ConfigError, DatasetError
+
+if TYPE_CHECKING:
+    from diagnose.data.windows import Segments, Task
+    from gensig.dataset.reader import Dataset
+
+OPTIONS = {"torque_nm": "--torque-nm", AGE: "--life-time-h"}
+UNITS = {"torque_nm": "N m", AGE: "h"}
+
+
+@final
+@dataclass(frozen=True, slots=True, kw_only=True)
+class StoredLife(StoredNetwork):
+    """A network of remaining lives, with the facts of its hours."""
+
+    model: LifeNetwork
+    description: ModelDescription
+    facts: LifeFacts
+
+    @classmethod
+    def load(cls, folder: str | Path) -> Self:
+        """Network of remaining lives of a folder."""
+        model, description, facts = load_life_model(folder)
+        return cls(model=model, description=description, facts=facts)
+
+    def check(self, source: Source) -> None:
+        """Refuse a missing torque or age, no such number, and a column that it does not take."""
+        for name, value in (("torque_nm", source.torque_nm), (AGE, source.life_time_h)):
+            option, is_told = OPTIONS[name], name in self.facts.told
+            if value is None and is_told:
+                raise ConfigError(f"this model must know {name} of {source.file}: say {option}")
+            if value is not None and not is_told:
+                raise ConfigError(
+                    f"{option}: {self.facts.method} is not told {name}; leave it out",
+                )
+            if value is not None and not 0.0 <= value < float("inf"):
+                raise ConfigError(f"{option} {value:g} must be 0 or above")
+
+    def answer(self, source: Source, prepared: PreparedRecording) -> Answer:
+        """Remaining life in h, with the interval of its training."""
+        facts, speed = self.facts, prepared.speed_rpm
+        if speed is None:
+            raise ConfigError(
+                f"this model must know the speed of {source.file}: say --speed-rpm or --tacho",
+            )
+        values = {"speed_rpm": speed, "torque_nm": source.torque_nm, AGE: source.life_time_h}
+        conditions = np.array([[float(values[name] or 0.0) for name in facts.told]])
+        by_window = shares_of_windows(self.model, prepared.windows, conditions)
+        level = facts.early_life_h
+        share = float(np.clip(by_window.mean(), 0.0, 1.0))
+        low, high = interval(np.array(share * level), facts.half_width_h, level)
+        return Answer(
+            record={
+                "remaining_life_h": share * level,
+                "low_h": float(low),
+                "high_h": float(high),
+                "at_early_level": share == 1.0,
+                "early_life_h": level,
+                "coverage": facts.coverage,
+                "intervals_hold": facts.intervals_hold,
+                "n_calibration_lives": facts.n_calibration_lives,
+                "method": facts.method,
+            },
+            windows=[{"remaining_life_h": float(np.clip(of_window, 0.0, 1.0)) * level} for of_window in by_window],
+            conditions={
+                "told": {name: values[name] for name in facts.told},
+                "trained_range": {name: list(facts.told_range[name]) for name in facts.told},
+            },
+            training={"trained_classes": list(self.description.class_names)},
+            reasons=[line for name in OPTIONS if (line := _outside(facts, name, values[name]))],
+        )
+
+    def line(self, result: Mapping[str, Any]) -> str:
+        """Hours left with their interval, and how far the model can be relied on."""
+        level, hours = result["early_life_h"], result["remaining_life_h"]
+        left = f"{level:.3g} h or longer" if result["at_early_level"] else f"{hours:.3g} h left"
+        said = f"{result['recording']}: {left}"
+        if result["intervals_hold"]:
+            end = f"{result['high_h']:.3g} h"
+            if result["high_h"] >= level:
+                end += " or longer"
+            said += f", {result['coverage']:.0%} interval {result['low_h']:.3g} to {end}"
+        else:
+            n_lives = result["n_calibration_lives"]
+            said += f"; no interval: {n_lives} validation lives are too few for one"
+        if result["out_of_distribution"]:
+            reasons = "; ".join(result["reasons"])
+            return f"{said}; OUT OF DISTRIBUTION, do not rely on it: {reasons}"
+        beyond, n_windows = result["n_windows_beyond"], result["n_windows"]
+        return f"{said}; like the training data ({beyond} of {n_windows} windows beyond it)"
+
+    def classes_of(self, dataset: Dataset) -> tuple[str, ...]:
+        """Classes of the training that the data set has, at least one."""
+        trained = self.description.class_names
+        classes = tuple(name for name in trained if name in dataset.class_names)
+        if not classes:
+            raise DatasetError(
+                f"{dataset.folder} does not fit the model: its classes are "
+                f"{', '.join(dataset.class_names)}, the model was trained on {', '.join(trained)}"
+            )
+        return classes
+
+    def scores(self, task: Task, segments: Segments, part: str) -> Scores:
+        """Scores by life, with the level and the intervals of the training."""
+        from diagnose.data.lives import kept_segments, lives_of
+        from diagnose.studies.life_jobs import LifePrediction
+        from diagnose.studies.life_study import (
+            below_bound,
+            count_lives,
+            scored_snapshots,
+            write_life_predictions,
+        )
+        from diagnose.studies.study import BOOTSTRAP_SEED
+
+        facts, dataset = self.facts, task.dataset
+        lives = lives_of(task)
+        self._check_columns(dataset)
+        segments = kept_segments(segments, lives.name != "")
+        if not lives.failed[segments.record].any():
+            raise ConfigError(
+                f"{dataset.folder}, {part}: no life failed, so that there is nothing to score",
+            )
+        columns = [np.asarray(dataset.column(name), dtype=float) for name in facts.told]
+        windows = input_of(self.description.model).load(task, segments)
+        record, share = shares_of_records(self.model, windows, np.stack(columns, axis=1))
+        prediction = LifePrediction(
+            protocol=self.description.protocol,
+            method=facts.method,
+            seed=self.description.seed,
+            record=record,
+            said=facts.early_life_h * share,
+            half_width=facts.half_width_h,
+            early_life=facts.early_life_h,
+            detail=part,
+        )
+        by_measure = by_life(scored_snapshots(lives, prediction))
+        table = {name: row[None] for name, row in by_measure.items()}
+        rng = np.random.default_rng(BOOTSTRAP_SEED)
+
+        def write(folder: Path, result: dict[str, Any]) -> None:
+            from diagnose.report.life_report import life_figure
+
+            write_life_predictions(folder / "predictions.csv", task, lives, [prediction])
+            life_figure(folder / "remaining_life.png", lives, [prediction])
+
+        return Scores(
+            counts={
+                "n_records": int(record.size),
+                "n_lives": count_lives(lives, record, failed=True),
+                "n_lives_censored": count_lives(lives, record, failed=False),
+            },
+            method={"method": facts.method},
+            values={
+                "early_life_h": facts.early_life_h,
+                "half_width_h": facts.half_width_h,
+                "coverage_wanted": facts.coverage,
+                "intervals_hold": facts.intervals_hold,
+                "censored_below_bound": below_bound(lives, prediction),
+                **life_scores(table, n_bootstrap=self.description.n_bootstrap, rng=rng),
+            },
+            write=write,
+        )
+
+    def _check_columns(self, dataset: Dataset) -> None:
+        """Refuse a data set without a column that the network takes beside the signal."""
+        absent = [name for name in self.facts.told if name not in dataset.column_names]
+        if absent:
+            raise DatasetError(
+                f"{dataset.folder} does not fit the model, which is told {absent[0]}: it has no such column"
+            )
+
+    def lines(self, result: Mapping[str, Any]) -> list[str]:
+        """Part, channels, every measure, and the coverage that was wanted."""
+        lives, censored = result["n_lives"], result["n_lives_censored"]
+        channels, level = ", ".join(result["channel_names"]), result["early_life_h"]
+        lines = [
+            f"{result['n_records']} records of {lives} lives that failed (and {censored} censored): {result['part']}",
+            f"channels {channels}; remaining life cut at {level:.4g} h",
+        ]
+        for name in MEASURES:
+            mean, low, high = (result[name][key] for key in ("mean", "low", "high"))
+            lines.append(f"{name} {mean:.4g}, 95 % interval over lives {low:.4g} to {high:.4g}")
+        wanted = f"coverage wanted {result['coverage_wanted']:.0%}"
+        if not result["intervals_hold"]:
+            wanted += ": too few validation lives for such intervals"
+        return [*lines, wanted]
+
+    def graph(self) -> Graph:
+        """Windows in m/s^2 and the columns beside them in, hours out."""
+        facts = self.facts
+        return Graph(
+            answer=lambda model, windows, told: model(windows, told),
+            further={"told": _condition_examples(facts)},
+            output="remaining_life_h",
+            unit=facts.early_life_h,
+            unit_text="the early level",
+            agreement="hours within {:.1g} of the early level of torch's",
+            facts={
+                "told": list(facts.told),
+                "told_range": {name: list(ends) for name, ends in facts.told_range.items()},
+                "early_life_h": facts.early_life_h,
+                "half_width_h": facts.half_width_h,
+                "coverage": facts.coverage,
+                "intervals_hold": facts.intervals_hold,
+                "record": "mean of remaining_life_h over the windows of a record, cut to "
+                "0..early_life_h, which stands for itself and all above; interval: half_width_h "
+                "to both sides, cut alike",
+            },
+        )
+
+
+def _condition_examples(facts: LifeFacts) -> NDArray[np.float32]:
+    """(window, column) within the ranges of the training, as many as examples of windows."""
+    low, high = np.array([facts.told_range[name] for name in facts.told]).reshape(-1, 2).T
+    share = np.random.default_rng(1).uniform(size=(N_CHECKED, len(facts.told)))
+    return (low + share * (high - low)).astype(np.float32)
+
+
+def _outside(facts: LifeFacts, name: str, value: float | None) -> str | None:
+    """Why a value is unlike those of the training; None if it is like them or not taken."""
+    if value is None:
+        return None
+    low, high = facts.told_range[name]
+    if low * (1 - SPEED_TOLERANCE) <= value <= high * (1 + SPEED_TOLERANCE):
+        return None
+    unit = UNITS[name]
+    return f"{value:g} {unit} is outside the {low:.4g} to {high:.4g} {unit} of the training"

@@ -1,0 +1,243 @@
+"""The pieces of a study of remaining lives: baselines and networks of one protocol."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from dataclasses import dataclass, replace
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from diagnose.baselines.features import Cache
+from diagnose.baselines.life_models import (
+    Table,
+    age_table,
+    constant_regression,
+    fit_regression,
+    indicator_table,
+    operating_names,
+    operating_values,
+    with_age,
+)
+from diagnose.data.lives import (
+    Lives,
+    balanced_weights,
+    early_level,
+    kept_segments,
+    life_segments,
+    lives_of,
+)
+from diagnose.data.windows import SUBSETS, Segments, Task
+from diagnose.networks.domain import Domain, fit_domain
+from diagnose.networks.registry import input_of
+from diagnose.scoring.life_scores import conformal_half_width
+from diagnose.settings import TrainSettings
+from diagnose.studies.jobs import Job
+from diagnose.training.life_store import AGE, LifeFacts
+from diagnose.training.remaining_life import RemainingLife, shares_of_records
+from diagnose.training.train import train_network
+
+FloatArray = NDArray[np.floating]
+IntArray = NDArray[np.integer]
+AGE_ONLY, CONSTANT, INDICATORS, AND_AGE = "age_only", "constant", "indicators", "_and_age"
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class LifePrediction:
+    """Test snapshots of a protocol with the answers of one method, trained with one seed.
+
+    Attributes
+    ----------
+    record : (record,) place in the data set, sorted, each once
+    said : (record,) h remaining life, cut at the early level
+    half_width : h, of the intervals; the early level where calibration lives are too few
+    early_life : h
+    detail : fit or training, in words
+    facts, weights, domain, best_epoch : of networks only, for their files
+    temperature : 1, there are no probabilities
+    """
+
+    protocol: str
+    method: str
+    seed: int
+    record: IntArray
+    said: FloatArray
+    half_width: float
+    early_life: float
+    detail: str
+    facts: LifeFacts | None = None
+    weights: dict[str, NDArray[Any]] | None = None
+    domain: Domain | None = None
+    best_epoch: int = 0
+    temperature: float = 1.0
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class LifeSets:
+    """Snapshots of a protocol, and the remaining life that is to be learnt of them.
+
+    Attributes
+    ----------
+    protocol : name of the split
+    lives : of the data set
+    parts : subset -> stretches; in training and validation those of known remaining life
+    level : h, at which the remaining life is cut
+    share : (record,) remaining life as a share of the level, of all records
+    calibration : validation records of lives that failed
+    coverage : of the intervals
+    """
+
+    protocol: str
+    lives: Lives
+    parts: Mapping[str, Segments]
+    level: float
+    share: FloatArray
+    calibration: IntArray
+    coverage: float
+
+    def prediction(
+        self,
+        method: str,
+        detail: str,
+        share: FloatArray,
+        seed: int = 0,
+    ) -> LifePrediction:
+        """Test snapshots with a method's shares of the level, (record,), of all records."""
+        error = self.level * np.abs(share - self.share)[self.calibration]
+        life = self.lives.name[self.calibration]
+        record = np.sort(self.parts["test"].record)
+        return LifePrediction(
+            protocol=self.protocol,
+            method=method,
+            seed=seed,
+            record=record,
+            said=self.level * share[record],
+            half_width=min(conformal_half_width(error, life, self.coverage), self.level),
+            early_life=self.level,
+            detail=detail,
+        )
+
+
+def life_sets(task: Task, settings: TrainSettings, protocol: str) -> LifeSets:
+    """Snapshots of one protocol."""
+    lives = lives_of(task)
+    parts = {subset: life_segments(task, lives, protocol, subset) for subset in SUBSETS}
+    level = early_level(
+        lives,
+        parts["train"].record,
+        level_h=settings.remaining_life.early_life_h,
+        share=settings.remaining_life.early_life_share,
+    )
+    known = lives.known(level)
+    for subset in ("train", "validation"):
+        parts[subset] = kept_segments(parts[subset], known)
+    held_out = parts["validation"].record
+    return LifeSets(
+        protocol=protocol,
+        lives=lives,
+        parts=parts,
+        level=level,
+        share=np.minimum(lives.remaining, level) / level,
+        calibration=held_out[lives.failed[held_out]],
+        coverage=settings.remaining_life.coverage,
+    )
+
+
+def run_life_job(task: Task, settings: TrainSettings, job: Job) -> list[LifePrediction]:
+    """Predictions on the test part of a protocol, of the baselines or, with a seed, of networks."""
+    sets = life_sets(task, settings, job.protocols[0])
+    if job.seed is None:
+        return _baselines(task, settings, sets)
+    return _networks(task, settings, sets, job.seed)
+
+
+def _baselines(task: Task, settings: TrainSettings, sets: LifeSets) -> list[LifePrediction]:
+    lives, parts, share = sets.lives, sets.parts, sets.share
+    train = parts["train"].record
+    usual = constant_regression(share[train], lives.name[train])
+    detail = f"{usual:.2f} of the early level for all"
+    predictions = [sets.prediction(CONSTANT, detail, np.full(share.size, usual))]
+    cache: Cache = {}
+    clock = {name: age_table(lives, part) for name, part in parts.items()}
+    heard = {
+        name: indicator_table(task, lives, part, features=settings.features, cache=cache)
+        for name, part in parts.items()
+    }
+    tables: dict[str, dict[str, Table]] = {AGE_ONLY: clock, INDICATORS: heard}
+    if settings.remaining_life.with_age:
+        aged = {name: with_age(table, lives) for name, table in heard.items()}
+        tables[INDICATORS + AND_AGE] = aged
+    for method, table in tables.items():
+        detail, predict = fit_regression(table["train"], table["validation"], lives, share)
+        answer = np.full(share.size, np.nan)
+        for part in ("validation", "test"):
+            answer[table[part].record] = np.clip(predict(table[part]), 0.0, 1.0)
+        predictions.append(sets.prediction(method, detail, answer))
+    return predictions
+
+
+def _networks(
+    task: Task,
+    settings: TrainSettings,
+    sets: LifeSets,
+    seed: int,
+) -> list[LifePrediction]:
+    load, lives = input_of(settings.model).load, sets.lives
+    windows = {name: load(task, part, training=name == "train") for name, part in sets.parts.items()}
+    columns, values = operating_names(task), operating_values(task, np.arange(sets.share.size))
+    network = str(settings.model.get("name", "network"))
+    conditions = {network: (columns, values)}
+    if settings.remaining_life.with_age:
+        aged = np.concatenate([values, lives.age[:, None]], axis=1)
+        conditions[network + AND_AGE] = ((*columns, AGE), aged)
+    weight = np.zeros(sets.share.size)
+    for subset in ("train", "validation"):
+        record = sets.parts[subset].record
+        weight[record] = balanced_weights(lives.name[record])
+    domain = fit_domain(windows["train"], windows["validation"])
+    seen = np.unique(windows["train"].record)
+    predictions = []
+    for method, (columns, values) in conditions.items():
+        target = RemainingLife(conditions=values, share=sets.share, weight=weight)
+        training = train_network(
+            windows["train"],
+            windows["validation"],
+            target=target,
+            settings=settings,
+            seed=seed,
+        )
+        answer = np.full(sets.share.size, np.nan)
+        for subset in ("validation", "test"):
+            record, share = shares_of_records(training.model, windows[subset], values)
+            answer[record] = share
+        prediction = sets.prediction(method, training.detail, answer, seed)
+        predictions.append(
+            replace(
+                prediction,
+                facts=_facts(sets, prediction, columns, values[seen]),
+                weights=training.weights(),
+                domain=domain,
+                best_epoch=training.best_epoch,
+            )
+        )
+    return predictions
+
+
+def _facts(
+    sets: LifeSets,
+    prediction: LifePrediction,
+    columns: tuple[str, ...],
+    values: FloatArray,
+) -> LifeFacts:
+    """Facts of a network whose training records have these values (record, column)."""
+    low, high = values.min(axis=0).tolist(), values.max(axis=0).tolist()
+    return LifeFacts(
+        method=prediction.method,
+        early_life_h=sets.level,
+        half_width_h=prediction.half_width,
+        coverage=sets.coverage,
+        n_calibration_lives=int(np.unique(sets.lives.name[sets.calibration]).size),
+        told=columns,
+        told_range=dict(zip(columns, zip(low, high, strict=True), strict=True)),
+    )

@@ -1,0 +1,162 @@
+"""Classes as what a network learns: cross-entropy, further heads, log-probabilities of records."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass, replace
+from typing import Any, ClassVar, final
+
+import numpy as np
+import torch
+from numpy.typing import NDArray
+from torch import nn
+from torch.nn.functional import cross_entropy, log_softmax
+
+from diagnose.data.targets import further_loss, place_loss
+from diagnose.data.windows import WindowSet
+from diagnose.networks.calibration import fit_temperature
+from diagnose.networks.network import Network
+from diagnose.networks.registry import build_model
+from diagnose.scoring.metrics import over_records
+from diagnose.training.target import FloatArray, IntArray, LearningTarget
+
+HEADS_WEIGHT = 0.3  # of each further head against the classes; assumed
+CACHED = 16  # windows that stay in the cache of a processor
+
+
+@final
+@dataclass(frozen=True, slots=True, kw_only=True)
+class Classes(LearningTarget[Network]):
+    """Class of a record, and with further heads its severity and faulty gear.
+
+    Attributes
+    ----------
+    n_classes : of the task
+    """
+
+    n_classes: int
+    stream: ClassVar[int] = 1
+
+    def network(
+        self,
+        model_config: Mapping[str, Any],
+        train: WindowSet,
+        input_scale: Sequence[float],
+    ) -> Network:
+        """Network with one score a class."""
+        return build_model(
+            model_config,
+            n_channels=len(input_scale),
+            n_classes=self.n_classes,
+            input_scale=input_scale,
+        )
+
+    def loss(
+        self,
+        model: Network,
+        signals: torch.Tensor,
+        windows: WindowSet,
+        batch: IntArray,
+    ) -> torch.Tensor:
+        """Cross-entropy of the classes, and the losses of further heads and of the fault's place."""
+        device = signals.device
+        label = torch.from_numpy(windows.label[batch]).to(device)
+        weight = torch.from_numpy(_class_weights(windows.label, self.n_classes)).to(device)
+        targets = {name: torch.from_numpy(values[batch]).to(device) for name, values in windows.targets.items()}
+        with _mixed_precision(device):
+            answers = model.answers(signals)
+            loss = cross_entropy(answers["classes"], label, weight=weight)
+            if model.further:
+                loss = loss + HEADS_WEIGHT * further_loss(answers, label, targets)
+            if "places" in answers and {"gear", "place"} <= set(targets):
+                gear, place = targets["gear"], targets["place"]
+                loss = loss + place_loss(answers["places"], label, gear, place, model.turns)
+        return loss
+
+    def answers(self, model: Network, signals: torch.Tensor, windows: WindowSet) -> FloatArray:
+        """(window, class) log-probabilities."""
+        return _log_probabilities(model, signals)
+
+    def record_loss(self, answers: FloatArray, windows: WindowSet) -> float:
+        """Cross-entropy of record predictions, each class present counting the same."""
+        by_record, label = _over_labelled_records(answers, windows)
+        losses = -by_record[np.arange(label.size), label]
+        return float(np.mean([losses[label == present].mean() for present in np.unique(label)]))
+
+    def temperature(self, answers: FloatArray, windows: WindowSet) -> float:
+        """Temperature with the least cross-entropy over the records."""
+        return fit_temperature(*_over_labelled_records(answers, windows))
+
+
+def predict_windows(model: nn.Module, windows: WindowSet, *, batch_size: int = 64) -> FloatArray:
+    """(window, class) log-probabilities at the planned starts; the batch size changes speed only."""
+    every = np.arange(len(windows))
+    blocks = np.array_split(every, -(-every.size // batch_size))
+    signals = (torch.from_numpy(windows.cut(block)) for block in blocks)
+    return np.concatenate([_log_probabilities(model, block) for block in signals])
+
+
+def _log_probabilities(model: nn.Module, signals: torch.Tensor) -> FloatArray:
+    """(window, class) log-probabilities, in batches of `CACHED` windows."""
+    model.eval()
+    device = next(model.parameters()).device
+    with torch.inference_mode():
+        blocks = [log_softmax(model(block.to(device)), dim=1) for block in signals.split(CACHED)]
+    return torch.cat(blocks).cpu().numpy().astype(float)
+
+
+def _over_labelled_records(
+    log_probability: FloatArray,
+    windows: WindowSet,
+) -> tuple[FloatArray, IntArray]:
+    """Predictions (record, class) and labels (record,)."""
+    _, by_record = over_records(log_probability, windows.record)
+    _, first = np.unique(windows.record, return_index=True)
+    return by_record, windows.label[first]
+
+
+def with_shuffled_labels(
+    windows: WindowSet,
+    n_classes: int,
+    rng: np.random.Generator,
+) -> WindowSet:
+    """Windows whose labels tell nothing of the class, all of a record the same; no other targets.
+
+    Within each true class all labels are dealt in the same proportions, in random order. A plain
+    permutation leaves every class a majority label by chance, and a network that finds the classes
+    then scores 0, 1/4, 1/2, ... at random.
+    """
+    records, first, position = np.unique(windows.record, return_index=True, return_inverse=True)
+    true = windows.label[first]
+    share = np.bincount(true, minlength=n_classes) / true.size
+    shuffled = np.empty_like(true)
+    for label in np.unique(true):
+        members = np.flatnonzero(true == label)
+        dealt = np.repeat(
+            np.arange(n_classes),
+            np.floor(share * members.size + 1e-9).astype(int),
+        )
+        n_missing = members.size - dealt.size
+        left = np.flatnonzero(share > 0)
+        if n_missing <= left.size:
+            extra = rng.permutation(left)[:n_missing]
+        else:
+            extra = rng.choice(left, n_missing)
+        shuffled[members] = rng.permutation(np.concatenate([dealt, extra]))
+    assert records.size == shuffled.size
+    return replace(windows, label=shuffled[position], targets={})
+
+
+def _mixed_precision(device: torch.device) -> torch.autocast:
+    """Products in bfloat16 on a GPU that computes in it (capability 8), 32 bits elsewhere."""
+    capable = device.type == "cuda" and torch.cuda.get_device_capability(device)[0] >= 8
+    return torch.autocast(device.type, dtype=torch.bfloat16, enabled=capable)
+
+
+def _class_weights(label: IntArray, n_classes: int) -> NDArray[np.float32]:
+    """Inverse frequency of each class, so that rare classes count the same; 0 for an absent one."""
+    counts = np.bincount(label, minlength=n_classes).astype(np.float32)
+    present = counts > 0
+    total = counts.sum() / present.sum()
+    weights = np.divide(total, counts, out=np.zeros_like(counts), where=present)
+    return weights.astype(np.float32)

@@ -1,0 +1,72 @@
+"""What a network learns to say of a record: the interface of classes and remaining lives."""
+
+from __future__ import annotations
+
+from abc import ABC, abstractmethod
+from collections.abc import Mapping, Sequence
+from typing import Any, ClassVar, Generic, TypeVar
+
+import numpy as np
+import torch
+from numpy.typing import NDArray
+from torch import nn
+
+from diagnose.data.windows import WindowSet
+
+FloatArray = NDArray[np.floating]
+IntArray = NDArray[np.integer]
+Model = TypeVar("Model", bound=nn.Module)
+
+
+class LearningTarget(ABC, Generic[Model]):
+    """Head, loss and answers of a network; `diagnose.training.train.train_network` asks it.
+
+    Attributes
+    ----------
+    stream : number of the random draws of a training, which differ from target to target
+    """
+
+    stream: ClassVar[int]
+
+    @abstractmethod
+    def network(
+        self,
+        model_config: Mapping[str, Any],
+        train: WindowSet,
+        input_scale: Sequence[float],
+    ) -> Model:
+        """Network of a configuration with the head of this target, untrained."""
+
+    @abstractmethod
+    def loss(
+        self,
+        model: Model,
+        signals: torch.Tensor,
+        windows: WindowSet,
+        batch: IntArray,
+    ) -> torch.Tensor:
+        """Loss of a batch.
+
+        Parameters
+        ----------
+        signals : (window, channel, sample) of the batch, on the network's device
+        windows, batch : the training windows, and which of them are in the batch
+        """
+
+    @abstractmethod
+    def answers(self, model: Model, signals: torch.Tensor, windows: WindowSet) -> FloatArray:
+        """(window, output) answers of a network in evaluation mode.
+
+        Parameters
+        ----------
+        signals : of all the windows, (window, channel, sample)
+        windows : the same ones
+        """
+
+    @abstractmethod
+    def record_loss(self, answers: FloatArray, windows: WindowSet) -> float:
+        """Loss of the answers of windows, combined to those of their records."""
+
+    @abstractmethod
+    def temperature(self, answers: FloatArray, windows: WindowSet) -> float:
+        """Temperature of the probabilities of records; 1 of what has no probabilities."""

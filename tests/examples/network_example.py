@@ -1,0 +1,56 @@
+"""A network of one's own: the module that a newcomer writes, and nothing else of gensig changes.
+
+In a checkout this file would be ``diagnose/networks/envelope_cnn.py``. Two steps follow. One is
+the entry ``"envelope_cnn": EnvelopeCnn`` in `diagnose.networks.registry.MODELS`. The other is the
+file ``configs/model/envelope.yaml`` with `CONFIG` as its content.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from typing import ClassVar
+
+import torch
+from torch import nn
+
+from diagnose.data.inputs import NetworkInput
+from diagnose.data.window_input import Windows
+from diagnose.networks.network import Network
+
+CONFIG = {"name": "envelope", "kind": "envelope_cnn", "kernel": 16, "width": 8}
+
+
+class EnvelopeCnn(Network):
+    """Learned band-pass filters, and how strong their outputs are on average and at most.
+
+    Parameters
+    ----------
+    n_channels, n_classes : of the data
+    input_scale : (channel,) what the input is divided by; stored with the weights
+    kernel : samples of a filter
+    width : number of filters
+    heads : see `diagnose.settings.HEADS`
+    """
+
+    inputs: ClassVar[type[NetworkInput]] = Windows  # or Turns: what a training is to feed it
+
+    def __init__(
+        self,
+        *,
+        n_channels: int,
+        n_classes: int,
+        input_scale: Sequence[float],
+        kernel: int,
+        width: int,
+        heads: Sequence[str] = (),
+    ) -> None:
+        super().__init__(input_scale)
+        self.filters = nn.Conv1d(n_channels, width, kernel, bias=False)
+        self.norm = nn.BatchNorm1d(width)
+        self.head = nn.Linear(2 * width, n_classes)  # adaptation and novelty expect this name
+        self.add_heads(heads, 2 * width, n_classes)
+
+    def look(self, windows: torch.Tensor) -> tuple[torch.Tensor, None]:
+        """Mean and maximum of every filter's envelope; no map of places on a turn."""
+        envelope = self.norm(self.filters(windows)).abs()
+        return torch.cat([envelope.mean(dim=-1), envelope.amax(dim=-1)], dim=1), None
