@@ -128,3 +128,13 @@ def test_a_page_is_cut_where_it_should_be() -> None:
     assert [target for _, _, target in LINK.findall(without_blocks(page))] == ["other.md#x"]
     assert anchors(page) == {"a-b-c", "twice", "twice-1"}
     assert list(command_lines(page)) == [(5, ["gensig", "plan", "fault=crack"])]
+
+
+def test_examples_on_the_page_are_the_files_that_run() -> None:
+    examples = ROOT / "tests" / "examples"
+    page = (ROOT / "docs" / "architecture.md").read_text(encoding="utf-8")
+    shown = {block.mark: block.code for block in blocks(page) if block.mark.startswith("tests/examples/")}
+    files = {path for path in examples.iterdir() if path.is_file() and not path.name.startswith("test_")}
+    assert set(shown) == {str(path.relative_to(ROOT)) for path in files}
+    for name, code in shown.items():
+        assert code == (ROOT / name).read_text(encoding="utf-8").rstrip(), name
