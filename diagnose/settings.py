@@ -12,7 +12,7 @@ from diagnose.baselines.features import FEATURES
 from diagnose.baselines.minirocket import KERNELS
 from diagnose.baselines.registry import baseline_names
 from gensig.errors import ConfigError
-from gensig.options.configuration import Configuration
+from gensig.options.configuration import Configuration, Section
 
 DEVICES = ("auto", "cpu", "cuda")
 HEADS = ("severity", "gear")
@@ -45,7 +45,7 @@ class TrainSettings:
     data: str
     out: str
     task: str
-    model: Mapping[str, Any]
+    model: Section
     protocols: tuple[str, ...] | None
     classes: tuple[str, ...] | None
     channels: tuple[str, ...] | None
@@ -133,6 +133,7 @@ def settings_from(config: Configuration) -> TrainSettings:
     if unknown := sorted(set(config) - known):
         raise ConfigError(f"diagnose train knows no key '{unknown[0]}'")
     values = config.plain()
+    values["model"] = config.section("model")
     for name in ("protocols", "classes", "channels", "test_channels", "seeds"):
         values[name] = _as_tuple(name, values[name])
     if values["seeds"] is None:

@@ -11,6 +11,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from diagnose.data.windows import Read, Segments, Task, WindowSet, read_signal
+from gensig.options.configuration import Section
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -54,9 +55,9 @@ class NetworkInput(ABC):
     @abstractmethod
     def completed(
         cls,
-        model_config: Mapping[str, Any],
+        model_config: Section,
         attributes: Mapping[str, Any],
-    ) -> dict[str, Any]:
+    ) -> Section:
         """Configuration of a network with what its input takes of a data set's attributes.
 
         Raises
@@ -66,7 +67,7 @@ class NetworkInput(ABC):
 
     @classmethod
     @abstractmethod
-    def of(cls, model_config: Mapping[str, Any]) -> Self:
+    def of(cls, model_config: Section) -> Self:
         """Input of a completed configuration, of a study or of a stored network."""
 
     @abstractmethod

@@ -13,6 +13,7 @@ from diagnose.data.inputs import NetworkInput, RecordedSignal
 from diagnose.data.targets import fault_places, record_targets
 from diagnose.data.windows import Read, Segments, Task, WindowSet, read_signal
 from gensig.errors import ConfigError, DatasetError
+from gensig.options.configuration import Section
 from gensig.signals.separation import separate_gears
 
 N_TEETH, PER_TOOTH = "n_teeth", "samples_per_tooth"  # of a network's configuration
@@ -40,9 +41,9 @@ class Turns(NetworkInput):
     @classmethod
     def completed(
         cls,
-        model_config: Mapping[str, Any],
+        model_config: Section,
         attributes: Mapping[str, Any],
-    ) -> dict[str, Any]:
+    ) -> Section:
         """The configuration with the tooth counts of the data set."""
         try:
             teeth = [int(attributes[f"n_teeth_{gear}"]) for gear in ("pinion", "wheel")]
@@ -50,10 +51,10 @@ class Turns(NetworkInput):
             raise ConfigError(
                 f"the data set does not say {error.args[0]}, which this model needs: model=cnn",
             ) from None
-        return {**model_config, N_TEETH: teeth}
+        return model_config | {N_TEETH: teeth}
 
     @classmethod
-    def of(cls, model_config: Mapping[str, Any]) -> Self:
+    def of(cls, model_config: Section) -> Self:
         """Turns of the tooth counts and the samples a tooth that the configuration gives."""
         driving, driven = model_config[N_TEETH]
         return cls(n_teeth=(driving, driven), samples_per_tooth=model_config[PER_TOOTH])

@@ -20,6 +20,7 @@ from diagnose.data.windows import (
     read_signal,
 )
 from gensig.errors import ConfigError
+from gensig.options.configuration import Section
 
 
 @final
@@ -33,14 +34,14 @@ class Windows(NetworkInput):
     @classmethod
     def completed(
         cls,
-        model_config: Mapping[str, Any],
+        model_config: Section,
         attributes: Mapping[str, Any],
-    ) -> dict[str, Any]:
+    ) -> Section:
         """The configuration as it is."""
-        return dict(model_config)
+        return model_config
 
     @classmethod
-    def of(cls, model_config: Mapping[str, Any]) -> Self:
+    def of(cls, model_config: Section) -> Self:
         """The same value for every configuration."""
         return cls()
 

@@ -15,6 +15,7 @@ from diagnose.networks.small_cnn import SmallCnn
 from diagnose.networks.spectrum import SpectrumCnn
 from diagnose.networks.wdcnn import Wdcnn
 from gensig.errors import ConfigError
+from gensig.options.configuration import Section
 
 # Kind in a configuration -> network; each declares what it reads as its ``inputs``.
 MODELS: dict[str, type[Network]] = {
@@ -26,7 +27,7 @@ MODELS: dict[str, type[Network]] = {
 
 
 def build_model(
-    config: Mapping[str, Any],
+    config: Section,
     *,
     n_channels: int,
     n_classes: int,
@@ -54,7 +55,7 @@ def build_model(
         raise ConfigError(f"model {config['kind']}: {reason}") from None
 
 
-def input_of(config: Mapping[str, Any]) -> NetworkInput:
+def input_of(config: Section) -> NetworkInput:
     """What the network of a completed configuration reads.
 
     Raises
@@ -64,7 +65,7 @@ def input_of(config: Mapping[str, Any]) -> NetworkInput:
     return _network_class(config).inputs.of(config)
 
 
-def has_window_length(config: Mapping[str, Any]) -> bool:
+def has_window_length(config: Section) -> bool:
     """True if the length of windows matters to the network of a configuration, completed or not.
 
     Raises
@@ -75,17 +76,17 @@ def has_window_length(config: Mapping[str, Any]) -> bool:
 
 
 def completed(
-    config: Mapping[str, Any],
+    config: Section,
     attributes: Mapping[str, Any],
     heads: Sequence[str],
-) -> dict[str, Any]:
+) -> Section:
     """Configuration with its further heads, and with what its input takes of a data set.
 
     Raises
     ------
     ConfigError    for an unknown kind, or a data set whose attributes lack what the input needs
     """
-    with_heads = {**config, "heads": list(heads)} if heads else dict(config)
+    with_heads = config | {"heads": list(heads)} if heads else config
     return _network_class(config).inputs.completed(with_heads, attributes)
 
 
@@ -105,7 +106,7 @@ def check_window(model: nn.Module, n_channels: int, window_samples: int) -> None
         ) from None
 
 
-def _network_class(config: Mapping[str, Any]) -> type[Network]:
+def _network_class(config: Section) -> type[Network]:
     """Entry of `MODELS` that a configuration names.
 
     Raises

@@ -57,7 +57,7 @@ def export_onnx(network: StoredNetwork, file: Path) -> str:
         no file is left
     """
     description = network.description
-    if reason := input_of(description.model).why_not_exported:
+    if reason := input_of(description.network).why_not_exported:
         raise ConfigError(reason)
     need_packages()
     graph = network.graph()

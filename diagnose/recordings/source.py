@@ -135,7 +135,7 @@ def prepare_recording(description: ModelDescription, source: Source) -> Prepared
         stride_samples=description.stride_samples,
         normalise=description.normalise,
     )
-    inputs = input_of(description.model)
+    inputs = input_of(description.network)
     n_recorded = recording.acceleration.shape[-1]
     return PreparedRecording(
         windows=inputs.of_recording(recorded),

@@ -109,7 +109,7 @@ class StoredClassifier(StoredNetwork):
         from diagnose.studies.study import score_predictions
 
         description = self.description
-        windows = input_of(description.model).load(task, segments)
+        windows = input_of(description.network).load(task, segments)
         by_window = predict_windows(self.model, windows)
         record, log_probability = over_records(by_window, windows.record)
         units = np.asarray(task.dataset.column("unit_id"))[record]

@@ -141,7 +141,7 @@ class StoredLife(StoredNetwork):
                 f"{dataset.folder}, {part}: no life failed, so that there is nothing to score",
             )
         columns = [np.asarray(dataset.column(name), dtype=float) for name in facts.told]
-        windows = input_of(self.description.model).load(task, segments)
+        windows = input_of(self.description.network).load(task, segments)
         record, share = shares_of_records(self.model, windows, np.stack(columns, axis=1))
         prediction = LifePrediction(
             protocol=self.description.protocol,

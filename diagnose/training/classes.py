@@ -2,9 +2,9 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Sequence
 from dataclasses import dataclass, replace
-from typing import Any, ClassVar, final
+from typing import ClassVar, final
 
 import numpy as np
 import torch
@@ -19,6 +19,7 @@ from diagnose.networks.network import Network
 from diagnose.networks.registry import build_model
 from diagnose.scoring.metrics import over_records
 from diagnose.training.target import FloatArray, IntArray, LearningTarget
+from gensig.options.configuration import Section
 
 HEADS_WEIGHT = 0.3  # of each further head against the classes; assumed
 CACHED = 16  # windows that stay in the cache of a processor
@@ -39,7 +40,7 @@ class Classes(LearningTarget[Network]):
 
     def network(
         self,
-        model_config: Mapping[str, Any],
+        model_config: Section,
         train: WindowSet,
         input_scale: Sequence[float],
     ) -> Network:

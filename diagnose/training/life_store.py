@@ -82,7 +82,7 @@ def load_life_model(folder: str | Path) -> tuple[LifeNetwork, ModelDescription, 
     facts = _facts(folder, description.remaining_life)
     n_told = len(facts.told)
     ones = [1.0] * len(description.channel_names)
-    model = LifeNetwork(description.model, ones, np.zeros(n_told), np.ones(n_told))
+    model = LifeNetwork(description.network, ones, np.zeros(n_told), np.ones(n_told))
     load_weights(model, folder)
     return model.eval(), description, facts
 

@@ -2,9 +2,9 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Sequence
 from dataclasses import dataclass
-from typing import Any, ClassVar, final
+from typing import ClassVar, final
 
 import numpy as np
 import torch
@@ -14,6 +14,7 @@ from diagnose.data.windows import WindowSet
 from diagnose.networks.registry import build_model
 from diagnose.scoring.metrics import over_records
 from diagnose.training.target import FloatArray, IntArray, LearningTarget
+from gensig.options.configuration import Section
 
 N_FEATURES = 16  # numbers that the head takes of the network; assumed
 AT_A_TIME = 32  # windows answered in one step
@@ -35,7 +36,7 @@ class LifeNetwork(nn.Module):
 
     def __init__(
         self,
-        model_config: Mapping[str, Any],
+        model_config: Section,
         input_scale: Sequence[float],
         mean: FloatArray,
         spread: FloatArray,
@@ -81,7 +82,7 @@ class RemainingLife(LearningTarget[LifeNetwork]):
 
     def network(
         self,
-        model_config: Mapping[str, Any],
+        model_config: Section,
         train: WindowSet,
         input_scale: Sequence[float],
     ) -> LifeNetwork:

@@ -14,6 +14,7 @@ import numpy as np
 from diagnose.data.windows import Task, subset_segments
 from diagnose.settings import TrainSettings
 from gensig.errors import DatasetError
+from gensig.options.configuration import Section
 
 if TYPE_CHECKING:
     from torch import nn
@@ -58,6 +59,11 @@ class ModelDescription:
     adaptation: dict[str, Any] | None = None  # see `diagnose.recordings.machine`; None as trained
     test_score: dict[str, Any] | None = None  # see `diagnose.studies.study.test_score`; models of before have none
     remaining_life: dict[str, Any] | None = None  # see `diagnose.training.life_store`; None for a classifier
+
+    @property
+    def network(self) -> Section:
+        """Kind and parameters of the network, as `diagnose.networks.registry.build_model` takes them."""
+        return Section("model", self.model)
 
     @property
     def task(self) -> str:
@@ -155,7 +161,7 @@ def load_model(folder: str | Path) -> tuple[Network, ModelDescription]:
             f"{folder} says remaining lives and is no classifier: for diagnose predict, evaluate, export"
         )
     model = build_model(
-        description.model, n_channels=len(description.channel_names), n_classes=len(description.class_names)
+        description.network, n_channels=len(description.channel_names), n_classes=len(description.class_names)
     )
     load_weights(model, folder)
     return model.eval(), description

@@ -3,8 +3,8 @@
 from __future__ import annotations
 
 from abc import ABC, abstractmethod
-from collections.abc import Mapping, Sequence
-from typing import Any, ClassVar, Generic, TypeVar
+from collections.abc import Sequence
+from typing import ClassVar, Generic, TypeVar
 
 import numpy as np
 import torch
@@ -12,6 +12,7 @@ from numpy.typing import NDArray
 from torch import nn
 
 from diagnose.data.windows import WindowSet
+from gensig.options.configuration import Section
 
 FloatArray = NDArray[np.floating]
 IntArray = NDArray[np.integer]
@@ -31,7 +32,7 @@ class LearningTarget(ABC, Generic[Model]):
     @abstractmethod
     def network(
         self,
-        model_config: Mapping[str, Any],
+        model_config: Section,
         train: WindowSet,
         input_scale: Sequence[float],
     ) -> Model:
