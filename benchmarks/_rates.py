@@ -11,11 +11,12 @@ from scipy.integrate import solve_ivp
 
 from benchmarks import _scalar
 from benchmarks._measure import in_turn
-from gensig.dynamics import _kernels, integrator
+from gensig.dynamics import _kernels
 from gensig.dynamics._layout import N_LAW
 from gensig.dynamics._vector import LANES, n_lanes
+from gensig.dynamics.backends.group_run import GroupRun
 from gensig.dynamics.decimation import decimator, in_band_error
-from gensig.dynamics.lanes import pack
+from gensig.dynamics.lanes import fill_lanes, pack
 from gensig.dynamics.pair import PairDynamics
 from gensig.plan.make import make_plan
 from gensig.plan.request import read_request
@@ -59,8 +60,8 @@ def kernel(lanes: list[PairDynamics], oversampling: int, precision: str = "float
     """The product's integrator with the mean accelerations of four channels, tables already packed."""
     step = 1.0 / (SAMPLING_RATE * oversampling)
     group, n_settling = pack(lanes, step, precision), round(SETTLING / step)
-    settled = integrator._Run(integrator.fill_lanes(lanes, precision), CHANNELS, precision)
-    for lane, dynamics in enumerate(integrator.fill_lanes(lanes, precision)):
+    settled = GroupRun(fill_lanes(lanes, precision), CHANNELS, precision)
+    for lane, dynamics in enumerate(fill_lanes(lanes, precision)):
         settled.begin(group, lane, dynamics.static_start(0.0))
     settled.advance(group, step, 0, n_settling)
     n_calls = round(TIMED / step / PER_CALL)
@@ -108,7 +109,7 @@ def difference(all_of: list[PairDynamics], oversampling: int) -> float:
     """Largest relative difference of both codes' accelerations, 20 Hz to 20 kHz, over 20 ms from the same start."""
     step, low_pass = 1.0 / (SAMPLING_RATE * oversampling), decimator(oversampling)
     n_steps = (round(SETTLING * SAMPLING_RATE) + 2 * low_pass.margin) * oversampling + 1
-    group, run = pack(all_of, step), integrator._Run(all_of, CHANNELS, "float64")
+    group, run = pack(all_of, step), GroupRun(all_of, CHANNELS, "float64")
     for lane, dynamics in enumerate(all_of):
         run.begin(group, lane, dynamics.static_start(0.0))
     ours = np.empty((n_steps, len(CHANNELS), LANES))

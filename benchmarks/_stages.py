@@ -13,7 +13,9 @@ import numpy as np
 
 from benchmarks._measure import least
 from gensig.dataset.storage.shard import ShardWriter
-from gensig.dynamics import _kernels, integrator
+from gensig.dynamics import _kernels
+from gensig.dynamics.backends import runge_kutta
+from gensig.dynamics.backends.group_run import GroupRun
 from gensig.dynamics.decimation import Decimator, decimator
 from gensig.production import folder as generation
 from gensig.record import simulate as records
@@ -31,12 +33,12 @@ CLOCKED: tuple[tuple[Any, str, str], ...] = (
     (InputReader, "inputs", PLAN),
     (spur_pair, "_mesh_table", TABLES),
     (pair_machine, "pair_dynamics", EQUATIONS),
-    (pair_machine, "settling_oversampling", EQUATIONS),
-    (integrator, "settling_time", EQUATIONS),
-    (integrator, "pack", EQUATIONS),
-    (integrator.PairDynamics, "static_start", EQUATIONS),
-    (integrator._Run, "advance", SETTLING),
-    (integrator._Run, "record", RECORDING),
+    (pair_machine, "check_machine", EQUATIONS),
+    (runge_kutta, "settling_time", EQUATIONS),
+    (runge_kutta, "pack", EQUATIONS),
+    (runge_kutta.PairDynamics, "static_start", EQUATIONS),
+    (GroupRun, "advance", SETTLING),
+    (GroupRun, "record", RECORDING),
     (pair_machine, "_checks", CHECKING),
     (records, "_record", NOISE),
     (generation, "open_shard", WRITING),

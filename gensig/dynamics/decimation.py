@@ -13,6 +13,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from gensig.dynamics._kernels import TOGETHER, low_pass
+from gensig.dynamics._vector import LANES
 
 Array = NDArray[np.float64]
 
@@ -56,6 +57,15 @@ class Decimator:
         taps = self.padded(means.dtype.name)
         low_pass(means.ravel(), 1, taps, self.oversampling, n_channels, n_samples, out.ravel(), 0)
         return np.ascontiguousarray(out.transpose(2, 1, 0), dtype=np.float64)
+
+    def apply_to_columns(self, means: Array) -> Array:
+        """The same for a plain table: means (step, column) to samples (sample, column)."""
+        n_steps, n_columns = means.shape
+        n_groups = -(-n_columns // LANES)
+        padded = np.zeros((n_steps, n_groups, LANES))
+        padded.reshape(n_steps, -1)[:, :n_columns] = means
+        samples = self.apply(padded).transpose(2, 1, 0)
+        return samples.reshape(len(samples), -1)[:, :n_columns]
 
 
 @lru_cache(maxsize=16)

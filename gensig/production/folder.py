@@ -31,8 +31,8 @@ from gensig.dataset.storage.receipts import (
     write_receipt,
 )
 from gensig.dataset.storage.shard import ShardWriter
-from gensig.dynamics._vector import n_lanes
 from gensig.dynamics.decimation import usable_band
+from gensig.dynamics.integrator import records_together
 from gensig.errors import ConfigError, DatasetError
 from gensig.execution.base import Executor, ShardFailure
 from gensig.life.life_options import runs_to_failure
@@ -234,10 +234,10 @@ def _check_places(out: Path, rows: Sequence[Mapping[str, Any]], shard_index: int
 
 
 def block_length(config: Configuration) -> int:
-    """Records that are simulated at a time: enough to fill the lanes with them and their twins, few enough to hold."""
+    """Records that are simulated at a time: enough for full speed, few enough for the memory."""
     system = read_machine(config)
     n_bytes = 8 * len(system.sensing.channels) * round(system.operating.duration * system.sensing.sampling_rate)
-    return max(n_lanes(system.solver.precision), min(MOST_BLOCK, BLOCK_BYTES // n_bytes))
+    return max(records_together(system.solver), min(MOST_BLOCK, BLOCK_BYTES // n_bytes))
 
 
 def open_shard(path: Path, config: Configuration, n_records: int, params: Sequence[str]) -> ShardWriter:

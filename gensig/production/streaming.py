@@ -14,12 +14,13 @@ from gensig.dataset.plan import Plan
 from gensig.dataset.schema import DEFAULTS, stored_reason
 from gensig.dataset.splitting.protocols import make_splits, why_left_out
 from gensig.dataset.splitting.splits import SUBSETS
-from gensig.dynamics._vector import n_lanes
+from gensig.dynamics.integrator import Solver, records_together
 from gensig.errors import ConfigError, DatasetError
 from gensig.options.configuration import Configuration, whole_number
 from gensig.plan.make import make_plan
 from gensig.record.options import read_dataset_options
 from gensig.record.simulate import Record, simulate_records
+from gensig.units import read
 
 EPOCH_STREAM = 9100  # spawn key of the seeds of later epochs; the causes of a record and the splits have others
 
@@ -147,7 +148,7 @@ class RecordStream:
         return len(self.numbers)
 
     def __iter__(self) -> Iterator[Record]:
-        together = n_lanes(self.config["solver"]["precision"])
+        together = records_together(read(Solver, self.config["solver"], "solver"))
         for first in range(0, len(self), together):
             yield from self._records(self.numbers[first : first + together])
 

@@ -10,7 +10,6 @@ from typing import Self
 import numpy as np
 from numpy.typing import NDArray
 
-from gensig.dynamics._vector import n_lanes
 from gensig.dynamics.decimation import in_band_error
 from gensig.dynamics.integrator import (
     BOUNCING,
@@ -18,10 +17,10 @@ from gensig.dynamics.integrator import (
     Motions,
     Solver,
     check_channels,
+    check_machine,
     check_memory,
     check_step,
     integrate,
-    settling_oversampling,
 )
 from gensig.dynamics.mesh_state import MeshState, mesh_state
 from gensig.dynamics.pair import Body, PairDynamics, Rotor
@@ -170,8 +169,8 @@ def pair_dynamics(run: PairRun) -> PairDynamics:
     )
 
 
-def _lane_key(run: PairRun) -> tuple[object, ...]:
-    """Everything that runs must share to be integrated side by side."""
+def _kind(run: PairRun) -> tuple[object, ...]:
+    """Everything that runs must share to be integrated in one call."""
     system = run.system
     operating = system.operating
     sensing = (system.sensing.sampling_rate, system.sensing.channels, operating.duration)
@@ -187,10 +186,10 @@ def _finer(run: PairRun) -> PairRun:
 
 
 def simulate_pairs(runs: Sequence[PairRun]) -> list[CleanRecord | SimulationError]:
-    """Simulate records in groups of those that share rate, duration and law, side by side; in the order given.
+    """Records of runs, in the order given; runs that share rate, duration and law are integrated in one call.
 
-    A record's bits do not depend on what it is simulated beside. A motion that does not stay finite gives its error in
-    place of its record.
+    The bits of a record do not depend on the other runs. A motion that does not stay finite gives its error in place
+    of its record.
     """
     found: dict[int, CleanRecord | SimulationError] = {}
     machines: dict[int, PairDynamics] = {}
@@ -199,17 +198,14 @@ def simulate_pairs(runs: Sequence[PairRun]) -> list[CleanRecord | SimulationErro
         system = run.system
         try:
             machines[place] = pair_dynamics(run)
-            settling = settling_oversampling(machines[place], system.solver, system.sensing.sampling_rate)
+            check_machine(machines[place], system.solver, system.sensing.sampling_rate)
         except SimulationError as error:
             found[place] = error
         else:
-            kinds.setdefault((*_lane_key(run), settling), []).append(place)
+            kinds.setdefault(_kind(run), []).append(place)
     for places in kinds.values():
-        together = n_lanes(runs[places[0]].system.solver.precision)
-        for first in range(0, len(places), together):
-            group = places[first : first + together]
-            records = _side_by_side([runs[place] for place in group], [machines[place] for place in group])
-            found.update(zip(group, records, strict=True))
+        records = _side_by_side([runs[place] for place in places], [machines[place] for place in places])
+        found.update(zip(places, records, strict=True))
     coarse = [place for place, record in found.items() if _is_too_coarse(runs[place], record)]
     if coarse:
         found.update(zip(coarse, simulate_pairs([_finer(runs[place]) for place in coarse]), strict=True))
@@ -252,19 +248,19 @@ def _side_by_side(runs: Sequence[PairRun], machines: Sequence[PairDynamics]) -> 
     )
     errors, checks = _checks(motions, system.solver, system.sensing.sampling_rate)
     records: list[CleanRecord | SimulationError] = []
-    for lane, run in enumerate(runs):
+    for index, run in enumerate(runs):
         gain = 1.0 if run.gearbox is None else run.gearbox.gain[:, None]
         operating = run.system.operating
-        if motions.finite[lane]:
+        if motions.finite[index]:
             records.append(
                 CleanRecord(
-                    acceleration=motions.acceleration[lane] * gain,
-                    shaft_angle=motions.shaft_angle[lane],
-                    mean_speed=float(motions.mean_speed[lane]),
-                    contact_loss_fraction=float(motions.contact_loss_fraction[lane]),
-                    integration_error=float(errors[lane]),
-                    integration_check=checks[lane],
-                    mesh=_mesh_state(run, machines[lane], motions, lane) if run.tell_mesh else None,
+                    acceleration=motions.acceleration[index] * gain,
+                    shaft_angle=motions.shaft_angle[index],
+                    mean_speed=float(motions.mean_speed[index]),
+                    contact_loss_fraction=float(motions.contact_loss_fraction[index]),
+                    integration_error=float(errors[index]),
+                    integration_check=checks[index],
+                    mesh=_mesh_state(run, machines[index], motions, index) if run.tell_mesh else None,
                 )
             )
         else:

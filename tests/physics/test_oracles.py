@@ -9,9 +9,9 @@ from dataclasses import dataclass, replace
 import numpy as np
 import pytest
 from fault_cases import one
-from lane_tools import law_of, trajectory
+from lane_tools import trajectory
 from numpy.testing import assert_allclose
-from scipy.integrate import solve_ivp
+from plain_motion import at_rest, equations, solved
 from scipy.linalg import expm
 
 from gensig.faults.broken import MissingTooth
@@ -21,44 +21,8 @@ from gensig.systems.run import Run, Start
 
 SAMPLING_RATE = 51200.0
 PHASE = 0.3
-LIKELY = np.repeat([1e-6, 1e-2], 6) * np.tile([1, 1, 20, 1, 1, 20], 2)  # m, rad, m/s, rad/s: how much things move
 RECORDED = [0, 1, 3, 4]  # the channels' degrees of freedom
 MORE_DAMPED = {"mesh.damping_ratio": 0.0735}  # by a twentieth
-
-
-def equations(dynamics):
-    """y' as a function of t and y = (q, q'), and the matrix of its linear part without the mesh."""
-    system, direction, law = dynamics.system(), dynamics.approach_direction(), law_of(dynamics)
-    radius, speed = dynamics.table.pair.pinion.base_radius, dynamics.operating.speed
-    free = np.eye(12, k=6)
-    free[6:] = -np.hstack([system.stiffness, system.damping]) / system.mass[:, None]
-    pushed = np.concatenate([np.zeros(6), system.force / system.mass])
-    # motion of the mesh by state; state by normal force, friction force, its moments, force on the roll
-    seen, felt = np.zeros((4, 12)), np.zeros((12, 5))
-    seen[1, :6] = seen[2, 6:] = direction
-    seen[0, 2] = seen[3, 8] = radius
-    felt[6:, 0] = -direction
-    felt[[6, 9], 1] = 1, -1
-    felt[[8, 11, 8], [2, 3, 4]] = 1, 1, radius
-    felt[6:] /= system.mass[:, None]
-    start, rate = np.array([dynamics.start_roll, 0, 0, radius * speed]), np.array([radius * speed, 0, 0, 0])
-
-    def slope(t, y):
-        return free @ y + pushed + felt @ law(*(start + rate * t + seen @ y))[:5]
-
-    return slope, free
-
-
-def solved(slope, start, times, method, rtol):
-    """States at some times, (time, state)."""
-    return solve_ivp(
-        slope, (0.0, times[-1]), start, method=method, rtol=rtol, atol=10 * rtol * LIKELY, t_eval=times,
-        first_step=1e-7, max_step=2e-5,
-    ).y.T  # fmt: skip
-
-
-def at_rest(dynamics):
-    return np.concatenate([dynamics.static_start(0.0), np.zeros(6)])
 
 
 class TestFourMilliseconds:

@@ -8,9 +8,11 @@ from pathlib import Path
 import h5py
 import numpy as np
 import pytest
+import yaml
 from small_sets import TINY, make
 
 from gensig.cli import main
+from gensig.dynamics.backends.registry import DEFAULT_BACKEND
 
 SET = (
     "dataset.records_per_shard=4", "dataset.store_clean=true", "dataset.store_tacho=true",
@@ -32,6 +34,35 @@ def reproduce(folder: Path, capsys: pytest.CaptureFixture[str], *words: str) -> 
 def test_every_record_has_the_same_bits(reference: Path, capsys: pytest.CaptureFixture[str]) -> None:
     assert reproduce(reference, capsys) == (0, "6 of 6 records have the same bits\n")
     assert reproduce(reference, capsys, "--records", "2") == (0, "2 of 2 records have the same bits\n")
+
+
+def test_a_set_of_the_default_backend_is_stored_as_by_0_9(reference: Path) -> None:
+    """Nothing that is stored names the default backend, so that files, identity and shards are those of 0.9.0."""
+    texts = [(reference / name).read_text() for name in ("config.yaml", "manifest.json")]
+    with h5py.File(reference / "shards" / "shard-00000.h5") as file:
+        texts.append(str(file.attrs["config_json"]))
+    assert all("oversampling" in text and "backend" not in text for text in texts)
+
+
+def test_a_set_that_names_the_default_backend_goes_on(
+    reference: Path, tmp_path: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    """The missing key and its default are one configuration: records are the same, and lost shards are made."""
+    folder = tmp_path / "data"
+    shutil.copytree(reference, folder)
+    config = yaml.safe_load((folder / "config.yaml").read_text())
+    config["solver"]["backend"] = DEFAULT_BACKEND
+    (folder / "config.yaml").write_text(yaml.safe_dump(config, sort_keys=False))
+    assert reproduce(folder, capsys, "--records", "2") == (0, "2 of 2 records have the same bits\n")
+    content = json.loads((folder / "manifest.json").read_text())
+    content["state"] = "incomplete"
+    content["shards"][1] |= {"state": "planned", "sha256": "", "bytes": 0, "n_failed": 0}
+    (folder / "manifest.json").write_text(json.dumps(content))
+    lost = folder / "shards" / "shard-00001.h5"
+    lost.unlink()
+    assert main(["resume", "--quiet", "--workers", "1", str(folder)]) == 0
+    with h5py.File(lost) as made, h5py.File(reference / "shards" / "shard-00001.h5") as before:
+        assert np.array_equal(made["acceleration"], before["acceleration"])
 
 
 def alter(reference: Path, out: Path, part: float, environment: dict[str, str]) -> Path:

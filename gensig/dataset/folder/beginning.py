@@ -22,7 +22,7 @@ from gensig.dataset.folder.layout import (
     shard_name,
     write_manifest,
 )
-from gensig.dataset.folder.manifest import deciding, identity_hash, plain_data
+from gensig.dataset.folder.manifest import deciding, identity_hash, stored_config
 from gensig.dataset.plan import Plan, plan_text
 from gensig.dataset.splitting.protocols import make_splits
 from gensig.dataset.storage.atomic import TEMPORARY_SUFFIX, cannot_write, locked, write_text
@@ -65,7 +65,7 @@ def create_folder(
             f"identity {identity[:12]} does not belong to this configuration; use identity_hash(config, ...)"
         )
     texts = {
-        CONFIG: yaml.safe_dump(plain_data(config), sort_keys=False, allow_unicode=True),
+        CONFIG: yaml.safe_dump(stored_config(config), sort_keys=False, allow_unicode=True),
         OVERRIDES: yaml.safe_dump([str(item) for item in overrides], allow_unicode=True),
         PLAN: plan_text(plan),
         **{f"{SPLITS}/{name}.csv": table.to_csv() for name, table in make_splits(plan, seed).items()},

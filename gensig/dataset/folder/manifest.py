@@ -39,10 +39,14 @@ __all__ = [
     "record_failed_shard",
     "record_shard",
     "record_shards",
+    "stored_config",
 ]
 
 # These change where and how a data set is made, not one bit of it.
 NOT_IDENTITY = ("out", "executor", "verbosity")
+# Keys that came after 0.9.0 and the value that they have where they are missing. At that value they are not stored and
+# no part of the identity: a folder that was begun without the key is the same data set.
+SINCE_0_9 = {"solver.backend": "runge_kutta"}
 RECEIPT_SUFFIX = ".done"
 
 
@@ -64,12 +68,23 @@ def identity_hash(config: ConfigContent, generator_version: str) -> str:
 
 def deciding(config: ConfigContent) -> dict[str, Any]:
     """The part of a configuration that decides bits, as plain data of its own."""
-    return {key: value for key, value in plain_data(config).items() if key not in NOT_IDENTITY}
+    return {key: value for key, value in stored_config(config).items() if key not in NOT_IDENTITY}
+
+
+def stored_config(config: dict[str, Any]) -> dict[str, Any]:
+    """A configuration as a data set stores it: plain data, without the keys of ``SINCE_0_9`` that have their value."""
+    stored = plain_data(config)
+    for dotted, default in SINCE_0_9.items():
+        section, _, key = dotted.partition(".")
+        options = stored.get(section)
+        if isinstance(options, dict) and options.get(key) == default:
+            del options[key]
+    return stored
 
 
 def differing_keys(one: ConfigContent, other: ConfigContent) -> list[str]:
     """Dotted keys that decide bits and whose values differ between two configurations, in order."""
-    ours, theirs = _leaves(one), _leaves(other)
+    ours, theirs = SINCE_0_9 | _leaves(one), SINCE_0_9 | _leaves(other)
     absent = object()
     return [key for key in sorted({*ours, *theirs}) if repr(ours.get(key, absent)) != repr(theirs.get(key, absent))]
 

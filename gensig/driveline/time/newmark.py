@@ -23,7 +23,6 @@ from gensig.driveline.time.geared_line import (
     pack_meshes,
     pack_torques,
 )
-from gensig.dynamics._vector import LANES
 from gensig.dynamics.decimation import decimator
 from gensig.errors import ConfigError, SimulationError, StepError
 
@@ -249,18 +248,17 @@ class _Run:
     def record(self, n_samples: int) -> Array:
         """Integrate on from a step before the low-pass's reach, and decimate block by block, (channel, sample)."""
         factor, low_pass = self.solver.oversampling, decimator(self.solver.oversampling)
-        n_groups = -(-len(self.channels) // LANES)
         n_kept = 2 * low_pass.margin * factor + 1
-        means = np.zeros((n_kept + BLOCK * factor, n_groups * LANES))
+        means = np.zeros((n_kept + BLOCK * factor, len(self.channels)))
         self.advance(n_kept, self.chosen, means)
-        samples = np.empty((n_samples, n_groups * LANES))
+        samples = np.empty((n_samples, len(self.channels)))
         for done in range(0, n_samples, BLOCK):
             n_now = min(BLOCK, n_samples - done)
             self.advance(n_now * factor, self.chosen, means[n_kept:])
-            filled = means[: n_kept + n_now * factor].reshape(-1, n_groups, LANES)
-            samples[done : done + n_now] = low_pass.apply(filled).transpose(2, 1, 0).reshape(n_now, -1)
+            filled = means[: n_kept + n_now * factor]
+            samples[done : done + n_now] = low_pass.apply_to_columns(filled)
             means[:n_kept] = means[n_now * factor : n_now * factor + n_kept].copy()
-        return samples[:, : len(self.channels)].T
+        return samples.T
 
     def told(self, signals: Array, angle: Array, speed: Array) -> LineMotion:
         """The motion, and what the run tells about itself."""

@@ -6,9 +6,10 @@ from itertools import pairwise
 import numpy as np
 import pytest
 
-from gensig.dynamics import integrator
+from gensig.dynamics.backends import runge_kutta, step_limits
+from gensig.dynamics.backends.base import BOUNCING
+from gensig.dynamics.backends.step_limits import COARSE, coarsest_oversampling, settling_stages
 from gensig.dynamics.decimation import in_band_error
-from gensig.dynamics.integrator import BOUNCING, COARSE, settling_oversampling, settling_stages
 from gensig.errors import SimulationError
 from gensig.faults.broken import MissingTooth
 from gensig.faults.crack import Crack
@@ -53,8 +54,8 @@ def runs(machine):
 def steady(runs):
     """The same after 1.2 s of settling in fine steps."""
     with pytest.MonkeyPatch.context() as patch:
-        patch.setattr(integrator, "COARSE", ((16, 0.02),))
-        patch.setattr(integrator, "settling_time", lambda _: 1.2)
+        patch.setattr(step_limits, "COARSE", ((16, 0.02),))
+        patch.setattr(runge_kutta, "settling_time", lambda _: 1.2)
         return accelerations(runs)
 
 
@@ -73,12 +74,12 @@ def test_nothing_of_the_start_is_left(runs, steady):
 
 
 def test_coarse_steps_to_the_end_would_leave_more(runs, steady, monkeypatch):
-    monkeypatch.setattr(integrator, "COARSE", ((1, 0.02),))
+    monkeypatch.setattr(step_limits, "COARSE", ((1, 0.02),))
     assert left(runs, steady).max() > 10 * LEFT
 
 
 def test_a_shorter_settling_would_leave_more(runs, steady, monkeypatch):
-    monkeypatch.setattr(integrator, "settling_time", lambda _: 0.2)
+    monkeypatch.setattr(runge_kutta, "settling_time", lambda _: 0.2)
     assert left(runs, steady).max() > 10 * LEFT
 
 
@@ -110,13 +111,13 @@ class TestHardLandings:
             assert alone.acceleration.tobytes() == other.acceleration.tobytes()
 
     def test_coarse_steps_would_lose_them(self, bouncing, monkeypatch):
-        monkeypatch.setattr(integrator, "CAREFUL", 1)
+        monkeypatch.setattr(runge_kutta, "CAREFUL", 1)
         (record,) = simulate_together([bouncing])
         assert isinstance(record, SimulationError)
 
 
 def test_stages_become_finer_and_end_before_the_record(dynamics_of, xiamen):
-    stages = settling_stages(dynamics_of(xiamen), xiamen.solver, SAMPLING_RATE)
+    stages = settling_stages(dynamics_of(xiamen), xiamen.solver.oversampling, SAMPLING_RATE)
     assert [steps for steps, _ in stages] == [steps for steps, _ in COARSE]
     assert all(one > other > 0 for (_, one), (_, other) in pairwise(stages))
 
@@ -124,7 +125,7 @@ def test_stages_become_finer_and_end_before_the_record(dynamics_of, xiamen):
 @pytest.mark.filterwarnings("ignore::gensig.dynamics.integrator.CoarseStepWarning")
 def test_no_stage_takes_longer_steps_than_are_stable_nor_shorter_than_the_record(dynamics_of, xiamen):
     dynamics = dynamics_of(xiamen)
-    two = replace(xiamen.solver, oversampling=2)
-    assert [steps for steps, _ in settling_stages(dynamics, two, SAMPLING_RATE)] == [1, 2, 2]
-    assert settling_oversampling(dynamics, xiamen.solver, SAMPLING_RATE) == 1
-    assert [steps for steps, _ in settling_stages(dynamics, xiamen.solver, SAMPLING_RATE / 2)] == [2, 2, 3]
+    oversampling = xiamen.solver.oversampling
+    assert [steps for steps, _ in settling_stages(dynamics, 2, SAMPLING_RATE)] == [1, 2, 2]
+    assert coarsest_oversampling(dynamics, oversampling, SAMPLING_RATE) == 1
+    assert [steps for steps, _ in settling_stages(dynamics, oversampling, SAMPLING_RATE / 2)] == [2, 2, 3]

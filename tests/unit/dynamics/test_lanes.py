@@ -1,12 +1,14 @@
 """A record has the same bits alone and beside others, whatever they are, in every lane and order."""
 
-from dataclasses import replace
+from dataclasses import fields, replace
 
 import numpy as np
 import pytest
 from fault_cases import one
 
 from gensig.dynamics._vector import LANES
+from gensig.dynamics.backends.base import Integration, Motions
+from gensig.dynamics.backends.runge_kutta import integrate_group, lane_groups
 from gensig.dynamics.integrator import Solver, integrate
 from gensig.dynamics.lanes import pack
 from gensig.errors import SimulationError
@@ -293,6 +295,17 @@ def with_solver(one_run, **changes):
     return replace(one_run, system=replace(one_run.system, solver=solver))
 
 
+BRIEF = Integration(
+    sampling_rate=51200.0,
+    duration=0.005,
+    channels=("wheel_y", "pinion_rotation"),
+    tell_mesh=False,
+    oversampling=4,
+    precision="float64",
+    max_error=None,
+)
+
+
 class TestMotions:
     @pytest.fixture
     def motions(self, xiamen, dynamics_of):
@@ -309,17 +322,31 @@ class TestMotions:
 
     def test_shapes(self, motions, xiamen, dynamics_of):
         found = motions([dynamics_of(xiamen), dynamics_of(xiamen, phase=0.8)])
-        assert found.acceleration.shape == (LANES, 2, 256)
-        assert found.shaft_angle.shape == (LANES, 256)
-        assert found.check.shape == (LANES, 2, 0)
-        assert found.mean_speed.shape == found.contact_loss_fraction.shape == found.finite.shape == (LANES,)
+        assert found.acceleration.shape == (2, 2, 256)
+        assert found.shaft_angle.shape == (2, 256)
+        assert found.check.shape == (2, 2, 0)
+        assert found.mean_speed.shape == found.contact_loss_fraction.shape == found.finite.shape == (2,)
         assert found.finite.all()
 
-    def test_lanes_without_a_machine_repeat_the_first(self, motions, xiamen, dynamics_of):
-        found = motions([dynamics_of(xiamen), dynamics_of(xiamen, phase=0.8)])
-        first, second, *rest = found.acceleration
+    def test_lanes_without_a_machine_repeat_the_first(self, xiamen, dynamics_of):
+        machines = [dynamics_of(xiamen), dynamics_of(xiamen, phase=0.8)]
+        first, second, *rest = integrate_group(machines, BRIEF).acceleration
         assert first.tobytes() != second.tobytes()
+        assert len(rest) == LANES - 2
         assert all(lane.tobytes() == first.tobytes() for lane in rest)
+
+    def test_any_number_of_machines_comes_back_in_order(self, motions, machine, dynamics_of):
+        """More than a group takes, of two kinds of settling; every motion is that of the machine alone."""
+        stiff = machine({"gear.pinion.support.stiffness_y_n_per_m": 2e9})
+        machines = [dynamics_of(stiff if k % 3 == 1 else machine({}), phase=0.05 * k) for k in range(LANES + 3)]
+        groups = lane_groups(machines, BRIEF)
+        assert [len(group) for group in groups] == [7, 4]
+        together = motions(machines)
+        for k, one_machine in enumerate(machines):
+            single = motions([one_machine])
+            for field in fields(Motions):
+                of_all, of_one = getattr(together, field.name)[k], getattr(single, field.name)[0]
+                assert of_all.tobytes() == of_one.tobytes(), field.name
 
 
 def test_a_group_takes_teeth_of_different_numbers(machine, dynamics_of):

@@ -14,7 +14,15 @@ from dataset_samples import CONFIG, build, make_plan, write_shard
 
 from gensig.dataset.folder.beginning import create_folder
 from gensig.dataset.folder.layout import read_config, shard_path
-from gensig.dataset.folder.manifest import finalize, identity_hash, read_manifest, record_shard
+from gensig.dataset.folder.manifest import (
+    deciding,
+    differing_keys,
+    finalize,
+    identity_hash,
+    read_manifest,
+    record_shard,
+    stored_config,
+)
 from gensig.dataset.plan import Plan, read_plan
 from gensig.errors import DatasetError
 
@@ -38,6 +46,23 @@ def test_identity_covers_what_decides_the_bits() -> None:
     assert identity_hash(CONFIG | {"gear": {"n_teeth": 23, "out": 1}}, "0.1.0") != base  # nested names count
     with pytest.raises(DatasetError, match="plain data"):
         identity_hash({"a": object()}, "0.1.0")
+
+
+def with_backend(name: str) -> dict:
+    return CONFIG | {"solver": {"oversampling": 5, "backend": name}}
+
+
+def test_a_key_that_came_after_0_9_counts_only_where_it_is_not_at_its_default() -> None:
+    """A folder that was begun without the key goes on, and is another data set than one of another backend."""
+    before = CONFIG | {"solver": {"oversampling": 5}}
+    default = with_backend("runge_kutta")
+    assert stored_config(default) == before
+    assert deciding(default) == deciding(before)
+    assert default["solver"]["backend"] == "runge_kutta"
+    assert identity_hash(default, "0.9.0") == identity_hash(before, "0.9.0")
+    assert identity_hash(with_backend("other"), "0.9.0") != identity_hash(before, "0.9.0")
+    assert differing_keys(before, default) == differing_keys(default, before) == []
+    assert differing_keys(before, with_backend("other")) == ["solver.backend"]
 
 
 def test_folder_holds_what_is_needed(folder: Path, plan: Plan) -> None:

@@ -1,0 +1,1 @@
+"""Methods that integrate the equations of motion; ``registry`` lists them."""

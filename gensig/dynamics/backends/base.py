@@ -1,0 +1,104 @@
+"""The interface of a backend: the integration that it is given and the motions that it returns."""
+
+from __future__ import annotations
+
+from abc import ABC, abstractmethod
+from collections.abc import Sequence
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+
+from gensig.dynamics.pair import PairDynamics
+from gensig.errors import ConfigError
+
+Array = NDArray[np.float64]
+
+BOUNCING = 0.01  # share of the time without contact above which teeth bounce
+OUT_OF_BOUNDS = 1e6  # m, rad, m/s or rad/s: no machine; a motion that overflows may come back to finite numbers
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class Integration:
+    """One integration: the record that is wanted and how accurate it must be.
+
+    Parameters
+    ----------
+    sampling_rate : Hz    of the record
+    duration : s          of the record, from time 0 on
+    channels : names of degrees of freedom
+    tell_mesh : also return the state of the mesh at every sample
+    oversampling : internal steps per sample, or as fine as so many steps
+    precision : a name in ``PRECISIONS``
+    max_error : accepted relative error, None where nobody compares it
+    """
+
+    sampling_rate: float
+    duration: float
+    channels: tuple[str, ...]
+    tell_mesh: bool
+    oversampling: int
+    precision: str
+    max_error: float | None
+
+    def __post_init__(self) -> None:
+        count_samples(self.duration, self.sampling_rate)  # refuses a record without samples
+
+    @property
+    def n_samples(self) -> int:
+        """Samples of the record."""
+        return count_samples(self.duration, self.sampling_rate)
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class Motions:
+    """Motions of machines, one row each, in the order of the machines.
+
+    Parameters
+    ----------
+    acceleration : (machine, channel, sample) m/s2 or rad/s2
+    check : (machine, channel, sample)    the beginning of the same at half the step; no sample without ``max_error``
+    shaft_angle : (machine, sample) rad   of the pinion since time 0
+    seen : (machine, row, sample)         the mesh, rows as ``_layout`` names them; no row unless asked for
+    mean_speed : (machine,) rad/s
+    contact_loss_fraction : (machine,)    share of the time without contact
+    finite : (machine,)                   whether the motion stayed within bounds
+    """
+
+    acceleration: Array
+    check: Array
+    shaft_angle: Array
+    seen: Array
+    mean_speed: Array
+    contact_loss_fraction: Array
+    finite: NDArray[np.bool_]
+
+
+class Backend(ABC):
+    """A method that integrates the equations of motion of machines."""
+
+    @abstractmethod
+    def check_step(
+        self, machine: PairDynamics, sampling_rate: float, oversampling: int, max_error: float | None
+    ) -> None:
+        """Raise SimulationError for a machine whose motion the method cannot follow at this step."""
+
+    @abstractmethod
+    def records_together(self, precision: str) -> int:
+        """Returns the least number of records that are simulated at full speed."""
+
+    @abstractmethod
+    def integrate(self, machines: Sequence[PairDynamics], integration: Integration) -> Motions:
+        """Returns the settled motions of machines that have passed ``check_step``.
+
+        The machines share their degrees of freedom and the kind of their mesh law. The motion of a machine must not
+        depend on the other machines of the call, nor on their number.
+        """
+
+
+def count_samples(duration: float, sampling_rate: float) -> int:
+    """Samples of a record; ConfigError where there is none."""
+    n_samples = round(duration * sampling_rate)
+    if n_samples < 1:
+        raise ConfigError(f"operating.duration_s = {duration:g} holds no sample at {sampling_rate:g} Hz")
+    return n_samples

@@ -1,0 +1,208 @@
+"""The classical Runge-Kutta method with a fixed step, several records side by side in vector lanes."""
+
+from __future__ import annotations
+
+import dataclasses
+import math
+from collections.abc import Iterable, Sequence
+from dataclasses import dataclass
+from typing import TypeAlias, final
+
+import numpy as np
+from numpy.typing import NDArray
+
+from gensig.dynamics._layout import Group
+from gensig.dynamics._vector import n_lanes
+from gensig.dynamics.backends.base import BOUNCING, OUT_OF_BOUNDS, Backend, Integration, Motions
+from gensig.dynamics.backends.group_run import GroupRun
+from gensig.dynamics.backends.step_limits import (
+    check_step,
+    coarsest_oversampling,
+    settling_stages,
+    settling_time,
+)
+from gensig.dynamics.decimation import decimator
+from gensig.dynamics.lanes import at_step, fill_lanes, pack
+from gensig.dynamics.pair import PairDynamics
+
+Array = NDArray[np.float64]
+Stages: TypeAlias = Sequence[tuple[int, int]]
+
+CAREFUL = 3  # steps per sample in which a machine that bounced settles again: hard landings are stiff
+CHECKED = 0.03  # s at the beginning of a record, integrated again at half the step
+
+
+@final
+class RungeKutta(Backend):
+    """The compiled core of gensig: as many records at a time as a vector holds."""
+
+    def check_step(
+        self, machine: PairDynamics, sampling_rate: float, oversampling: int, max_error: float | None
+    ) -> None:
+        """Raise SimulationError for a step that is not stable; warn of a coarse one without ``max_error``."""
+        check_step(machine, sampling_rate, oversampling, max_error)
+
+    def records_together(self, precision: str) -> int:
+        """Returns the number of vector lanes."""
+        return n_lanes(precision)
+
+    def integrate(self, machines: Sequence[PairDynamics], integration: Integration) -> Motions:
+        """Returns the motions of machines, integrated in groups that settle in the same stages."""
+        groups = lane_groups(machines, integration)
+        motions = ((group, integrate_group([machines[i] for i in group], integration)) for group in groups)
+        return in_order(motions, len(machines))
+
+
+def lane_groups(machines: Sequence[PairDynamics], integration: Integration) -> list[list[int]]:
+    """Indices of the machines of each group; machines of one group settle in the same steps."""
+    by_steps: dict[int, list[int]] = {}
+    for index, machine in enumerate(machines):
+        steps = coarsest_oversampling(machine, integration.oversampling, integration.sampling_rate)
+        by_steps.setdefault(steps, []).append(index)
+    n = n_lanes(integration.precision)
+    return [same[first : first + n] for same in by_steps.values() for first in range(0, len(same), n)]
+
+
+def in_order(groups: Iterable[tuple[list[int], Motions]], n_machines: int) -> Motions:
+    """Motions of all machines, from the motions of groups and the indices of their machines."""
+    rows: dict[str, NDArray[np.generic]] = {}
+    for indices, motions in groups:
+        for field in dataclasses.fields(Motions):
+            values = getattr(motions, field.name)
+            if len(indices) == n_machines:
+                rows[field.name] = values[:n_machines]
+                continue
+            if field.name not in rows:
+                rows[field.name] = np.empty((n_machines, *values.shape[1:]), dtype=values.dtype)
+            rows[field.name][indices] = values[: len(indices)]
+    return Motions(**rows)  # type: ignore[arg-type]
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class GroupSteps:
+    """The numbers of a group of machines at any number of steps per sample.
+
+    ``packed`` is ``group`` as it was packed, for a step of ``packed_step`` s.
+    """
+
+    packed: Group
+    packed_step: float
+    sampling_rate: float
+
+    def at(self, oversampling: int) -> tuple[Group, float]:
+        """The group at so many steps per sample, and the step in s."""
+        step = 1.0 / (self.sampling_rate * oversampling)
+        return at_step(self.packed, self.packed_step, step), step
+
+
+def integrate_group(machines: Sequence[PairDynamics], integration: Integration) -> Motions:
+    """Settles machines and records them from time 0 on, in one group.
+
+    Returns
+    -------
+    one row a lane: lanes without a machine repeat the first
+    """
+    rate, oversampling, precision = integration.sampling_rate, integration.oversampling, integration.precision
+    low_pass, lanes = decimator(oversampling), fill_lanes(machines, precision)
+    # output samples; time 0 is the first recorded one
+    stages = [(steps, -low_pass.margin - before) for steps, before in settling_stages(machines[0], oversampling, rate)]
+    end = stages[-1][1]
+    # every lane begins in its own time; until then it integrates what nobody looks at
+    begins = [min(end - 1, -low_pass.margin - math.ceil(settling_time(machine) * rate)) for machine in lanes]
+    span = min(begins) / rate, integration.duration + low_pass.margin / rate
+    packed_step = 1.0 / (rate * oversampling)
+    steps = GroupSteps(
+        packed=pack(machines, packed_step, precision, span),
+        packed_step=packed_step,
+        sampling_rate=rate,
+    )
+    channels = [machines[0].dofs.index(name) for name in integration.channels]
+    run = GroupRun(lanes, np.array(channels, dtype=np.int64), precision)
+    run = settled(run, lanes, begins, stages, steps, oversampling)
+    return recorded(run, steps, integration, end)
+
+
+def settled(
+    run: GroupRun,
+    lanes: Sequence[PairDynamics],
+    begins: Sequence[int],
+    stages: Stages,
+    steps: GroupSteps,
+    oversampling: int,
+) -> GroupRun:
+    """Returns the machines at the end of the last stage; those that bounced have settled in careful steps."""
+    run, bounced = run_stages(run, lanes, begins, stages, steps)
+    careful = [(min(oversampling, max(CAREFUL, n)), until) for n, until in stages]
+    if bounced.any() and careful != stages:
+        run.take(run_stages(run, lanes, begins, careful, steps)[0], bounced)
+    return run.again()
+
+
+def run_stages(
+    run: GroupRun,
+    lanes: Sequence[PairDynamics],
+    begins: Sequence[int],
+    stages: Stages,
+    steps: GroupSteps,
+) -> tuple[GroupRun, NDArray[np.bool_]]:
+    """Integrates machines through the stages of the settling.
+
+    Parameters
+    ----------
+    begins : output sample at which each lane begins, at rest
+    stages : steps per sample, and the output sample at which the stage ends
+
+    Returns
+    -------
+    the machines at the end of the last stage, and which of them were out of contact or bounds on the way, (lane,)
+    """
+    now, lost = min(begins), np.zeros(len(lanes))
+    for n_steps, until in stages:
+        run, (group, step) = run.again(), steps.at(n_steps)
+        for begin in sorted({begin for begin in begins if now <= begin < until}):
+            run.advance(group, step, now * n_steps, (begin - now) * n_steps)
+            for lane, dynamics in enumerate(lanes):
+                if begins[lane] == begin:
+                    run.begin(group, lane, dynamics.static_start(begin * n_steps * step))
+                    lost[lane] = 0.0
+            now = begin
+        if now < until:
+            run.advance(group, step, now * n_steps, (until - now) * n_steps)
+            now = until
+        lost += run.lost / n_steps
+    return run, ~run.is_within(OUT_OF_BOUNDS) | (lost > BOUNCING * (now - np.array(begins)))
+
+
+def recorded(run: GroupRun, steps: GroupSteps, integration: Integration, end: int) -> Motions:
+    """Records settled machines, which stand at output sample ``end``."""
+    fine, n_samples = integration.oversampling, integration.n_samples
+    low_pass, (group, step) = decimator(fine), steps.at(fine)
+    run.advance(group, step, end * fine, (-low_pass.margin - end) * fine - 1)
+    checking = run.again()
+    run.lost[:] = 0.0
+    acceleration, angle, seen = run.record(group, step, low_pass, n_samples, tell_mesh=integration.tell_mesh)
+    check = np.empty((*acceleration.shape[:2], 0))
+    if integration.max_error is not None:
+        check = half_step(checking, steps, integration)
+    return Motions(
+        acceleration=acceleration,
+        check=check,
+        shaft_angle=angle[:, :-1],
+        seen=seen,
+        mean_speed=(angle[:, -1] - angle[:, 0]) * integration.sampling_rate / n_samples,
+        contact_loss_fraction=run.lost / ((n_samples + 2 * low_pass.margin - 1) * fine + 1),
+        finite=run.is_within(OUT_OF_BOUNDS),
+    )
+
+
+def half_step(run: GroupRun, steps: GroupSteps, integration: Integration) -> Array:
+    """The beginning of the record at half the step, (lane, channel, sample)."""
+    fine = integration.oversampling
+    low_pass, finer_low_pass = decimator(fine), decimator(2 * fine)
+    group, step = steps.at(2 * fine)
+    # the settled state stands before the step that is the first here; the finer low-pass may reach less far
+    first = -2 * (low_pass.margin * fine + 1)
+    wait = -2 * finer_low_pass.margin * fine - 1 - first
+    run.advance(group, step, first, wait)
+    n_check = min(integration.n_samples, math.ceil(CHECKED * integration.sampling_rate))
+    return run.record(group, step, finer_low_pass, n_check)[0]

@@ -1,0 +1,71 @@
+"""Steps that the classical Runge-Kutta scheme can take, and the stages in which a machine settles."""
+
+from __future__ import annotations
+
+import math
+import warnings
+
+import numpy as np
+
+from gensig.dynamics.pair import PairDynamics
+from gensig.dynamics.system import slowest_decay
+from gensig.errors import SimulationError
+
+LONGEST_SETTLING = 0.45  # s
+SETTLED = 1e-4  # share of the start's transient that is left
+STABILITY_LIMIT = 2.6  # |lambda| h of the classical RK4 on the imaginary axis is 2.83, on the real axis 2.79
+LONG_STEP = 0.5  # of the same, above which the error may exceed 1e-3
+COARSE_STABILITY = 0.6  # share of the limit: tables may be stiffer than their mean
+# Stages of the settling: steps per sample, and the time before the record at which the stage ends, s. The slow
+# transient of the drive takes nearly all of the settling. What coarse steps do to it decays in the finer steps that
+# follow, and the last stage before the record takes the record's own step.
+COARSE = ((1, 0.2), (2, 0.1), (3, 0.02))
+
+
+class CoarseStepWarning(UserWarning):
+    """A step that is stable but too long for the stated error."""
+
+    once = True  # each machine of a plan says it with other numbers
+
+
+def settling_time(dynamics: PairDynamics) -> float:
+    """Time after which the start's transient has fallen to 1e-4 (longest 0.45 s), s."""
+    rate = slowest_decay(dynamics.system(), dynamics.approach_direction(), dynamics.mean_mesh_stiffness)
+    return min(LONGEST_SETTLING, math.log(1.0 / SETTLED) / rate)
+
+
+def coarsest_oversampling(dynamics: PairDynamics, oversampling: int, sampling_rate: float) -> int:
+    """Least number of steps per sample that is stable while a machine settles, at most that of the record."""
+    fastest = float(np.abs(dynamics.stiff_rates).max()) / sampling_rate
+    return min(oversampling, math.ceil(fastest / (COARSE_STABILITY * STABILITY_LIMIT)))
+
+
+def settling_stages(dynamics: PairDynamics, oversampling: int, sampling_rate: float) -> list[tuple[int, int]]:
+    """Stages of the settling: steps per sample, and the samples before the record at which the stage ends."""
+    least = coarsest_oversampling(dynamics, oversampling, sampling_rate)
+    return [(min(max(steps, least), oversampling), math.ceil(before * sampling_rate)) for steps, before in COARSE]
+
+
+def check_step(dynamics: PairDynamics, sampling_rate: float, oversampling: int, max_error: float | None = None) -> None:
+    """Raise SimulationError for a step that RK4 cannot take, warn of a long one where nothing will look at its error.
+
+    With a ``max_error`` records whose error is too large are made again at half the step.
+    """
+    rates, step = dynamics.stiff_rates, 1.0 / (sampling_rate * oversampling)
+    fastest = float(np.abs(rates).max())
+    if fastest * step > STABILITY_LIMIT:
+        raise SimulationError(
+            f"solver.oversampling = {oversampling} makes internal steps of {step:.3g} s, too long for the stiffest "
+            f"motion at {fastest / (2 * math.pi):.4g} Hz; raise solver.oversampling to at least "
+            f"{math.ceil(oversampling * fastest * step / STABILITY_LIMIT)}"
+        )
+    oscillating = float(np.abs(np.imag(rates)).max())
+    if max_error is None and oscillating * step > LONG_STEP:
+        warnings.warn(
+            f"{2 * math.pi / (oscillating * step):.1f} internal steps to a period of the mesh mode at "
+            f"{oscillating / (2 * math.pi):.4g} Hz, and solver.max_error = null looks at no error, which may exceed "
+            f"1e-3: raise solver.oversampling to {math.ceil(oversampling * oscillating * step / LONG_STEP)}, or give "
+            "solver.max_error=1e-3",
+            CoarseStepWarning,
+            stacklevel=2,
+        )
