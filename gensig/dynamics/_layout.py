@@ -1,7 +1,7 @@
-"""Compiled core: where every number lies.
+"""Compiled core: the rows of its arrays by name.
 
-Arrays are flat; a row is one number for every record of the group. ``slot`` names an instant at which the tables were
-read.
+Arrays are flat, and a row is one number for every record of the group: ``get_row``, ``set_row`` and ``at`` of
+``_vector`` turn a row into a place. A slot is an instant at which the tables were read.
 """
 
 from __future__ import annotations
@@ -11,7 +11,7 @@ from typing import Any, NamedTuple
 from numba.core import types
 from numba.extending import intrinsic
 
-from gensig.dynamics._vector import FOUR, inlined, load, width
+from gensig.dynamics._vector import FOUR, inlined
 from gensig.mesh.pair_table import N_PAIRS
 
 MOST_PAIRS = 8  # that may be followed at once; spur gears have 4
@@ -39,8 +39,8 @@ NOMINAL_ANGLE, NOMINAL_SPEED, NOMINAL_ACCELERATION, TORQUE, TORQUE_SLOPE, N_PROF
 
 # rows of one pair in a slot of the scratch
 OWN, OWN_SLOPE, GAP, GAP_SLOPE, STIFFNESS, POSITION, N_KEPT = range(7)
-COAST, MIDDLE, PART = 0, 3, 4  # slots 1 and 2 take turns as begin and end of a step
-N_SLOTS = 5
+# slots; the second and the third take turns as begin and end of a step
+COAST, EVEN, ODD, MIDDLE, PART, N_SLOTS = range(6)
 SLOT_ROWS = MOST_PAIRS * N_KEPT
 COLUMNS = FOUR  # of a table: compliance, its slope, gap, its slope
 # rows of the scratch behind the slots
@@ -51,9 +51,11 @@ TILT = ERROR + MOST_PAIRS
 AHEAD = TILT + MOST_PAIRS  # roll of a slot, less that at the begin of the step
 WITHIN = AHEAD + N_SLOTS
 FLAGS = WITHIN + 1
-MOTION = FLAGS + 1  # roll less that at the begin of the step, approach, its rate, the roll's rate
+STEP_APPROACH = FLAGS + 1  # the approach at the last stage of a step
+# the motion of the mesh at a stage; the roll is counted from the begin of the step
+MOTION_ROLL, MOTION_APPROACH, MOTION_RATE, MOTION_ROLL_RATE = range(STEP_APPROACH + 1, STEP_APPROACH + 5)
 N_LAW = 8
-LAW = MOTION + 4
+LAW = MOTION_ROLL_RATE + 1  # fields of ``Law``
 RAW = LAW + N_LAW  # table rows as they are read, lane by lane
 PAIR_FORCE = RAW + MOST_PAIRS * COLUMNS
 # of chords only: the force that bends what pairs share, the same at the last step's end, the approach less that
@@ -64,6 +66,12 @@ BESIDE = RAW_BESIDE + MOST_PAIRS * COLUMNS
 LEFT_OUT, LEFT_OUT_SLOPE, TOUCH, TOUCH_SLOPE = range(COLUMNS)
 BESIDE_ROWS = MOST_PAIRS * COLUMNS
 N_MESH = BESIDE + N_SLOTS * BESIDE_ROWS
+# blocks of the machine behind the rows of the mesh, in rows per degree of freedom: five states, each q and then v; the
+# accelerations of a stage and their sums for q and v. Behind them the rows of the drive, the forces, and the mean
+# accelerations of a step and of its first part
+NOW, SINGLE, PARTED, TRIAL_A, TRIAL_B, ACCELERATIONS, SUM_Q, SUM_V, BEHIND = 0, 2, 4, 6, 8, 10, 11, 12, 13
+# rows of the drive at the begin of a step: nominal speed, its change, share of the set torque, the pinion's turn
+DRIVE_SPEED, DRIVE_GAIN, DRIVE_TORQUE, DRIVE_CENTER, N_DRIVE = range(5)
 # what is told of the mesh at an output sample: the newest pair, the normal force, and that of every pair
 SEEN_NEWEST, SEEN_FORCE, SEEN_PAIRS, N_SEEN = 0, 1, 2, 2 + MOST_PAIRS
 # rows of the float64 scratch
@@ -72,7 +80,32 @@ BASE, CENTER, NOMINAL, ROLL, N_WIDE = 0, 1, 2, 3, 3 + N_SLOTS
 NEWEST, AT_PINION, AT_WHEEL, CHORD = 0, 1, 1 + MOST_PAIRS, 1 + 2 * MOST_PAIRS
 SPAN = CHORD + MOST_PAIRS
 N_COUNTS = SPAN + N_SLOTS
+# spans of pairs in a slot: those that were read, and those that come near their mates
+FIRST_READ, LAST_READ, FIRST_NEAR_PAIR, LAST_NEAR_PAIR, N_SPAN = range(5)
 NOBODY = -(2**62)
+
+
+class Law(NamedTuple):
+    """Law of the gear mesh at an instant, a row each.
+
+    Parameters
+    ----------
+    normal, friction : N               forces
+    moment_p, moment_w : N m           of the friction, about pinion and wheel
+    along : N                          force on the roll coordinate, of the energy balance
+    stored : J
+    lost : W                           in the mesh damping
+    loaded : number of loaded pairs, negative on the back flanks
+    """
+
+    normal: Any
+    friction: Any
+    moment_p: Any
+    moment_w: Any
+    along: Any
+    stored: Any
+    lost: Any
+    loaded: Any
 
 
 class Group(NamedTuple):
@@ -156,5 +189,30 @@ def followed(group):
 
 
 @inlined
-def at_row(numbers, row):
-    return load(numbers, row * width(numbers))
+def pair_rows(slot, pair):
+    """First row of a pair in a slot; ``OWN`` to ``POSITION`` count from there."""
+    return slot * SLOT_ROWS + pair * N_KEPT
+
+
+@inlined
+def chord_rows(slot, pair):
+    """First row of a pair's chord in a slot; ``LEFT_OUT`` to ``TOUCH_SLOPE`` count from there."""
+    return BESIDE + slot * BESIDE_ROWS + pair * COLUMNS
+
+
+@inlined
+def raw_place(block, pair, lane, n):
+    """Place of the table row that was read for a pair of one record, in ``RAW`` or ``RAW_BESIDE``."""
+    return block * n + (pair * n + lane) * COLUMNS
+
+
+@inlined
+def span_place(slot, n):
+    """Place of the spans of a slot; ``FIRST_READ`` to ``LAST_NEAR_PAIR`` count from there."""
+    return SPAN * n + N_SPAN * slot
+
+
+@inlined
+def machine_rows(block, n_dof):
+    """First row of a block of the machine; see ``NOW``."""
+    return N_MESH + block * n_dof

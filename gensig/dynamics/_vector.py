@@ -187,6 +187,50 @@ def store(typing_context: Any, array: Any, place: Any, value: Any) -> Any:
     return types.void(array, types.intp, value), build
 
 
+def _row_place(builder: Any, vector: Vector, row: Any) -> Any:
+    """The place at which a row of a flat array begins."""
+    return builder.mul(row, ir.Constant(row.type, vector.count))
+
+
+@_intrinsic
+def get_row(typing_context: Any, array: Any, row: Any) -> Any:
+    """A row of a flat array: one number for every record of the group."""
+    vector = GROUPS[array.dtype]
+
+    def build(context: Any, builder: Any, sig: Any, args: Any) -> Any:
+        place = _row_place(builder, vector, args[1])
+        address = _address(context, builder, sig.args[0], args[0], place, vector)
+        return builder.load(address, align=vector.element.bitwidth // 8)
+
+    return vector(array, types.intp), build
+
+
+@_intrinsic
+def set_row(typing_context: Any, array: Any, row: Any, value: Any) -> Any:
+    """Write a row of a flat array."""
+    vector = GROUPS[array.dtype]
+    if value is not vector:
+        raise TypeError(f"{value} is no row of an array of {array.dtype}")
+
+    def build(context: Any, builder: Any, sig: Any, args: Any) -> Any:
+        place = _row_place(builder, vector, args[1])
+        address = _address(context, builder, sig.args[0], args[0], place, vector)
+        builder.store(args[2], address, align=vector.element.bitwidth // 8)
+        return context.get_dummy_value()
+
+    return types.void(array, types.intp, value), build
+
+
+@_intrinsic
+def at(typing_context: Any, row: Any, lane: Any, n_lanes: Any) -> Any:
+    """The place of one record's number in a flat array: row ``row``, record ``lane`` of ``n_lanes``."""
+
+    def build(context: Any, builder: Any, sig: Any, args: Any) -> Any:
+        return builder.add(builder.mul(args[0], args[2]), args[1])
+
+    return types.intp(types.intp, types.intp, types.intp), build
+
+
 @_intrinsic
 def width(typing_context: Any, array: Any) -> Any:
     """Records of a group whose numbers have the array's kind."""

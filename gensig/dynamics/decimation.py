@@ -13,12 +13,12 @@ import numpy as np
 from numpy.typing import NDArray
 
 from gensig.dynamics._kernels import TOGETHER, low_pass
+from gensig.dynamics._tableau import LOW_PASS
 from gensig.dynamics._vector import LANES
 
 Array = NDArray[np.float64]
 
-PASS_SHARE = 0.390625  # 20 kHz of 51.2 kHz
-ATTENUATION_DB = 100.0
+PASS_SHARE, STOP_SHARE, ATTENUATION_DB = LOW_PASS
 LOWEST_HZ = 20.0
 STORED = Path(__file__).with_name("low_pass.json")  # first halves of symmetric taps, by oversampling
 
@@ -88,9 +88,9 @@ def design(oversampling: int) -> Decimator:
     from scipy.signal import firwin2, kaiserord
 
     nyquist = 0.5 * oversampling  # in units of the output rate
-    n_taps, beta = kaiserord(ATTENUATION_DB, (0.5 - PASS_SHARE) / nyquist)
+    n_taps, beta = kaiserord(ATTENUATION_DB, (STOP_SHARE - PASS_SHARE) / nyquist)
     margin = math.ceil(0.5 * n_taps / oversampling)
-    middle = 0.5 * (PASS_SHARE + 0.5)
+    middle = 0.5 * (PASS_SHARE + STOP_SHARE)
     frequency = np.append(np.linspace(0.0, middle, 65), [middle, nyquist])
     gain = np.append(1.0 / np.sinc(frequency[:65] / oversampling), [0.0, 0.0])
     n_grid = max(16385, 1 + 2 ** math.ceil(math.log2(256 * oversampling)))

@@ -10,6 +10,7 @@ import math
 
 from gensig.driveline.time import _layout as layout
 from gensig.driveline.time._line_mesh_kernels import gather, mesh_law, solve_contact
+from gensig.dynamics._tableau import NEWMARK
 from gensig.dynamics._vector import compiled
 
 ANGLE, SPEED, ACCELERATION, MESH_FORCE = range(4)  # kinds of channels
@@ -206,7 +207,7 @@ def advance(line, meshes, torques, course, state, step, first_step, n_steps, cha
     n, n_meshes = len(q), len(law)
     ahead_q, ahead_v, moved, force_1 = work.ahead_q, work.ahead_v, work.moved, work.force
     turned, roll_rate, free, approach_1, law_1 = work.turned, work.roll_rate, work.free, work.approach, work.law
-    per_step, half = 2.0 / step, 0.5 * step
+    per_step, half = NEWMARK.damping / step, 0.5 * step
     angle, speed, gain, knot, share = nominal(course, first_step * step, 0)
     for place in range(first_step, first_step + n_steps):
         speed_0 = speed

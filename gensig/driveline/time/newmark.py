@@ -23,6 +23,7 @@ from gensig.driveline.time.geared_line import (
     pack_meshes,
     pack_torques,
 )
+from gensig.dynamics._tableau import NEWMARK
 from gensig.dynamics.decimation import decimator
 from gensig.errors import ConfigError, SimulationError, StepError
 
@@ -192,7 +193,13 @@ class _Run:
         self.line, self.course, self.solver, self.channels = line, course.knots, solver, tuple(channels)
         self.order = elimination_order(line)
         at_of, step = np.argsort(self.order), solver.step
-        self.packed = pack_line(line, self.order, 4.0 / step**2, 2.0 / step, f"with a step of {step:.3g} s")
+        self.packed = pack_line(
+            line,
+            self.order,
+            NEWMARK.mass / step**2,
+            NEWMARK.damping / step,
+            f"with a step of {step:.3g} s",
+        )
         self.meshes = pack_meshes(line, self.order)
         self.torques = pack_torques(line, self.order, torques, course)
         self.law, self.work = np.zeros((len(line.meshes), layout.N_LAW)), _scratch(line)
