@@ -7,7 +7,7 @@ import time
 import numpy as np
 
 from benchmarks._rates import SAMPLING_RATE
-from gensig.dynamics._vector import compiled, load, n_lanes, store, width
+from gensig.dynamics._vector import compiled, get_row, n_lanes, set_row
 
 ROUNDS = 200_000
 PER_ROUND = 32  # vector operations
@@ -22,8 +22,7 @@ TABLE_BYTES = 3 * 64  # two rows of four numbers for each pair
 @compiled
 def _chains(numbers, rounds):
     """Eight independent chains of products and sums, two registers each."""
-    n = width(numbers)
-    factor, term = load(numbers, 0), load(numbers, n)
+    factor, term = get_row(numbers, 0), get_row(numbers, 1)
     a, b, c, d = term, term, term, term
     e, f, g, h = factor, factor, factor, factor
     for _ in range(rounds):
@@ -35,7 +34,7 @@ def _chains(numbers, rounds):
         e, f, g, h = e + term, f + term, g + term, h + term
         a, b, c, d = a + term, b + term, c + term, d + term
         e, f, g, h = e * factor, f * factor, g * factor, h * factor
-    store(numbers, 2 * n, ((a + b) + (c + d)) + ((e + f) + (g + h)))
+    set_row(numbers, 2, ((a + b) + (c + d)) + ((e + f) + (g + h)))
 
 
 def peak(runs: int, precision: str = "float64") -> float:

@@ -153,24 +153,16 @@ def _address(context: Any, builder: Any, kind: Any, array: Any, place: Any, read
     return builder.bitcast(builder.gep(data, [place]), llvm.as_pointer())
 
 
-def _loaded(vectors: dict[Any, Vector], array: Any) -> Any:
-    def build(context: Any, builder: Any, sig: Any, args: Any) -> Any:
-        size = sig.return_type.element.bitwidth // 8
-        return builder.load(_address(context, builder, sig.args[0], args[0], args[1], sig.return_type), align=size)
-
-    return vectors[array.dtype](array, types.intp), build
-
-
-@_intrinsic
-def load(typing_context: Any, array: Any, place: Any) -> Any:
-    """The numbers of a group that begin at ``place`` of a one-dimensional array."""
-    return _loaded(GROUPS, array)
-
-
 @_intrinsic
 def load_four(typing_context: Any, array: Any, place: Any) -> Any:
     """Four numbers from ``place`` on."""
-    return _loaded(ROWS, array)
+    vector = ROWS[array.dtype]
+
+    def build(context: Any, builder: Any, sig: Any, args: Any) -> Any:
+        address = _address(context, builder, sig.args[0], args[0], args[1], vector)
+        return builder.load(address, align=vector.element.bitwidth // 8)
+
+    return vector(array, types.intp), build
 
 
 @_intrinsic

@@ -4,6 +4,8 @@ from __future__ import annotations
 
 from typing import Any, NamedTuple
 
+from gensig.dynamics._vector import inlined
+
 # numbers of a mesh
 (
     BACKLASH, DAMPING, SHARED, START, NOMINAL_PITCHES, PITCHES_PER_RAD, MIRROR, LEAST_GAP, LEAST_COAST_GAP,
@@ -24,6 +26,18 @@ FORCE, TANGENT, RATE_TANGENT, STORED, LOST, ALONG, N_LAW = range(7)
 APART, BEHIND, LARGEST, LEAST, N_TALLY = range(5)
 # sums of a run in J, then counts
 INPUT, PASSING, DISSIPATED, THROUGHPUT, ROUNDS, N_SUMS = range(6)
+
+
+@inlined
+def spring_column(spring):
+    """Column of the stiffness of a spring in what is gathered of a pair; its slope stands behind it."""
+    return STIFFNESS + PER_SPRING * spring
+
+
+@inlined
+def node_place(place, row, n_cells, cell):
+    """Place in ``Meshes.table`` of the node before a cell of a row; ``place`` are the whole numbers of the mesh."""
+    return place[AT_TABLE] + (row * (n_cells + 1) + cell) * spring_column(place[N_SPRINGS])
 
 
 class Rows(NamedTuple):

@@ -11,7 +11,7 @@ import math
 import numpy as np
 
 from gensig.driveline.time import _layout as layout
-from gensig.driveline.time._layout import COAST, DRIVE
+from gensig.driveline.time._layout import COAST, DRIVE, node_place, spring_column
 from gensig.dynamics._vector import compiled
 
 MOST_ROUNDS = 60
@@ -53,7 +53,7 @@ def gather(meshes, mesh, flank, turned, within, pairs):
     newest = math.floor(turned) - first
     n_cells = n_pairs * n_nodes
     n_springs, at_depth = place[layout.N_SPRINGS], place[layout.AT_DEPTH]
-    n_columns, reach = layout.STIFFNESS + layout.PER_SPRING * n_springs, np.inf
+    n_columns, reach = spring_column(n_springs), np.inf
     if n_springs > 1:
         reach = within + meshes.depth[at_depth + 1]
     for j in range(n_pairs):
@@ -69,8 +69,9 @@ def gather(meshes, mesh, flank, turned, within, pairs):
             continue
         x = (turned - (index + first)) * n_nodes
         cell = min(max(int(x), 0), n_cells - 1)
-        at = place[layout.AT_TABLE] + (row * (n_cells + 1) + cell) * n_columns
-        between(meshes.table, at, at + n_columns, x - cell, sense * n_nodes, here[layout.GAP :])
+        low = node_place(place, row, n_cells, cell)
+        high = low + n_columns
+        between(meshes.table, low, high, x - cell, sense * n_nodes, here[layout.GAP :])
         if flank == DRIVE:
             here[layout.GAP] += (
                 meshes.error[place[layout.AT_ERROR_A] + tooth_a] + meshes.error[place[layout.AT_ERROR_B] + tooth_b]
@@ -78,8 +79,8 @@ def gather(meshes, mesh, flank, turned, within, pairs):
         for spring in range(n_springs):
             if here[layout.GAP] + meshes.depth[at_depth + spring] > reach:
                 break
-            to = layout.STIFFNESS + layout.PER_SPRING * spring
-            between(meshes.table, at + to, at + n_columns + to, x - cell, sense * n_nodes, here[to:])
+            column = spring_column(spring)
+            between(meshes.table, low + column, high + column, x - cell, sense * n_nodes, here[column:])
     return reach
 
 
@@ -90,7 +91,7 @@ def flank_law(pairs, depth, damping, shared, within, rate, roll_rate):
 
     Returns
     -------
-    what ``_line_layout.N_LAW`` names: force, its slopes over approach and rate, stored energy, power lost, force along
+    what ``_layout.N_LAW`` names: force, its slopes over approach and rate, stored energy, power lost, force along
     the roll
     """
     total, least = 0.0, 0.0
@@ -101,9 +102,9 @@ def flank_law(pairs, depth, damping, shared, within, rate, roll_rate):
                 bite = within - pairs[j, layout.GAP] - depth[spring]
                 if not bite > least:
                     break
-                own = pairs[j, layout.STIFFNESS + layout.PER_SPRING * spring]
-                stiffness += own
-                force += own * bite
+                stiff = pairs[j, spring_column(spring)]
+                stiffness += stiff
+                force += stiff * bite
         total = force / (1.0 + shared * stiffness)
         # each pair that the shared deflection lifts off raises the total, and may so lift another
         if shared * total <= least:
@@ -119,20 +120,20 @@ def flank_law(pairs, depth, damping, shared, within, rate, roll_rate):
             bite = within - pairs[j, layout.GAP] - depth[spring] - shared * total
             if not bite > 0.0:
                 break
-            at = layout.STIFFNESS + layout.PER_SPRING * spring
-            own, slope = pairs[j, at], pairs[j, layout.GAP_SLOPE]
-            elastic = own * bite
+            column = spring_column(spring)
+            stiff, slope = pairs[j, column], pairs[j, layout.GAP_SLOPE]
+            elastic = stiff * bite
             speed = rate - slope * roll_rate
             grown = 1.0 + damping * speed
             pressed = 0.0
             if grown > 0.0:
                 pressed = elastic * grown
-                tangent += own * softer * grown
+                tangent += stiff * softer * grown
                 rate_tangent += elastic * damping
             normal += pressed
             stored += 0.5 * elastic * bite
             lost += (pressed - elastic) * speed
-            along += pressed * slope - 0.5 * bite * bite * pairs[j, at + 1]
+            along += pressed * slope - 0.5 * bite * bite * pairs[j, column + 1]
     return normal, tangent, rate_tangent, stored, lost, along
 
 
@@ -143,10 +144,10 @@ def mesh_law(meshes, mesh, turned, roll_rate, approach, rate, law, work):
     ``work.reach`` (mesh, flank) says up to where ``work.pairs`` holds all that touches for this roll, -inf where it
     holds nothing yet; what is missing is gathered when it may touch.
     """
-    number, place, found = meshes.number[mesh], meshes.place[mesh], law[mesh]
+    number, place, total = meshes.number[mesh], meshes.place[mesh], law[mesh]
     n_pairs, at_depth = place[layout.N_PAIRS], place[layout.AT_DEPTH]
     depth = meshes.depth[at_depth : at_depth + place[layout.N_SPRINGS]]
-    found[:] = 0.0
+    total[:] = 0.0
     for flank in range(layout.N_FLANKS):
         within, least, sense = approach, number[layout.LEAST_GAP], 1.0
         if flank == COAST:
@@ -164,12 +165,12 @@ def mesh_law(meshes, mesh, turned, roll_rate, approach, rate, law, work):
             sense * rate,
             roll_rate,
         )
-        found[layout.FORCE] += sense * normal
-        found[layout.TANGENT] += tangent
-        found[layout.RATE_TANGENT] += rate_tangent
-        found[layout.STORED] += stored
-        found[layout.LOST] += lost
-        found[layout.ALONG] += along
+        total[layout.FORCE] += sense * normal
+        total[layout.TANGENT] += tangent
+        total[layout.RATE_TANGENT] += rate_tangent
+        total[layout.STORED] += stored
+        total[layout.LOST] += lost
+        total[layout.ALONG] += along
 
 
 @compiled

@@ -11,10 +11,12 @@ from gensig.dynamics._vector import (
     LANES,
     PRECISIONS,
     any_above,
-    load,
+    at,
+    get_row,
     load_four,
     n_lanes,
     second_and_fourth,
+    set_row,
     spread,
     store,
     transpose,
@@ -31,15 +33,15 @@ COMPILED = njit(error_model="numpy")
 CHOICE, N_LANE_BY_LANE = 12, 13  # results before: two vectors, vector and number, number and vector
 
 
-def lane_by_lane(read, n):
-    """Every operation that mixes no lanes, on vectors of n that ``read`` loads."""
+def lane_by_lane(read, per_row, n):
+    """Every operation that mixes no lanes, on vectors of n; ``read`` counts rows, or numbers if ``per_row`` is n."""
 
     @COMPILED
     def every(rows, numbers, out, above):
         """``rows`` holds groups of four vectors; ``above`` takes whether a > b anywhere."""
         for k in range(len(above)):
-            here, there, x = k * 4 * n, k * N_LANE_BY_LANE * n, numbers[k]
-            a, b = read(rows, here), read(rows, here + n)
+            here, there, x = k * 4 * per_row, k * N_LANE_BY_LANE * n, numbers[k]
+            a, b = read(rows, here), read(rows, here + per_row)
             store(out, there, a + b)
             store(out, there + n, a - b)
             store(out, there + 2 * n, a * b)
@@ -52,7 +54,9 @@ def lane_by_lane(read, n):
             store(out, there + 9 * n, x - a)
             store(out, there + 10 * n, x * a)
             store(out, there + 11 * n, x / a)
-            store(out, there + 12 * n, where_above(a, b, read(rows, here + 2 * n), read(rows, here + 3 * n)))
+            store(
+                out, there + 12 * n, where_above(a, b, read(rows, here + 2 * per_row), read(rows, here + 3 * per_row))
+            )
             above[k] = any_above(a, b)
 
     return every
@@ -61,13 +65,18 @@ def lane_by_lane(read, n):
 EVERY = {
     (precision, shape): lane_by_lane(*of)
     for precision in PRECISIONS
-    for shape, of in (("group", (load, n_lanes(precision))), ("row", (load_four, FOUR)))
+    for shape, of in (("group", (get_row, 1, n_lanes(precision))), ("row", (load_four, FOUR, FOUR)))
 }
 
 
 @COMPILED
 def move(values, source, target, out):
-    store(out, target, load(values, source))
+    set_row(out, target, get_row(values, source))
+
+
+@COMPILED
+def place_of(row, lane, n):
+    return at(row, lane, n)
 
 
 @COMPILED
@@ -216,24 +225,39 @@ def test_rows_of_four(precision, numbers):
     assert same_numbers(picked, rows[..., [1, 1, 3, 3]])
 
 
-def test_load_and_store_move_vectors_wherever_they_lie(precision):
-    for moved, n in ((move, n_lanes(precision)), (move_four, FOUR)):
-        values = np.arange(n + 8, dtype=precision)
-        for source in range(9):
-            for target in range(9):
-                out = np.full(n + 8, -1.0, dtype=precision)
-                moved(values, source, target, out)
-                expected = np.full(n + 8, -1.0)
-                expected[target : target + n] = values[source : source + n]
-                assert out.tolist() == expected.tolist()
+def test_rows_of_four_move_wherever_they_lie(precision):
+    values = np.arange(FOUR + 8, dtype=precision)
+    for source in range(9):
+        for target in range(9):
+            out = np.full(FOUR + 8, -1.0, dtype=precision)
+            move_four(values, source, target, out)
+            expected = np.full(FOUR + 8, -1.0)
+            expected[target : target + FOUR] = values[source : source + FOUR]
+            assert out.tolist() == expected.tolist()
+
+
+def test_rows_move_as_rows_of_a_table(precision):
+    """Row and place are those of numpy's (row, lane)."""
+    n = n_lanes(precision)
+    values = np.arange(5 * n, dtype=precision).reshape(5, n)
+    for source in range(5):
+        for target in range(5):
+            out = np.full((5, n), -1.0, dtype=precision)
+            move(values.ravel(), source, target, out.ravel())
+            expected = np.full((5, n), -1.0)
+            expected[target] = values[source]
+            assert out.tolist() == expected.tolist()
+        for lane in range(n):
+            assert values.ravel()[place_of(source, lane, n)] == values[source, lane]
 
 
 def test_a_vector_goes_into_an_array_of_its_own_kind_only(precision):
     (other,) = (name for name in PRECISIONS if name != precision)
     values, out = np.zeros(16, dtype=precision), np.full(16, 7.0, dtype=other)
-    for moved, n in ((move, n_lanes(precision)), (move_four, FOUR)):
-        with pytest.raises(TypeError, match=f"{precision}x{n} does not fit an array of {other}"):
-            moved(values, 0, 0, out)
+    with pytest.raises(TypeError, match=f"{precision}x{n_lanes(precision)} is no row of an array of {other}"):
+        move(values, 0, 0, out)
+    with pytest.raises(TypeError, match=f"{precision}x{FOUR} does not fit an array of {other}"):
+        move_four(values, 0, 0, out)
     assert (out == 7.0).all()
 
 
