@@ -43,6 +43,7 @@ from gensig.driveline.teeth import (
     tooth_table,
 )
 from gensig.driveline.time.newmark import LineMotion, LineSolver
+from gensig.dynamics.backends.registry import DEFAULT_BACKEND
 from gensig.dynamics.integrator import Solver, check_memory
 from gensig.dynamics.pair import Body
 from gensig.errors import ConfigError, SimulationError
@@ -228,9 +229,13 @@ class LineMachine(Machine):
             raise ConfigError(f"mesh.law = {self.mesh.law}: the meshes of a drive line are one-sided")
         if self.solver.precision != "float64":
             raise ConfigError(f"solver.precision = {self.solver.precision}: a drive line is integrated in float64")
+        if self.solver.backend != DEFAULT_BACKEND:
+            raise ConfigError(
+                f"solver.backend = {self.solver.backend}: a drive line has an integrator of its own; leave it out"
+            )
         self._warn_of_supports()
         self.quality.check_covered(self.pair.pinion, self.pair.wheel)
-        check_memory(self.operating.duration, sensing.sampling_rate, len(sensing.channels), self.solver.precision)
+        check_memory(self.operating.duration, sensing.sampling_rate, len(sensing.channels), self.solver)
         self.mesh_table()
 
     def _warn_of_supports(self) -> None:

@@ -5,7 +5,7 @@ from __future__ import annotations
 from collections.abc import Sequence
 
 from gensig.dynamics.backends.base import BOUNCING, Integration, Motions, count_samples
-from gensig.dynamics.backends.registry import BACKENDS, DEFAULT_BACKEND
+from gensig.dynamics.backends.registry import BACKENDS
 from gensig.dynamics.backends.step_limits import CoarseStepWarning, check_step, settling_time
 from gensig.dynamics.pair import DOFS, PairDynamics
 from gensig.dynamics.solver import FINEST, Solver
@@ -78,11 +78,9 @@ def check_machine(dynamics: PairDynamics, solver: Solver, sampling_rate: float) 
     BACKENDS[solver.backend].check_step(dynamics, sampling_rate, solver.oversampling, solver.max_error)
 
 
-def check_memory(
-    duration: float, sampling_rate: float, n_channels: int, precision: str, backend: str = DEFAULT_BACKEND
-) -> None:
+def check_memory(duration: float, sampling_rate: float, n_channels: int, solver: Solver) -> None:
     """Raise ConfigError for records that would not fit into memory side by side."""
-    together = BACKENDS[backend].records_together(precision)
+    together = records_together(solver)
     n_bytes = count_samples(duration, sampling_rate) * n_channels * together * 8
     if n_bytes > MOST_BYTES:
         longest = duration * MOST_BYTES / n_bytes

@@ -20,7 +20,6 @@ from gensig.options.configuration import Configuration, whole_number
 from gensig.plan.make import make_plan
 from gensig.record.options import read_dataset_options
 from gensig.record.simulate import Record, simulate_records
-from gensig.units import read
 
 EPOCH_STREAM = 9100  # spawn key of the seeds of later epochs; the causes of a record and the splits have others
 
@@ -148,7 +147,7 @@ class RecordStream:
         return len(self.numbers)
 
     def __iter__(self) -> Iterator[Record]:
-        together = records_together(read(Solver, self.config["solver"], "solver"))
+        together = records_together(self.config.section("solver").read(Solver))
         for first in range(0, len(self), together):
             yield from self._records(self.numbers[first : first + together])
 

@@ -19,7 +19,6 @@ from gensig.dynamics.integrator import (
     check_channels,
     check_machine,
     check_memory,
-    check_step,
     integrate,
 )
 from gensig.dynamics.mesh_state import MeshState, mesh_state
@@ -121,11 +120,11 @@ class GearPairMachine(Machine):
         self.mesh_table()
         self.quality.check_covered(self.pair.pinion, self.pair.wheel)
         sensing, operating = self.sensing, self.operating
-        check_memory(operating.duration, sensing.sampling_rate, len(sensing.channels), self.solver.precision)
+        check_memory(operating.duration, sensing.sampling_rate, len(sensing.channels), self.solver)
         nominal = pair_dynamics(Run(system=self, faults=()))
         check_channels(sensing.channels, self.channels)
         sensing.check(operating.duration)
-        check_step(nominal, sensing.sampling_rate, self.solver.oversampling, self.solver.max_error)
+        check_machine(nominal, self.solver, sensing.sampling_rate)
 
     @classmethod
     def simulate_runs(cls, runs: Sequence[Run[Self]]) -> list[CleanRecord | SimulationError]:
@@ -220,7 +219,7 @@ def _is_too_coarse(run: PairRun, record: CleanRecord | SimulationError) -> bool:
 
 
 def _checks(motions: Motions, solver: Solver, sampling_rate: float) -> tuple[Array, list[str]]:
-    """Relative error in the band and what it means, of every lane."""
+    """Relative error in the band of every motion, and its meaning."""
     exact, kept = motions.check, motions.finite
     errors = np.full(len(exact), np.nan)
     if solver.max_error is None:
@@ -228,11 +227,11 @@ def _checks(motions: Motions, solver: Solver, sampling_rate: float) -> tuple[Arr
     found = motions.acceleration[:, :, : exact.shape[2]]
     errors[kept] = in_band_error(found[kept], exact[kept], sampling_rate)
     checks = ["error" if error <= solver.max_error else "unresolved" for error in errors]
-    for lane, check in enumerate(checks):
-        if check == "unresolved" and kept[lane] and motions.contact_loss_fraction[lane] > BOUNCING:
-            one = slice(lane, lane + 1)
+    for index, check in enumerate(checks):
+        if check == "unresolved" and kept[index] and motions.contact_loss_fraction[index] > BOUNCING:
+            one = slice(index, index + 1)
             if agreement(found[one], exact[one], sampling_rate).agrees[0]:
-                checks[lane] = "levels"
+                checks[index] = "levels"
     return errors, checks
 
 
@@ -273,6 +272,6 @@ def _side_by_side(runs: Sequence[PairRun], machines: Sequence[PairDynamics]) -> 
     return records
 
 
-def _mesh_state(run: PairRun, dynamics: PairDynamics, motions: Motions, lane: int) -> MeshState:
+def _mesh_state(run: PairRun, dynamics: PairDynamics, motions: Motions, index: int) -> MeshState:
     faulty = faulty_teeth(run.system.pair, run.faults)
-    return mesh_state(dynamics, motions.seen[lane], motions.shaft_angle[lane], faulty)
+    return mesh_state(dynamics, motions.seen[index], motions.shaft_angle[index], faulty)

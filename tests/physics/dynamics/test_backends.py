@@ -15,7 +15,8 @@ from gensig.dynamics.decimation import decimator, in_band_error
 from gensig.dynamics.integrator import Solver, check_machine, records_together, settling_time
 from gensig.dynamics.pair import PairDynamics
 from gensig.errors import ConfigError, SimulationError
-from gensig.systems.pair_machine import CleanRecord, Run, Start, simulate_together
+from gensig.systems.base import simulate_together
+from gensig.systems.run import CleanRecord, Run, Start
 from gensig.units import read
 
 ACCURACY = 1e-3  # of a channel's spectrum: what the compiled core promises at its default step

@@ -9,6 +9,7 @@ import pytest
 from gensig.cli import main
 from gensig.dataset.folder.layout import PLAN
 from gensig.dataset.plan import PlanRows
+from gensig.dynamics.backends.registry import BACKENDS, DEFAULT_BACKEND
 from gensig.plan.request import read_request
 from gensig.record.simulate import simulate_record
 
@@ -88,6 +89,7 @@ def test_a_record_depends_on_its_row_alone_and_a_sham_has_no_fault(folder):
         (["sensing.sensor.low_cutoff_hz=1"], "take sensing=shaft_line"),
         (["mesh.law=paper"], "the meshes of a drive line are one-sided"),
         (["solver.precision=float32"], "integrated in float64"),
+        (["solver.backend=euler"], "solver.backend = 'euler'; allowed: runge_kutta"),
         (["dataset.store_mesh_state=true"], "take false"),
         (["heat=chongqing_rated"], "a drive line takes heat=none"),
         (["operating.torque_nm=-5"], "must be positive"),
@@ -100,6 +102,14 @@ def test_what_no_record_can_be_made_of_is_refused_in_one_line(words, told, tmp_p
     assert told in error
     assert "\n" not in error
     assert not (tmp_path / "set").exists()
+
+
+def test_a_backend_of_gear_pairs_is_refused(tmp_path, capsys, monkeypatch):
+    monkeypatch.setitem(BACKENDS, "other", BACKENDS[DEFAULT_BACKEND])
+    assert main(["generate", *SMALL, "solver.backend=other", f"out={tmp_path / 'set'}"]) != 0
+    error = capsys.readouterr().err.strip()
+    assert error.endswith("solver.backend = other: a drive line has an integrator of its own; leave it out")
+    assert "\n" not in error
 
 
 @pytest.mark.parametrize("seconds", ["0", "-1", "nan", "1000"])

@@ -335,6 +335,7 @@ class TestMotions:
         assert len(rest) == LANES - 2
         assert all(lane.tobytes() == first.tobytes() for lane in rest)
 
+    @pytest.mark.filterwarnings("ignore::gensig.dynamics.integrator.CoarseStepWarning")
     def test_any_number_of_machines_comes_back_in_order(self, motions, machine, dynamics_of):
         """More than a group takes, of two kinds of settling; every motion is that of the machine alone."""
         stiff = machine({"gear.pinion.support.stiffness_y_n_per_m": 2e9})

@@ -117,17 +117,18 @@ class TestRefusals:
     @pytest.mark.parametrize(("precision", "lanes"), [("float64", 8), ("float32", 16)])
     def test_more_than_fits_into_memory(self, precision, lanes):
         """The duration that it names fits, a longer one does not."""
+        solver = Solver(oversampling=5, precision=precision)
         with pytest.raises(ConfigError) as caught:
-            check_memory(1e4, 51200.0, 4, precision)
+            check_memory(1e4, 51200.0, 4, solver)
         text = str(caught.value)
         assert text.startswith(
             f"operating.duration_s = 10000: {lanes} records side by side with 4 channels at 51200 Hz"
         )
         longest = float(re.search(r"at most (.+) s at a time$", text)[1])
         assert_allclose(longest, MOST_BYTES / (51200 * 4 * 8 * lanes), rtol=5e-3, atol=0)
-        check_memory(0.99 * longest, 51200.0, 4, precision)
+        check_memory(0.99 * longest, 51200.0, 4, solver)
         with pytest.raises(ConfigError, match="record at most"):
-            check_memory(1.01 * longest, 51200.0, 4, precision)
+            check_memory(1.01 * longest, 51200.0, 4, solver)
 
     def test_a_machine_checks_its_memory_and_its_step(self, machine):
         machine().check()
