@@ -126,7 +126,7 @@ def test_a_machine_that_a_backend_refuses_is_a_failed_record(record, lsoda: str)
 
 
 def test_an_unknown_backend_is_refused_with_those_that_there_are(config_with, lsoda: str) -> None:
-    options = config_with()["solver"]
+    options = config_with().section("solver").plain()
     assert read(Solver, options, "solver").backend == DEFAULT_BACKEND == "runge_kutta"
     with pytest.raises(ConfigError) as caught:
         read(Solver, options | {"backend": "euler"}, "solver")
@@ -135,6 +135,6 @@ def test_an_unknown_backend_is_refused_with_those_that_there_are(config_with, ls
 
 def test_a_configuration_without_the_key_means_the_default(config_with) -> None:
     """Data sets of 0.9.0 know no backend."""
-    options = config_with()["solver"]
-    del options["backend"]
-    assert read(Solver, options, "solver").backend == DEFAULT_BACKEND
+    options = config_with().section("solver").without("backend")
+    assert "backend" not in options
+    assert options.read(Solver).backend == DEFAULT_BACKEND
