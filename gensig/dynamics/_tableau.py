@@ -11,14 +11,14 @@ from typing import NamedTuple
 class Tableau(NamedTuple):
     """Coefficients of a Runge-Kutta scheme of four stages for q'' = a(t, q, q').
 
-    Stage i is at ``node[i]`` of the step, and its state lies ``node[i]`` of the step away along the slopes of the stage
-    before. The two stages in the middle are alike. Over a step h
+    Stage i is at ``node[i]`` of the step, and its state lies ``node[i]`` of the step away along the
+    slopes of the stage before. The two stages in the middle are alike. Over a step h
 
         q_1 = q_0 + h (v_0 + h share sum position[i] a_i)
         v_1 = v_0 + h share sum weight[i] a_i
 
-    so that the mean acceleration of the step is share sum weight[i] a_i. ``position[i]`` follows from the weights and
-    nodes of the stages behind i.
+    so that the mean acceleration of the step is share sum weight[i] a_i. ``position[i]`` follows
+    from the weights and nodes of the stages behind i.
     """
 
     node: tuple[float, float, float, float]
@@ -45,8 +45,8 @@ class CubicMiddle(NamedTuple):
 class LowPass(NamedTuple):
     """Low-pass between the internal rate and the output rate, in shares of the output rate.
 
-    ``pass_share`` is the end of the pass band, ``stop_share`` the begin of the stop band, ``attenuation_db`` what the
-    latter takes.
+    ``pass_share`` is the end of the pass band, ``stop_share`` the begin of the stop band,
+    ``attenuation_db`` what the latter takes.
     """
 
     pass_share: float
@@ -55,10 +55,12 @@ class LowPass(NamedTuple):
 
 
 class Newmark(NamedTuple):
-    """Newmark's method with beta and gamma, and the numbers of the average acceleration that follow from them.
+    """Newmark's method with beta and gamma, and the numbers of the average acceleration that follow
+    from them.
 
-    A step h solves (``mass`` M / h^2 + ``damping`` C / h + K) dq = right-hand side, and ends at the speed
-    v_1 = ``damping`` dq / h - v_0: v_1 and v_0 have the mean dq / h, which only gamma = 2 beta = 1/2 makes true.
+    A step h solves (``mass`` M / h^2 + ``damping`` C / h + K) dq = right-hand side, and ends at the
+    speed v_1 = ``damping`` dq / h - v_0: v_1 and v_0 have the mean dq / h, which only gamma = 2
+    beta = 1/2 makes true.
     """
 
     beta: float

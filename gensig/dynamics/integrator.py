@@ -41,8 +41,8 @@ def integrate(
 ) -> Motions:
     """Settles every machine by itself, then records ``duration`` s from time 0 on.
 
-    The machines share their degrees of freedom and the kind of their mesh law. A motion does not depend on the other
-    machines of the call.
+    The machines share their degrees of freedom and the kind of their mesh law. A motion does not
+    depend on the other machines of the call.
 
     Returns
     -------

@@ -79,7 +79,11 @@ class Backend(ABC):
 
     @abstractmethod
     def check_step(
-        self, machine: PairDynamics, sampling_rate: float, oversampling: int, max_error: float | None
+        self,
+        machine: PairDynamics,
+        sampling_rate: float,
+        oversampling: int,
+        max_error: float | None,
     ) -> None:
         """Raise SimulationError for a machine whose motion the method cannot follow at this step."""
 
@@ -91,8 +95,8 @@ class Backend(ABC):
     def integrate(self, machines: Sequence[PairDynamics], integration: Integration) -> Motions:
         """Returns the settled motions of machines that have passed ``check_step``.
 
-        The machines share their degrees of freedom and the kind of their mesh law. The motion of a machine must not
-        depend on the other machines of the call, nor on their number.
+        The machines share their degrees of freedom and the kind of their mesh law. The motion of a
+        machine must not depend on the other machines of the call, nor on their number.
         """
 
 

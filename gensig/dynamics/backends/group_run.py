@@ -16,7 +16,7 @@ Array = NDArray[np.float64]
 
 
 class GroupRun:
-    """State (2, dof, lane) of a group of machines, their lost steps (lane,), and the scratch of the compiled core."""
+    """State (2, dof, lane) of machines, their lost steps (lane,), and scratch of the compiled core."""
 
     def __init__(self, lanes: Sequence[PairDynamics], channels: NDArray[np.int64], precision: str) -> None:
         n_dof = len(lanes[0].dofs)
@@ -51,7 +51,8 @@ class GroupRun:
         """A copy of the run whose tables are read anew, to go on at another step."""
         other = object.__new__(GroupRun)
         other.n_lanes, other.channels, other.precision = self.n_lanes, self.channels, self.precision
-        other.state, other.lost, other.fresh = self.state.copy(), np.zeros_like(self.lost), np.ones_like(self.fresh)
+        other.state = self.state.copy()
+        other.lost, other.fresh = np.zeros_like(self.lost), np.ones_like(self.fresh)
         other.work, other.wide, other.near = self.work.copy(), self.wide.copy(), self.near.copy()
         return other
 
@@ -65,14 +66,20 @@ class GroupRun:
         self.fresh[:] = 0.0
 
     def record(
-        self, group: Group, step: float, low_pass: Decimator, n_samples: int, *, tell_mesh: bool = False
+        self,
+        group: Group,
+        step: float,
+        low_pass: Decimator,
+        n_samples: int,
+        *,
+        tell_mesh: bool = False,
     ) -> tuple[Array, Array, Array]:
         """Integrate on, from ``low_pass.margin`` samples and a step before time 0, and decimate.
 
         Returns
         -------
-        accelerations (lane, channel, sample), angles of the pinions (lane, sample + 1), and ``N_SEEN`` rows of the mesh
-        (lane, row, sample); no row unless ``tell_mesh``
+        accelerations (lane, channel, sample), angles of the pinions (lane, sample + 1), and
+        ``N_SEEN`` rows of the mesh (lane, row, sample); no row unless ``tell_mesh``
         """
         factor, margin = low_pass.oversampling, low_pass.margin
         out = np.empty((self.n_lanes, len(self.channels), n_samples))

@@ -37,9 +37,13 @@ class RungeKutta(Backend):
     """The compiled core of gensig: as many records at a time as a vector holds."""
 
     def check_step(
-        self, machine: PairDynamics, sampling_rate: float, oversampling: int, max_error: float | None
+        self,
+        machine: PairDynamics,
+        sampling_rate: float,
+        oversampling: int,
+        max_error: float | None,
     ) -> None:
-        """Raise SimulationError for a step that is not stable; warn of a coarse one without ``max_error``."""
+        """Raise SimulationError for an unstable step; warn of a coarse one without ``max_error``."""
         check_step(machine, sampling_rate, oversampling, max_error)
 
     def records_together(self, precision: str) -> int:
@@ -102,13 +106,16 @@ def integrate_group(machines: Sequence[PairDynamics], integration: Integration) 
     -------
     one row a lane: lanes without a machine repeat the first
     """
-    rate, oversampling, precision = integration.sampling_rate, integration.oversampling, integration.precision
+    rate, oversampling = integration.sampling_rate, integration.oversampling
+    precision = integration.precision
     low_pass, lanes = decimator(oversampling), fill_lanes(machines, precision)
     # output samples; time 0 is the first recorded one
-    stages = [(steps, -low_pass.margin - before) for steps, before in settling_stages(machines[0], oversampling, rate)]
+    settling = settling_stages(machines[0], oversampling, rate)
+    stages = [(n_steps, -low_pass.margin - before) for n_steps, before in settling]
     end = stages[-1][1]
     # every lane begins in its own time; until then it integrates what nobody looks at
-    begins = [min(end - 1, -low_pass.margin - math.ceil(settling_time(machine) * rate)) for machine in lanes]
+    durations = [math.ceil(settling_time(machine) * rate) for machine in lanes]
+    begins = [min(end - 1, -low_pass.margin - n) for n in durations]
     span = min(begins) / rate, integration.duration + low_pass.margin / rate
     packed_step = 1.0 / (rate * oversampling)
     steps = GroupSteps(
@@ -130,7 +137,7 @@ def settled(
     steps: GroupSteps,
     oversampling: int,
 ) -> GroupRun:
-    """Returns the machines at the end of the last stage; those that bounced have settled in careful steps."""
+    """Returns the machines at the end of the last stage; what bounced has settled in finer steps."""
     run, bounced = run_stages(run, lanes, begins, stages, steps)
     careful = [(min(oversampling, max(CAREFUL, n)), until) for n, until in stages]
     if bounced.any() and careful != stages:
@@ -154,7 +161,8 @@ def run_stages(
 
     Returns
     -------
-    the machines at the end of the last stage, and which of them were out of contact or bounds on the way, (lane,)
+    the machines at the end of the last stage, and which of them were out of contact or bounds on
+    the way, (lane,)
     """
     now, lost = min(begins), np.zeros(len(lanes))
     for n_steps, until in stages:
@@ -200,7 +208,8 @@ def half_step(run: GroupRun, steps: GroupSteps, integration: Integration) -> Arr
     fine = integration.oversampling
     low_pass, finer_low_pass = decimator(fine), decimator(2 * fine)
     group, step = steps.at(2 * fine)
-    # the settled state stands before the step that is the first here; the finer low-pass may reach less far
+    # the settled state stands before the step that is the first here; the finer low-pass may reach
+    # less far
     first = -2 * (low_pass.margin * fine + 1)
     wait = -2 * finer_low_pass.margin * fine - 1 - first
     run.advance(group, step, first, wait)

@@ -16,9 +16,10 @@ SETTLED = 1e-4  # share of the start's transient that is left
 STABILITY_LIMIT = 2.6  # |lambda| h of the classical RK4 on the imaginary axis is 2.83, on the real axis 2.79
 LONG_STEP = 0.5  # of the same, above which the error may exceed 1e-3
 COARSE_STABILITY = 0.6  # share of the limit: tables may be stiffer than their mean
-# Stages of the settling: steps per sample, and the time before the record at which the stage ends, s. The slow
-# transient of the drive takes nearly all of the settling. What coarse steps do to it decays in the finer steps that
-# follow, and the last stage before the record takes the record's own step.
+# Stages of the settling: steps per sample, and the time before the record at which the stage ends,
+# s. The slow transient of the drive takes nearly all of the settling. What coarse steps do to it
+# decays in the finer steps that follow, and the last stage before the record takes the record's own
+# step.
 COARSE = ((1, 0.2), (2, 0.1), (3, 0.02))
 
 
@@ -35,19 +36,20 @@ def settling_time(dynamics: PairDynamics) -> float:
 
 
 def coarsest_oversampling(dynamics: PairDynamics, oversampling: int, sampling_rate: float) -> int:
-    """Least number of steps per sample that is stable while a machine settles, at most that of the record."""
+    """Least stable number of steps per sample of the settling, at most that of the record."""
     fastest = float(np.abs(dynamics.stiff_rates).max()) / sampling_rate
     return min(oversampling, math.ceil(fastest / (COARSE_STABILITY * STABILITY_LIMIT)))
 
 
 def settling_stages(dynamics: PairDynamics, oversampling: int, sampling_rate: float) -> list[tuple[int, int]]:
-    """Stages of the settling: steps per sample, and the samples before the record at which the stage ends."""
+    """Stages of the settling: steps per sample, and samples from the stage's end to the record."""
     least = coarsest_oversampling(dynamics, oversampling, sampling_rate)
     return [(min(max(steps, least), oversampling), math.ceil(before * sampling_rate)) for steps, before in COARSE]
 
 
 def check_step(dynamics: PairDynamics, sampling_rate: float, oversampling: int, max_error: float | None = None) -> None:
-    """Raise SimulationError for a step that RK4 cannot take, warn of a long one where nothing will look at its error.
+    """Raise SimulationError for a step that RK4 cannot take, warn of a long one where nothing will
+    look at its error.
 
     With a ``max_error`` records whose error is too large are made again at half the step.
     """
