@@ -82,13 +82,13 @@ def run_jobs(
     run = run or run_job
     if n_workers == 1 or len(jobs) == 1:
         results = []
-        with _one_thread():
-            for job in jobs:
-                results.append(run(task, settings, job))
-                on_done(results[-1])
-        _loaded.clear()
-        _domains.clear()
-        _shams.clear()
+        try:
+            with _one_thread():
+                for job in jobs:
+                    results.append(run(task, settings, job))
+                    on_done(results[-1])
+        finally:
+            _forget_inputs()
         return [prediction for result in results for prediction in result]
     context = multiprocessing.get_context("spawn")
     executor = ProcessPoolExecutor(min(n_workers, len(jobs)), context, _start_worker, (task, settings, run))
@@ -103,6 +103,13 @@ def run_jobs(
         ) from None
     finally:
         executor.shutdown(wait=True, cancel_futures=True)
+
+
+def _forget_inputs() -> None:
+    """Drop what the jobs of one study share, so that the next study in this process loads its own."""
+    _loaded.clear()
+    _domains.clear()
+    _shams.clear()
 
 
 def run_job(task: Task, settings: TrainSettings, job: Job) -> list[Outcome]:
