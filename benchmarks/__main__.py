@@ -41,12 +41,17 @@ def kernels(runs: int) -> dict[str, float]:
     """Rates of the integrators alone."""
     lanes = _rates.machines()
     eight = lanes[:LANES]
-    works = {f"compiled core float64 x{oversampling}": _rates.kernel(eight, oversampling) for oversampling in (4, 5, 8)}
+    works = {
+        f"compiled core float64 x{oversampling}": _rates.kernel(eight, oversampling)
+        for oversampling in (4, 5, 8)
+    }
     works["compiled core float64 x5, one of the lanes in use"] = _rates.kernel(eight[:1], 5)
     works[KERNEL.format("float32")] = _rates.kernel(lanes, 5, "float32")
     works[SCALAR] = _rates.scalar(eight, 5)
     works |= _rates.scipy_works(eight[0])
-    found = _rates.rates(works, 4 * runs)  # they are short: many turns cost little, and one of them is undisturbed
+    found = _rates.rates(
+        works, 4 * runs
+    )  # they are short: many turns cost little, and one of them is undisturbed
     if (ross := stored_rate()) is not None:
         found["ROSS run_time_response x1, as stored, by way of scalar Numba"] = ross * found[SCALAR]
     return found
@@ -56,7 +61,9 @@ def same_law() -> dict[str, float]:
     """Relative differences of the accelerations of scalar code and compiled core, 20 Hz to 20 kHz."""
     eight = _rates.machines(n=LANES)
     return {
-        f"x{_rates.SAME_OVERSAMPLING}, required below {_rates.SAME:g}": _rates.check_same_law(eight),
+        f"x{_rates.SAME_OVERSAMPLING}, required below {_rates.SAME:g}": _rates.check_same_law(
+            eight
+        ),
         "x5, where the compiled core takes kinks apart": _rates.difference(eight, 5),
     }
 
@@ -72,23 +79,32 @@ def start_up(runs: int) -> dict[str, float]:
     found = {
         "the interpreter alone": min(wall("pass") for _ in range(runs)),
         "import gensig": min(wall("import gensig") for _ in range(runs)),
-        "first record of 1 s, compiled code cached": min(wall(RECORD.format("float64")) for _ in range(runs)),
+        "first record of 1 s, compiled code cached": min(
+            wall(RECORD.format("float64")) for _ in range(runs)
+        ),
     }
     with tempfile.TemporaryDirectory() as cache:
-        found["first record of 1 s, nothing cached"] = wall(RECORD.format("float64"), NUMBA_CACHE_DIR=cache)
+        found["first record of 1 s, nothing cached"] = wall(
+            RECORD.format("float64"), NUMBA_CACHE_DIR=cache
+        )
     return found
 
 
 def ratios(rates: dict[str, float], ends: dict[str, dict[str, float]]) -> dict[str, float]:
     """What compares between machines."""
-    found = {f"kernel {precision} over scalar Numba": rates[KERNEL.format(precision)] for precision in PRECISIONS}
+    found = {
+        f"kernel {precision} over scalar Numba": rates[KERNEL.format(precision)]
+        for precision in PRECISIONS
+    }
     found = {name: value / rates[SCALAR] for name, value in found.items()}
     end = ends["float64"][RECORDS]
     found["float32 over float64, end to end"] = ends["float32"][RECORDS] / end
     found["end to end over solve_ivp RK45, right-hand side compiled"] = end / rates[RK45]
     found["end to end over solve_ivp RK45, NumPy around the law"] = end / rates[RK45_NUMPY]
     for precision, values in ends.items():
-        found[f"share of the kernel's rate reached, {precision}"] = values[RECORDS] / rates[KERNEL.format(precision)]
+        found[f"share of the kernel's rate reached, {precision}"] = (
+            values[RECORDS] / rates[KERNEL.format(precision)]
+        )
         one, two = (values[_end_to_end.wall_name(workers)] for workers in (1, 2))
         found[f"two workers over one, {precision}"] = two / one
     for name, value in rates.items():
@@ -110,11 +126,16 @@ def main() -> None:
     def show(section: str, values: dict[str, float]) -> None:
         sections[section] = values
         over = values.get(SCALAR)
-        print_figures(section, values, *([lambda value: f"{value / over:.4g} x scalar"] if over else []))
+        print_figures(
+            section, values, *([lambda value: f"{value / over:.4g} x scalar"] if over else [])
+        )
 
     show("difference of scalar code and compiled core", same_law())
     show(f"integrators, {PER_CORE}", kernels(arguments.runs))
-    show("roof of the compiled core: its additions and multiplications alone", roof(8 * arguments.runs, 5))
+    show(
+        "roof of the compiled core: its additions and multiplications alone",
+        roof(8 * arguments.runs, 5),
+    )
     rates, ends = sections[f"integrators, {PER_CORE}"], {}
     for precision in PRECISIONS:
         values = _end_to_end.by_stage(precision, arguments.runs)

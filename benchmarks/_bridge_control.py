@@ -37,7 +37,13 @@ LOADS = (0, 50, 90)  # %
 SCORED = 3  # the channel in which both states have the same path; the others are only reported
 TWIN_OF = "healthy__load50"
 # Windows of 0.125 s as the default's at 51.2 kHz; the default network stays at chance on so little of one channel.
-TRAINING = ("window_samples=1600", "stride_samples=1600", "model=spectrum", "epochs=20", "epoch_fraction=1")
+TRAINING = (
+    "window_samples=1600",
+    "stride_samples=1600",
+    "model=spectrum",
+    "epochs=20",
+    "epoch_fraction=1",
+)
 BLOCK = 2  # windows that are drawn together
 N_BOOTSTRAP = 5000
 CLASSES = ("healthy", "crack", "broken", "missing_tooth")
@@ -63,10 +69,14 @@ def training_sets(file: Path, twin: Path) -> dict[str, tuple[list[str], Path | N
     """
     if not twin.is_dir():
         words = ["--array", TWIN_OF, "--channels", f"channel_{SCORED}", "--rate", f"{RATE:g}"]
-        status = gensig_main(["twin", str(file), *words, "--teeth", *TEETH, "--speed", SPEED, "--out", str(twin)])
+        status = gensig_main(
+            ["twin", str(file), *words, "--teeth", *TEETH, "--speed", SPEED, "--out", str(twin)]
+        )
         if status != 0:
             raise ConfigError(f"gensig twin ended with status {status}")
-    torque = f"operating.torque_nm: {{distribution: uniform, low: {TORQUES[0]}, high: {TORQUES[1]}}}"
+    torque = (
+        f"operating.torque_nm: {{distribution: uniform, low: {TORQUES[0]}, high: {TORQUES[1]}}}"
+    )
     common = [
         f"plan.classes=[{','.join(CLASSES)}]",
         "plan.n_records=320",
@@ -95,18 +105,36 @@ def training_sets(file: Path, twin: Path) -> dict[str, tuple[list[str], Path | N
 def judge_control(file: Path, models: Sequence[Path]) -> list[dict[str, Any]]:
     """One row for each channel, load and variant: how much more of a fault the broken state is said to have."""
     with np.load(file, allow_pickle=False) as held:
-        recorded = {(state, load): held[f"{state}__load{load}"] for state in STATES for load in LOADS}
+        recorded = {
+            (state, load): held[f"{state}__load{load}"] for state in STATES for load in LOADS
+        }
     n_channels = len(recorded[STATES[0], LOADS[0]])
-    loaded = [(*load_model(folder), load_domain(folder, load_model(folder)[1]), folder) for folder in models]
+    loaded = [
+        (*load_model(folder), load_domain(folder, load_model(folder)[1]), folder)
+        for folder in models
+    ]
     rng = np.random.default_rng(20240607)
     rows = []
     for channel in range(n_channels):
         for variant in (BEFORE, *METHODS):
             found = [_judge(recorded, channel, variant, *one) for one in loaded]
             for load in LOADS:
-                fault = {state: np.mean([one[state, load][0] for one in found], axis=0) for state in STATES}
-                beyond = {state: np.mean([one[state, load][1] for one in found], axis=0) for state in STATES}
-                rows.append({"channel": channel, "variant": variant, "load": load, **_row(fault, beyond, rng)})
+                fault = {
+                    state: np.mean([one[state, load][0] for one in found], axis=0)
+                    for state in STATES
+                }
+                beyond = {
+                    state: np.mean([one[state, load][1] for one in found], axis=0)
+                    for state in STATES
+                }
+                rows.append(
+                    {
+                        "channel": channel,
+                        "variant": variant,
+                        "load": load,
+                        **_row(fault, beyond, rng),
+                    }
+                )
     return rows
 
 
@@ -123,8 +151,12 @@ def _judge(
     statistics = load_statistics(folder)
     assert statistics is not None
     healthy = description.class_names.index(HEALTHY)
-    halves = {key: _halves(signal[channel : channel + 1], description) for key, signal in recorded.items()}
-    found: dict[tuple[str, int], list[tuple[FloatArray, FloatArray]]] = {key: [] for key in recorded}
+    halves = {
+        key: _halves(signal[channel : channel + 1], description) for key, signal in recorded.items()
+    }
+    found: dict[tuple[str, int], list[tuple[FloatArray, FloatArray]]] = {
+        key: [] for key in recorded
+    }
     for judged in (0, 1):
         network, region = model, domain
         if variant != BEFORE:
@@ -135,14 +167,20 @@ def _judge(
             said = 1.0 - np.exp(predict_windows(network, parts[judged])[:, healthy])
             found[key].append((said, distances(region, parts[judged]) > region.threshold))
     return {
-        key: (np.concatenate([said for said, _ in parts]), np.concatenate([beyond for _, beyond in parts]))
+        key: (
+            np.concatenate([said for said, _ in parts]),
+            np.concatenate([beyond for _, beyond in parts]),
+        )
         for key, parts in found.items()
     }
 
 
 def _halves(signal: NDArray[Any], description: ModelDescription) -> tuple[WindowSet, WindowSet]:
     n_samples = signal.shape[-1]
-    first, second = (_windows(part, description) for part in (signal[:, : n_samples // 2], signal[:, n_samples // 2 :]))
+    first, second = (
+        _windows(part, description)
+        for part in (signal[:, : n_samples // 2], signal[:, n_samples // 2 :])
+    )
     return first, second
 
 
@@ -160,7 +198,9 @@ def _windows(signal: NDArray[Any], description: ModelDescription) -> WindowSet:
     )
 
 
-def _row(fault: dict[str, FloatArray], beyond: dict[str, FloatArray], rng: np.random.Generator) -> dict[str, Any]:
+def _row(
+    fault: dict[str, FloatArray], beyond: dict[str, FloatArray], rng: np.random.Generator
+) -> dict[str, Any]:
     """Difference of the mean probabilities with a 95 % interval by bootstrap over blocks of each recording."""
     drawn = {state: _block_means(values, rng) for state, values in fault.items()}
     sound, broken = (fault[state] for state in STATES)

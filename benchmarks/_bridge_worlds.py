@@ -31,7 +31,10 @@ IntArray = NDArray[np.integer]
 
 BASE = ("experiment=quickstart", "plan.n_gearboxes=8", "operating.duration_s=0.5")
 SOURCE = (*BASE, "sensing=housing")
-OTHER_SENSORS = ("sensing.path.natural_frequency_hz=[150,6000]", "sensing.sensor.mounted_resonance_hz=9000")  # assumed
+OTHER_SENSORS = (
+    "sensing.path.natural_frequency_hz=[150,6000]",
+    "sensing.sensor.mounted_resonance_hz=9000",
+)  # assumed
 WORLDS = {
     "paths": (*SOURCE, "seed=1"),
     "sensors": (*SOURCE, "seed=3", *OTHER_SENSORS),
@@ -47,7 +50,10 @@ WORLDS = {
     ),
 }
 PROTOCOL = "by_unit"
-SCOPES = ("world", "gearbox")  # whose healthy records: all gearboxes of the world together, or each its own
+SCOPES = (
+    "world",
+    "gearbox",
+)  # whose healthy records: all gearboxes of the world together, or each its own
 BEFORE = "before"
 N_BOOTSTRAP = 2000
 
@@ -85,7 +91,9 @@ def judge_world(source: Dataset, world: Dataset, models: Sequence[Path]) -> Judg
         found = {BEFORE: predict_windows(model, judged)}
         for scope in SCOPES:
             for name, statistics, method in _variants(healthy, mixture):
-                found[f"{name}, {scope}"] = _adapted(model, statistics, method, adapting, judged, _groups(world, scope))
+                found[f"{name}, {scope}"] = _adapted(
+                    model, statistics, method, adapting, judged, _groups(world, scope)
+                )
         seeds.append({name: over_records(value, judged.record)[1] for name, value in found.items()})
     record = np.unique(judged.record)
     return Judged(
@@ -108,7 +116,12 @@ def _groups(world: Dataset, scope: str) -> NDArray[Any]:
 
 
 def _adapted(
-    model: nn.Module, source: Statistics, method: str, adapting: WindowSet, judged: WindowSet, group: NDArray[Any]
+    model: nn.Module,
+    source: Statistics,
+    method: str,
+    adapting: WindowSet,
+    judged: WindowSet,
+    group: NDArray[Any],
 ) -> FloatArray:
     """(window, class) log-probabilities, each group of records by the network adapted to its healthy ones."""
     found = np.empty((len(judged), 0))
@@ -137,7 +150,10 @@ def scores(judged: Judged, class_names: Sequence[str]) -> dict[str, dict[str, An
     base, base_drawn = 0.0, np.zeros(N_BOOTSTRAP)  # of the first variant, the network as trained
     for name, log_probability in judged.log_probability.items():
         confusion = np.stack(
-            [confusion_by_unit(judged.label, rows.argmax(axis=1), judged.unit, n_classes) for rows in log_probability]
+            [
+                confusion_by_unit(judged.label, rows.argmax(axis=1), judged.unit, n_classes)
+                for rows in log_probability
+            ]
         )
         resampled = balanced_accuracy(np.einsum("bu,sutp->bstp", times, confusion))
         drawn = np.take_along_axis(resampled, seeds, axis=1).mean(axis=1)
@@ -151,7 +167,9 @@ def scores(judged: Judged, class_names: Sequence[str]) -> dict[str, dict[str, An
             "interval": _interval(drawn),
             "gain": mean - base,
             "gain_interval": _interval(drawn - base_drawn),
-            "auroc": float(np.mean([_auroc(judged.label, rows, healthy) for rows in log_probability])),
+            "auroc": float(
+                np.mean([_auroc(judged.label, rows, healthy) for rows in log_probability])
+            ),
             "recall": dict(zip(class_names, share.tolist(), strict=True)),
         }
     return table

@@ -130,7 +130,9 @@ def share_load(mesh, m, roll, approach, work):
         work[KIND, k], work[POSITION, k], work[BITE, k] = kind, position, -np.inf
         if kind >= 0:
             x = (position - FIRST_PITCH * m.pitch) * m.nodes_per_meter
-            work[BITE, k] = approach - _bent(mesh.gap, mesh.gap_slope, kind, 0, x, m.nodes_per_meter)
+            work[BITE, k] = approach - _bent(
+                mesh.gap, mesh.gap_slope, kind, 0, x, m.nodes_per_meter
+            )
     total, stiffness = work[TOTAL, 0], 0.0
     for _ in range(MOST_ROUNDS):
         force, stiffness = 0.0, 0.0
@@ -140,7 +142,9 @@ def share_load(mesh, m, roll, approach, work):
                 work[LOAD, k] = 0.0
                 continue
             x = (work[POSITION, k] - FIRST_PITCH * m.pitch) * m.nodes_per_meter
-            work[LOAD, k], tangent = _pair_load(mesh, int(work[KIND, k]), x, bite, work[LOAD, k], m.nodes_per_meter)
+            work[LOAD, k], tangent = _pair_load(
+                mesh, int(work[KIND, k]), x, bite, work[LOAD, k], m.nodes_per_meter
+            )
             force += work[LOAD, k]
             stiffness += tangent
         change = (force - total) / (1.0 + m.shared * stiffness)
@@ -265,8 +269,20 @@ def motion(
     state = np.concatenate([start, np.zeros_like(start)])
     spring, damper = np.diag(system.stiffness).copy(), np.diag(system.damping).copy()
     lowest = _integrate(
-        mesh, numbers, direction, system.mass, spring, damper, system.force, state, step, first_step, velocity
+        mesh,
+        numbers,
+        direction,
+        system.mass,
+        spring,
+        damper,
+        system.force,
+        state,
+        step,
+        first_step,
+        velocity,
     )
     if not lowest > -numbers.backlash:
-        raise ValueError(f"the approach fell to {lowest:.3g} m, through the backlash of {numbers.backlash:.3g} m")
+        raise ValueError(
+            f"the approach fell to {lowest:.3g} m, through the backlash of {numbers.backlash:.3g} m"
+        )
     return velocity

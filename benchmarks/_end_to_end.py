@@ -26,14 +26,18 @@ from gensig.production.folder import begin_folder, run_folder
 from gensig.record import simulate as records
 from gensig.systems import spur_pair
 
-RECORDING_SHARE = "share of the records' own integration"  # of the kernel's rate, where that would be the same
+RECORDING_SHARE = (
+    "share of the records' own integration"  # of the kernel's rate, where that would be the same
+)
 SHARD = 24  # records, as in the experiment
 N_SHARDS, SHARDS_A_WORKER = 2, 3
 
 
 def data_set(precision: str, n_shards: int) -> dict[str, Any]:
     """Configuration of a quickstart data set: 1 s, four channels, a fault, speed, load and noise of its own each."""
-    config, _ = quickstart(n_shards * SHARD, f"solver.precision={precision}", f"dataset.records_per_shard={SHARD}")
+    config, _ = quickstart(
+        n_shards * SHARD, f"solver.precision={precision}", f"dataset.records_per_shard={SHARD}"
+    )
     return config
 
 
@@ -102,7 +106,9 @@ def _complete(out: Path, *, workers: int) -> list[float]:
     """Make every shard; the times at which they were finished."""
     ends: list[float] = []
     executor = LocalExecutor(n_workers=workers)
-    n_failed, problems = run_folder(out, executor=executor, on_shard=lambda _: ends.append(time.perf_counter()))
+    n_failed, problems = run_folder(
+        out, executor=executor, on_shard=lambda _: ends.append(time.perf_counter())
+    )
     if n_failed or problems:
         raise AssertionError(f"{n_failed} records failed, problems: {problems}")
     return ends

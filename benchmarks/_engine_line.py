@@ -38,11 +38,17 @@ MASS = {3: 4.2608, 66: 6.851, 67: 2.0185, 18: 3.3467, 19: 2.5686, 45: 2.7469, 20
         32: 4.5783, 44: 2.4033}  # kg  # fmt: skip
 MODULE, PRESSURE_ANGLE = 3e-3, math.radians(20.0)
 SUPPORT, SUPPORT_RATIO = 5e8, 0.03  # N/m and damping ratio, assumed
-LOSS_FACTOR, LOSS_AT = 0.03, 2.0 * math.pi * 100.0  # of shafts, made viscous at an assumed frequency
+LOSS_FACTOR, LOSS_AT = (
+    0.03,
+    2.0 * math.pi * 100.0,
+)  # of shafts, made viscous at an assumed frequency
 BACKLASH, MESH_DAMPING = 1.5e-4, 2e-4  # m and s/m, assumed
 RIPPLE = (0.1, 0.03, 0.01)  # of mesh stiffness: shares of its first harmonics, assumed
 HOUSING_MASS = 20.0  # kg, what each bearing carries along, assumed
-END_GEARS, DRAG = (28, 39, 40, 41, 62, 64), 40.0  # places of the ends of the branches in the line; N m, assumed
+END_GEARS, DRAG = (
+    (28, 39, 40, 41, 62, 64),
+    40.0,
+)  # places of the ends of the branches in the line; N m, assumed
 
 
 def base_radius(n_teeth: int, helix_angle: float) -> float:
@@ -83,42 +89,73 @@ def engine_line(*, lateral: bool = True, linear: bool = False) -> GearedLine:
                 matrix[bearing, bearing] += value
     rotation, meshes = np.zeros(n), []
     rotation[: at_of[18]] = 1.0
-    for driver, driven, z_a, z_b, helix, value in sorted(MESHES, key=lambda mesh: (mesh[0] > 21, mesh[0], mesh[1])):
+    for driver, driven, z_a, z_b, helix, value in sorted(
+        MESHES, key=lambda mesh: (mesh[0] > 21, mesh[0], mesh[1])
+    ):
         a, b = at_of[driver], at_of[driven]
         radii = base_radius(z_a, helix), base_radius(z_b, helix)
         rotation[b] = -rotation[a] * z_a / z_b
         direction = np.zeros(n)
-        direction[a], direction[b] = math.copysign(radii[0], rotation[a]), math.copysign(radii[1], rotation[a])
+        direction[a], direction[b] = (
+            math.copysign(radii[0], rotation[a]),
+            math.copysign(radii[1], rotation[a]),
+        )
         if lateral:  # lines of action lie at assumed angles
             angle = 0.7 * len(meshes)
             for node, sign in ((driver, 1.0), (driven, -1.0)):
-                direction[side_of[node] : side_of[node] + 2] = sign * math.cos(angle), sign * math.sin(angle)
+                direction[side_of[node] : side_of[node] + 2] = (
+                    sign * math.cos(angle),
+                    sign * math.sin(angle),
+                )
         meshes.append(
-            _mesh(f"{driver}-{driven}", direction, a, (z_a, z_b), value * 1e6 / (radii[0] * radii[1]), linear)
+            _mesh(
+                f"{driver}-{driven}",
+                direction,
+                a,
+                (z_a, z_b),
+                value * 1e6 / (radii[0] * radii[1]),
+                linear,
+            )
         )
     for node, _ in SHAFTS:  # camshafts and pump shafts turn with their gear
         if rotation[at_of[node + 1]] == 0.0:
             rotation[at_of[node + 1]] = rotation[at_of[node]]
     return GearedLine(
-        names=tuple(names), mass=mass, damping=damping, stiffness=stiffness, rotation=rotation, meshes=tuple(meshes)
+        names=tuple(names),
+        mass=mass,
+        damping=damping,
+        stiffness=stiffness,
+        rotation=rotation,
+        meshes=tuple(meshes),
     )
 
 
 def engine_torques(mean: float = 5e3, pulse: float = 30.0) -> list[ShaftTorque]:
     """Pulses on ten throws and on pump and valve cams, N m over two turns of the crank, against the dynamometer."""
     angle = np.linspace(0.0, 4.0 * math.pi, 720, endpoint=False)
-    gas = 6.0 * mean / 10.0 * np.exp(-0.5 * (((angle - 2.0 * math.pi) % (4.0 * math.pi) - 0.6) / 0.35) ** 2)
+    gas = (
+        6.0
+        * mean
+        / 10.0
+        * np.exp(-0.5 * (((angle - 2.0 * math.pi) % (4.0 * math.pi) - 0.6) / 0.35) ** 2)
+    )
     gas *= 0.1 * mean / gas.mean()
     torques = [
-        ShaftTorque(dof=3 + i, table=gas, period=4.0 * math.pi, phase=(7 * i % 10) * 0.4 * math.pi) for i in range(10)
+        ShaftTorque(dof=3 + i, table=gas, period=4.0 * math.pi, phase=(7 * i % 10) * 0.4 * math.pi)
+        for i in range(10)
     ]
-    cam = -pulse * np.clip(np.sin(np.linspace(0.0, 2.0 * math.pi, 360, endpoint=False)), 0.0, None) ** 2
+    cam = (
+        -pulse
+        * np.clip(np.sin(np.linspace(0.0, 2.0 * math.pi, 360, endpoint=False)), 0.0, None) ** 2
+    )
     for i, dof in enumerate([*range(19, 29), *range(30, 40), *range(43, 63)]):
         torques.append(ShaftTorque(dof=dof, table=cam, phase=0.3 * math.pi * i))
     return [*torques, ShaftTorque(dof=16, table=np.array([-mean + 40 * 0.5 * 0.25 * pulse]))]
 
 
-def _mesh(name: str, direction: Array, a: int, n_teeth: tuple[int, int], stiffness: float, linear: bool) -> LineMesh:
+def _mesh(
+    name: str, direction: Array, a: int, n_teeth: tuple[int, int], stiffness: float, linear: bool
+) -> LineMesh:
     u = np.arange(64) / 64
     ripple = sum(share * np.cos(2.0 * math.pi * (i + 1) * u + i) for i, share in enumerate(RIPPLE))
     return phase_mesh(

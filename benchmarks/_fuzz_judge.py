@@ -63,7 +63,9 @@ def judge(folder: Path, mutant: Mutant, whole: dict[str, Any]) -> tuple[str, boo
         faults.append("a message of more than one line")
     if mutant.refused and read:
         faults.append("read without complaint what must be refused")
-    if any((folder / name).exists() or (folder.parent / name).exists() for name in ("evil", "evil.wav")):
+    if any(
+        (folder / name).exists() or (folder.parent / name).exists() for name in ("evil", "evil.wav")
+    ):
         faults.append("wrote a file")
     noticed = bool(lines) or not checked
     if not noticed and not mutant.forged and _meaning(folder) != whole:
@@ -80,7 +82,10 @@ def _read_all(folder: Path) -> None:
         for index in range(data.n_records):
             for name in data.signal_names:
                 block = data.signals(index, name=name)
-                if block.dtype != np.float32 or block.shape != (len(data.channel_names), data.n_samples):
+                if block.dtype != np.float32 or block.shape != (
+                    len(data.channel_names),
+                    data.n_samples,
+                ):
                     raise TypeError(f"{name} has type {block.dtype} and shape {block.shape}")
         len(data.where(speed_rpm=(0, 1e4)))
         if len(data.plan_table) != data.n_records:

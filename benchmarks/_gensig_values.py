@@ -48,7 +48,16 @@ def positions(pair: GearPair) -> dict[str, float]:
     """Positions from A of the named points, m: A, E ends of the path, B, D of the single zone, C pitch point."""
     path, pitch = pair.path_of_contact, pair.base_pitch
     a, b, c, d, e = 0.0, path - pitch, pair.pitch_point, pitch, path
-    return {"A": a, "AB": (a + b) / 2, "B": b, "BD": (b + d) / 2, "C": c, "D": d, "DE": (d + e) / 2, "E": e}
+    return {
+        "A": a,
+        "AB": (a + b) / 2,
+        "B": b,
+        "BD": (b + d) / 2,
+        "C": c,
+        "D": d,
+        "DE": (d + e) / 2,
+        "E": e,
+    }
 
 
 def phases() -> list[tuple[str, float]]:
@@ -74,7 +83,10 @@ def job(system: SpurPair) -> dict[str, Any]:
         "poisson_ratio": material.poisson_ratio,
         "density": material.density_kg_per_m3,
         "points": [contact(position, point) for point, position in positions(pair).items()],
-        "phases": [{"point": point, "share_of_pitch": share, "contacts": contacts(share)} for point, share in phases()],
+        "phases": [
+            {"point": point, "share_of_pitch": share, "contacts": contacts(share)}
+            for point, share in phases()
+        ],
     }
 
 
@@ -93,7 +105,10 @@ def _gear_job(gear: Gear) -> dict[str, Any]:
 def gensig_values(system: SpurPair) -> Values:
     """gensig's value of everything that ROSS computes, under the system's conventions."""
     pair, options = system.pair, system.mesh
-    points, shares = list(positions(pair)), np.array(list(positions(pair).values())) / pair.base_pitch
+    points, shares = (
+        list(positions(pair)),
+        np.array(list(positions(pair).values())) / pair.base_pitch,
+    )
     curves = system.stiffness_curves(n_positions=N_POSITIONS, points_per_tooth=N_PHASES)
 
     def at_points(curve: Array) -> Array:
@@ -102,16 +117,24 @@ def gensig_values(system: SpurPair) -> Values:
     values: Values = {("contact_ratio", ""): pair.transverse_contact_ratio}
     for gear in (pair.pinion, pair.wheel):
         for term in TERMS:
-            values |= _by_point(f"{gear.name}_{term}_compliance", points, at_points(curves.compliance[gear.name][term]))
+            values |= _by_point(
+                f"{gear.name}_{term}_compliance",
+                points,
+                at_points(curves.compliance[gear.name][term]),
+            )
         values |= {(f"{gear.name}_{angle}", ""): gear.root_half_angle for angle in ROOT_ANGLES}
         if options.body == "sainsot":
             values |= _coefficient_values(gear, gear.root_half_angle)
-    contact = at_points(curves.compliance["pinion"]["contact"] + curves.compliance["wheel"]["contact"])
+    contact = at_points(
+        curves.compliance["pinion"]["contact"] + curves.compliance["wheel"]["contact"]
+    )
     values |= _by_point("contact_compliance", points, contact)
     values["contact_compliance", ""] = float(contact[points.index("C")])
     names = [point for point, _ in phases()]
     for path in ("", "_own_path"):
-        values |= _by_point(f"pair_stiffness{path}", points, at_points(curves.single_pair_stiffness))
+        values |= _by_point(
+            f"pair_stiffness{path}", points, at_points(curves.single_pair_stiffness)
+        )
         values |= _by_point(f"mesh_stiffness{path}", names, curves.mesh_stiffness[:N_PHASES])
     return values
 
@@ -125,28 +148,38 @@ def ross_choices(system: SpurPair) -> Values:
     values: Values = {}
     for gear, curvature in sides(pair, position):
         parts = tooth_compliance(healthy_tooth(gear), curvature, material)
-        body = foundation(gear, curvature, system, half_angle=ross_half_angle(gear), height=contact_height)
+        body = foundation(
+            gear, curvature, system, half_angle=ross_half_angle(gear), height=contact_height
+        )
         for term in TERMS:
             found = body if term == "foundation" else getattr(parts, term)
             values |= _by_point(f"{gear.name}_{term}_compliance", points, found)
         values[f"{gear.name}_root_half_angle", ""] = ross_half_angle(gear)
         values |= _coefficient_values(gear, ross_half_angle(gear))
     true, own = sides(pair, position), ross_path(pair, shares)
-    values |= _by_point("pair_stiffness", points, ross_pair_stiffness(system, *(radii for _, radii in true)))
+    values |= _by_point(
+        "pair_stiffness", points, ross_pair_stiffness(system, *(radii for _, radii in true))
+    )
     values |= _by_point("pair_stiffness_own_path", points, ross_pair_stiffness(system, *own))
     for point, share in phases():
         inside = np.array([s for s in (share, share + 1.0) if s <= pair.transverse_contact_ratio])
         radii = [curvature for _, curvature in sides(pair, inside * pair.base_pitch)]
         own_radii = ross_path(pair, inside / pair.transverse_contact_ratio)
         values["mesh_stiffness", point] = float(ross_pair_stiffness(system, *radii).sum())
-        values["mesh_stiffness_own_path", point] = float(ross_pair_stiffness(system, *own_radii).sum())
+        values["mesh_stiffness_own_path", point] = float(
+            ross_pair_stiffness(system, *own_radii).sum()
+        )
     return values
 
 
-def foundation(gear: Gear, curvature: Array, system: SpurPair, *, half_angle: float, height: Height) -> Array:
+def foundation(
+    gear: Gear, curvature: Array, system: SpurPair, *, half_angle: float, height: Height
+) -> Array:
     """gensig's body term of the paper with the two choices that differ between the programs put in, (phase,) m/N."""
     angle = load_angle(gear, curvature)
-    reach = (gear.root_radius + height(gear, curvature)) * np.cos(angle)  # the function takes u_f = reach/cos - r_f
+    reach = (gear.root_radius + height(gear, curvature)) * np.cos(
+        angle
+    )  # the function takes u_f = reach/cos - r_f
     stand_in = _stand_in(gear, root_half_angle=half_angle, base_radius=reach)
     return fillet_foundation_compliance(stand_in, angle, system.material, allow_extrapolation=True)
 
@@ -163,12 +196,17 @@ def contact_height(gear: Gear, curvature: Array) -> Array:
 
 def ross_half_angle(gear: Gear) -> float:
     """ROSS's theta_f: b1 / r without the clearance c* in b1."""
-    return gear.root_half_angle - 2.0 * gear.clearance_coefficient * math.tan(gear.pressure_angle) / gear.n_teeth
+    return (
+        gear.root_half_angle
+        - 2.0 * gear.clearance_coefficient * math.tan(gear.pressure_angle) / gear.n_teeth
+    )
 
 
 def ross_rounding(pair: GearPair) -> GearPair:
     """The pair with ROSS's cutter tip, r_rho = c* m / (1 - sin(alpha))."""
-    return replace(pair, pinion=_with_ross_rounding(pair.pinion), wheel=_with_ross_rounding(pair.wheel))
+    return replace(
+        pair, pinion=_with_ross_rounding(pair.pinion), wheel=_with_ross_rounding(pair.wheel)
+    )
 
 
 def ross_path(pair: GearPair, share: Array) -> tuple[Array, Array]:
@@ -181,19 +219,25 @@ def ross_path(pair: GearPair, share: Array) -> tuple[Array, Array]:
     start = math.atan(pinion.junction_curvature_radius / pinion.base_radius)
     advance = share * (math.acos(pinion.base_radius / pinion.tip_radius) - start)
     tip = math.acos(wheel.base_radius / wheel.tip_radius)
-    return pinion.base_radius * np.tan(start + advance), wheel.base_radius * np.tan(tip - advance / pair.ratio)
+    return pinion.base_radius * np.tan(start + advance), wheel.base_radius * np.tan(
+        tip - advance / pair.ratio
+    )
 
 
 def ross_pair_stiffness(system: SpurPair, pinion: Array, wheel: Array) -> Array:
     """Single-pair stiffness from gensig's terms with ROSS's body choices, (phase,) N/m."""
     material = system.material
     contact = (
-        4.0 * (1.0 - material.poisson_ratio**2) / (math.pi * material.youngs_modulus * system.pair.pinion.face_width)
+        4.0
+        * (1.0 - material.poisson_ratio**2)
+        / (math.pi * material.youngs_modulus * system.pair.pinion.face_width)
     )
     total = np.full_like(pinion, contact)
     for gear, curvature in ((system.pair.pinion, pinion), (system.pair.wheel, wheel)):
         total = total + tooth_compliance(healthy_tooth(gear), curvature, material).total
-        total = total + foundation(gear, curvature, system, half_angle=ross_half_angle(gear), height=contact_height)
+        total = total + foundation(
+            gear, curvature, system, half_angle=ross_half_angle(gear), height=contact_height
+        )
     return 1.0 / total
 
 

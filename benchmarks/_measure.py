@@ -22,7 +22,12 @@ def machine() -> dict[str, Any]:
     """Processor, cores, how busy they are already, and the versions of what runs."""
     usable = len(os.sched_getaffinity(0)) if hasattr(os, "sched_getaffinity") else os.cpu_count()
     load = round(os.getloadavg()[0], 2) if hasattr(os, "getloadavg") else None
-    return {**environment(), "cpu_target": get_host_cpu_name(), "cores": usable, "load_at_start": load}
+    return {
+        **environment(),
+        "cpu_target": get_host_cpu_name(),
+        "cores": usable,
+        "load_at_start": load,
+    }
 
 
 def print_machine(found: Mapping[str, Any]) -> None:
@@ -30,7 +35,12 @@ def print_machine(found: Mapping[str, Any]) -> None:
     print(
         f"{found['cpu_model']} ({found['cpu_target']}), {found['cores']} cores, load {found['load_at_start']} at start"
     )
-    print(", ".join(f"{name} {found[name]}" for name in ("python", "numpy", "numba", "scipy", "h5py", "gensig")))
+    print(
+        ", ".join(
+            f"{name} {found[name]}"
+            for name in ("python", "numpy", "numba", "scipy", "h5py", "gensig")
+        )
+    )
     if (found["load_at_start"] or 0.0) > 0.5:
         print("This machine is busy with something else: all rates are too low, ratios are rough.")
 
@@ -62,7 +72,9 @@ def in_turn(works: Mapping[str, Callable[[], Any]], runs: int) -> dict[str, floa
     return found
 
 
-def print_figures(section: str, values: Mapping[str, float], *columns: Callable[[float], str]) -> None:
+def print_figures(
+    section: str, values: Mapping[str, float], *columns: Callable[[float], str]
+) -> None:
     """One section of a table; further columns are functions of the value."""
     print(f"\n{section}")
     for name, value in values.items():
@@ -73,4 +85,6 @@ def print_figures(section: str, values: Mapping[str, float], *columns: Callable[
 def write_json(path: str | None, named: Mapping[str, Any], figures: Figures) -> None:
     """The machine and the figures, to compare runs by; no file without a path."""
     if path:
-        Path(path).write_text(json.dumps({"machine": named, **figures}, indent=1) + "\n", encoding="utf-8")
+        Path(path).write_text(
+            json.dumps({"machine": named, **figures}, indent=1) + "\n", encoding="utf-8"
+        )

@@ -41,7 +41,11 @@ def mesh_numbers(dynamics: PairDynamics) -> MeshNumbers:
     table, pair, options = dynamics.table, dynamics.table.pair, dynamics.table.options
     if options.law != "one_sided":
         raise ValueError(f"mesh.law={options.law}; only one_sided is written out here")
-    viscous = 2.0 * options.damping_ratio * math.sqrt(dynamics.mean_mesh_stiffness * dynamics.equivalent_mass)
+    viscous = (
+        2.0
+        * options.damping_ratio
+        * math.sqrt(dynamics.mean_mesh_stiffness * dynamics.equivalent_mass)
+    )
     return MeshNumbers(
         pinion_radius=pair.pinion.base_radius,
         wheel_radius=pair.wheel.base_radius,

@@ -33,7 +33,16 @@ class Mutant:
 def mutate(folder: Path, seed: int) -> Mutant:
     """Change one thing in a folder, which becomes the mutant of this seed."""
     rng = np.random.default_rng(seed)
-    family = ("bytes", "bytes", "forged bytes", "structure", "structure", "manifest", "manifest", "text")[seed % 8]
+    family = (
+        "bytes",
+        "bytes",
+        "forged bytes",
+        "structure",
+        "structure",
+        "manifest",
+        "manifest",
+        "text",
+    )[seed % 8]
     if family == "bytes":
         return _damage(folder, _file(folder, rng), rng)
     if family == "forged bytes":
@@ -68,7 +77,9 @@ def forge_checksums(folder: Path) -> None:
     """Make `SHA256SUMS` fit the files again, whatever they are."""
     path = folder / "SHA256SUMS"
     names = [line.partition("  ")[2] for line in path.read_text(encoding="utf-8").splitlines()]
-    path.write_text("".join(f"{sha256_file(folder / name)}  {name}\n" for name in names), encoding="utf-8")
+    path.write_text(
+        "".join(f"{sha256_file(folder / name)}  {name}\n" for name in names), encoding="utf-8"
+    )
 
 
 def _file(folder: Path, rng: np.random.Generator) -> Path:
@@ -92,7 +103,22 @@ def _damage(folder: Path, path: Path, rng: np.random.Generator) -> Mutant:
     size = len(content)
     at = int(rng.integers(min(size, 8192) if rng.random() < 0.5 else size))
     length = int(min(rng.integers(1, 200), size - at))
-    kind = str(rng.choice(["flip", "flip", "flip", "noise", "zeros", "ones", "cut", "extended", "doubled", "swapped"]))
+    kind = str(
+        rng.choice(
+            [
+                "flip",
+                "flip",
+                "flip",
+                "noise",
+                "zeros",
+                "ones",
+                "cut",
+                "extended",
+                "doubled",
+                "swapped",
+            ]
+        )
+    )
     if kind == "flip":
         for place in {at, *rng.integers(0, size, int(rng.integers(0, 4))).tolist()}:
             content[place] ^= 1 << int(rng.integers(8))
@@ -108,7 +134,10 @@ def _damage(folder: Path, path: Path, rng: np.random.Generator) -> Mutant:
         content[at:at] = content[at : at + length]
     else:
         to = int(rng.integers(0, max(1, size - length)))
-        content[at : at + length], content[to : to + length] = content[to : to + length], content[at : at + length]
+        content[at : at + length], content[to : to + length] = (
+            content[to : to + length],
+            content[at : at + length],
+        )
     if bytes(content) == before:  # noise can repeat what was there
         content[at] ^= 1
         kind = "flip"
@@ -153,7 +182,9 @@ def _external_storage(file: h5py.File, folder: Path) -> None:
     _outside(file, folder)
     shape = file["acceleration"].shape
     del file["acceleration"]
-    file.create_dataset("acceleration", shape, "f4", external=[("../../outside.bin", 0, h5py.h5f.UNLIMITED)])
+    file.create_dataset(
+        "acceleration", shape, "f4", external=[("../../outside.bin", 0, h5py.h5f.UNLIMITED)]
+    )
 
 
 def _unwritten(file: h5py.File, name: str) -> None:
@@ -204,7 +235,9 @@ def _more(name: str, **options: Any) -> Shard:
 
 
 STRUCTURES: dict[str, Shard] = {
-    "soft link": _replaced("label", lambda file, name: file.__setitem__(name, h5py.SoftLink("/fault_tooth"))),
+    "soft link": _replaced(
+        "label", lambda file, name: file.__setitem__(name, h5py.SoftLink("/fault_tooth"))
+    ),
     "soft link one level down": _link_names,
     "dangling soft link": lambda file, _folder: file.__setitem__("more", h5py.SoftLink("/nowhere")),
     "external link": _external_link,
@@ -212,7 +245,9 @@ STRUCTURES: dict[str, Shard] = {
     "external storage": _external_storage,
     "group loop": _loop,
     "object type": _typed("torque_nm", h5py.vlen_dtype(np.float64)),
-    "text of any length": _replaced("label_name", lambda f, n: f.create_dataset(n, (_rows(f),), h5py.string_dtype())),
+    "text of any length": _replaced(
+        "label_name", lambda f, n: f.create_dataset(n, (_rows(f),), h5py.string_dtype())
+    ),
     "compound type": _typed("severity", np.dtype([("a", "f8"), ("b", "i4")])),
     "opaque type": _typed("severity", np.dtype("V8")),
     "references": _typed("severity", h5py.ref_dtype),
@@ -220,18 +255,31 @@ STRUCTURES: dict[str, Shard] = {
     "complex": _typed("severity", np.dtype("c16")),
     "unknown column of objects": _more("more", shape=(1,), dtype=h5py.string_dtype()),
     "scalar": _replaced("label", lambda file, name: file.create_dataset(name, data=1)),
-    "empty": _replaced("label", lambda file, name: file.create_dataset(name, data=h5py.Empty("i2"))),
+    "empty": _replaced(
+        "label", lambda file, name: file.create_dataset(name, data=h5py.Empty("i2"))
+    ),
     "no rows": _replaced("record_id", lambda file, name: file.create_dataset(name, (0,), "S32")),
-    "other rows": _replaced("label", lambda file, name: file.create_dataset(name, (_rows(file) + 1,), "i2")),
-    "text for numbers": _replaced("label", lambda file, name: file.create_dataset(name, (_rows(file),), "S4")),
-    "numbers for text": _replaced("status", lambda file, name: file.create_dataset(name, (_rows(file),), "i4")),
+    "other rows": _replaced(
+        "label", lambda file, name: file.create_dataset(name, (_rows(file) + 1,), "i2")
+    ),
+    "text for numbers": _replaced(
+        "label", lambda file, name: file.create_dataset(name, (_rows(file),), "S4")
+    ),
+    "numbers for text": _replaced(
+        "status", lambda file, name: file.create_dataset(name, (_rows(file),), "i4")
+    ),
     "never written": _replaced("acceleration", _unwritten),
     "gzip bomb": _replaced("acceleration", _gzip_bomb),
     "chunk bomb": _replaced("acceleration", _chunk_bomb),
-    "bomb in a label": _replaced("label", lambda f, n: f.create_dataset(n, (10**12,), "i2", chunks=(1000,))),
-    "bomb in width": _replaced("label_name", lambda f, n: f.create_dataset(n, (_rows(f),), "S2000000", chunks=(1,))),
+    "bomb in a label": _replaced(
+        "label", lambda f, n: f.create_dataset(n, (10**12,), "i2", chunks=(1000,))
+    ),
+    "bomb in width": _replaced(
+        "label_name", lambda f, n: f.create_dataset(n, (_rows(f),), "S2000000", chunks=(1,))
+    ),
     "unknown filter": _replaced(
-        "label", lambda f, n: f.create_dataset(n, data=np.zeros(_rows(f), "i2"), chunks=(1,), scaleoffset=2)
+        "label",
+        lambda f, n: f.create_dataset(n, data=np.zeros(_rows(f), "i2"), chunks=(1,), scaleoffset=2),
     ),
     "another version": _attribute("schema_version", 99),
     "version as text": _attribute("schema_version", "1"),
@@ -252,13 +300,23 @@ def _manifest(folder: Path, number: int, rng: np.random.Generator) -> Mutant:
         "traversal in a shard's name": lambda: content["shards"][0].update(name="../../outside.h5"),
         "absolute shard name": lambda: content["shards"][0].update(name="/etc/passwd"),
         "device as shard": lambda: content["shards"][1].update(name="/dev/zero"),
-        "traversal in a file's name": lambda: content["files"].update({"../../outside.bin": "0" * 64}),
-        "traversal in a split's name": lambda: content["files"].update({"splits/../plan.csv": "0" * 64}),
+        "traversal in a file's name": lambda: content["files"].update(
+            {"../../outside.bin": "0" * 64}
+        ),
+        "traversal in a split's name": lambda: content["files"].update(
+            {"splits/../plan.csv": "0" * 64}
+        ),
         "shards swapped": lambda: content["shards"].reverse(),
         "shard twice": lambda: content["shards"].append(content["shards"][0]),
         "shard gone": lambda: content["shards"].pop(),
-        "a billion records": lambda: (content.update(n_records=10**9), content["shards"][0].update(rows=10**9)),
-        "rows moved": lambda: (content["shards"][0].update(rows=1), content["shards"][1].update(rows=3)),
+        "a billion records": lambda: (
+            content.update(n_records=10**9),
+            content["shards"][0].update(rows=10**9),
+        ),
+        "rows moved": lambda: (
+            content["shards"][0].update(rows=1),
+            content["shards"][1].update(rows=3),
+        ),
         "negative rows": lambda: content["shards"][0].update(rows=-1),
         "huge number": lambda: content.update(n_records=10**400),
         "another seed": lambda: content.update(seed=content["seed"] + 1),
@@ -283,10 +341,16 @@ def _manifest(folder: Path, number: int, rng: np.random.Generator) -> Mutant:
         damaged = _damage(folder, path, rng)
         return Mutant(kind=f"manifest {damaged.kind}")
     else:
-        place = content if rng.random() < 0.5 else content["shards"][int(rng.integers(len(content["shards"])))]
+        place = (
+            content
+            if rng.random() < 0.5
+            else content["shards"][int(rng.integers(len(content["shards"])))]
+        )
         key = str(rng.choice([key for key in place if key != "environment"]))
         values = [None, True, [], {}, "x", -1, 1.5, 10**30, [[[[]]]], "\x00", "\ud800"]
-        place.pop(key) if name == "gone" else place.update({key: values[int(rng.integers(len(values)))]})
+        place.pop(key) if name == "gone" else place.update(
+            {key: values[int(rng.integers(len(values)))]}
+        )
         path.write_text(json.dumps(content), encoding="utf-8")
         name = f"{key} {name}"
     forge_checksums(folder)
@@ -295,7 +359,9 @@ def _manifest(folder: Path, number: int, rng: np.random.Generator) -> Mutant:
 
 def _text(folder: Path, rng: np.random.Generator) -> Mutant:
     """Plan, configuration or split changed, with a manifest that agrees."""
-    name = str(rng.choice(["plan.csv", "config.yaml", "overrides.yaml", "splits/random_window_leaky.csv"]))
+    name = str(
+        rng.choice(["plan.csv", "config.yaml", "overrides.yaml", "splits/random_window_leaky.csv"])
+    )
     path = folder / name
     text = path.read_text(encoding="utf-8")
     first = text.splitlines()[1].split(",")[0] if name.endswith("csv") else ""

@@ -65,7 +65,10 @@ def kernel(lanes: list[PairDynamics], oversampling: int, precision: str = "float
         settled.begin(group, lane, dynamics.static_start(0.0))
     settled.advance(group, step, 0, n_settling)
     n_calls = round(TIMED / step / PER_CALL)
-    means, nothing = np.empty(PER_CALL * len(CHANNELS) * settled.n_lanes, dtype=precision), np.empty(0)
+    means, nothing = (
+        np.empty(PER_CALL * len(CHANNELS) * settled.n_lanes, dtype=precision),
+        np.empty(0),
+    )
 
     def work() -> None:
         run = settled.again()
@@ -88,7 +91,9 @@ def scalar_run(dynamics: PairDynamics, oversampling: int, seconds: float) -> tup
     machine = _scalar.machine(dynamics)
     lowest = _scalar.integrate(machine, state, step, 0, len(means), CHANNELS, means)
     if lowest < -machine.mesh.backlash:
-        raise ValueError(f"the approach fell to {lowest:.3g} m, to the back flanks, which the scalar code has not")
+        raise ValueError(
+            f"the approach fell to {lowest:.3g} m, to the back flanks, which the scalar code has not"
+        )
     return state, means
 
 
@@ -125,7 +130,9 @@ def check_same_law(all_of: list[PairDynamics]) -> float:
     """The difference at a step fine enough for either, refused where it is none of the step's."""
     found = difference(all_of, SAME_OVERSAMPLING)
     if not found < SAME:
-        raise AssertionError(f"scalar code and compiled core differ by {found:.2g} at x{SAME_OVERSAMPLING}: two laws")
+        raise AssertionError(
+            f"scalar code and compiled core differ by {found:.2g} at x{SAME_OVERSAMPLING}: two laws"
+        )
     return found
 
 
@@ -136,7 +143,10 @@ def scipy_works(dynamics: PairDynamics) -> dict[str, Work]:
     product's own compiled law, as one would write it without.
     """
     settled = scalar_run(dynamics, SAME_OVERSAMPLING, SETTLING)[0].ravel()
-    compiled, plain = _scalar.right_hand_side(_scalar.machine(dynamics)), _numpy_right_hand_side(dynamics)
+    compiled, plain = (
+        _scalar.right_hand_side(_scalar.machine(dynamics)),
+        _numpy_right_hand_side(dynamics),
+    )
     if not np.allclose(compiled(SETTLING, settled), plain(SETTLING, settled), rtol=1e-6, atol=1e-6):
         raise AssertionError("the right-hand sides given to solve_ivp differ: two laws")
 
@@ -145,12 +155,18 @@ def scipy_works(dynamics: PairDynamics) -> dict[str, Work]:
         given = {"method": method, "rtol": SCIPY_RTOL, "atol": SCIPY_ATOL}
         return lambda: solve_ivp(slope, span, settled, **given), SCIPY_SECONDS
 
-    found = {f"solve_ivp {method}, right-hand side compiled": solve(compiled, method) for method in SCIPY}
+    found = {
+        f"solve_ivp {method}, right-hand side compiled": solve(compiled, method) for method in SCIPY
+    }
     return {**found, "solve_ivp RK45, NumPy around the compiled law": solve(plain, "RK45")}
 
 
 def _numpy_right_hand_side(dynamics: PairDynamics) -> RightHandSide:
-    group, system, direction = pack([dynamics], 1e-6), dynamics.system(), dynamics.approach_direction()
+    group, system, direction = (
+        pack([dynamics], 1e-6),
+        dynamics.system(),
+        dynamics.approach_direction(),
+    )
     n_dof, scratch = len(system.mass), _kernels.scratch(len(system.mass), 0)
     motion, found = np.empty((4, LANES)), np.empty((N_LAW, LANES))
     radius, speed = dynamics.table.pair.pinion.base_radius, dynamics.operating.speed

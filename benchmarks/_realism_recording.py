@@ -28,7 +28,16 @@ from gensig.signals.averaging import resample_to_angle, samples_per_turn_for
 from gensig.signals.indicators import crest_factor, fm4, kurtosis, rms, sideband_ratio
 from gensig.signals.rotation import find_mesh_frequency, mesh_phase_angle, resample_by_angle
 from gensig.signals.synchronous import mesh_harmonics
-from gensig.validation.realism import NOT_TOLD, NOTHING, RECORDING, TOLD, WITHOUT, Comparison, judge, points
+from gensig.validation.realism import (
+    NOT_TOLD,
+    NOTHING,
+    RECORDING,
+    TOLD,
+    WITHOUT,
+    Comparison,
+    judge,
+    points,
+)
 
 FloatArray = NDArray[np.floating]
 
@@ -60,7 +69,9 @@ def find_recording() -> FloatArray | None:
         return None
     with np.load(files[0], allow_pickle=False) as held:
         if "acceleration" not in held or held["acceleration"].ndim != 2:
-            raise DatasetError(f"{files[0].name} holds no array 'acceleration' of (channel, sample)")
+            raise DatasetError(
+                f"{files[0].name} holds no array 'acceleration' of (channel, sample)"
+            )
         return held["acceleration"].astype(float)
 
 
@@ -109,7 +120,9 @@ def _turns(x: FloatArray, sampling_rate: float, n_teeth: int, mesh_frequency: fl
     shares = mesh_harmonics(candidates[0].mean(axis=-2), n_teeth, 3) / rms(x)[:, None]
     for harmonic, channel in enumerate(np.argmax(shares, axis=0), start=1):
         try:
-            angle = mesh_phase_angle(x[channel], sampling_rate, n_teeth, mesh_frequency, harmonic=harmonic)
+            angle = mesh_phase_angle(
+                x[channel], sampling_rate, n_teeth, mesh_frequency, harmonic=harmonic
+            )
         except ValueError:
             continue
         candidates.append(resample_by_angle(x, angle, per_turn))
@@ -119,7 +132,9 @@ def _turns(x: FloatArray, sampling_rate: float, n_teeth: int, mesh_frequency: fl
 def _mesh_power(turns: FloatArray, n_teeth: int) -> float:
     """Power of the first mesh harmonics in the average turn over that of the turns, mean over the channels."""
     harmonics = mesh_harmonics(turns.mean(axis=-2), n_teeth, 3)
-    return float(np.mean(np.sum(np.square(harmonics), axis=-1) / np.mean(np.square(turns), axis=(-2, -1))))
+    return float(
+        np.mean(np.sum(np.square(harmonics), axis=-1) / np.mean(np.square(turns), axis=(-2, -1)))
+    )
 
 
 def _decibel(ratio: FloatArray) -> FloatArray:
@@ -140,10 +155,14 @@ def simulated_indicators(data: Dataset) -> dict[str, FloatArray]:
     return {name: np.array([row[name] for row in rows]) for name in INDICATORS}
 
 
-def recording_indicators(recording: FloatArray, duration: float = RECORDING_DURATION) -> dict[str, FloatArray]:
+def recording_indicators(
+    recording: FloatArray, duration: float = RECORDING_DURATION
+) -> dict[str, FloatArray]:
     """(channel,) indicators of the recording, of its first part where less is simulated."""
     length = min(recording.shape[-1], round(duration * RECORDING_RATE))
-    return indicators(recording[:, :length], RECORDING_RATE, RECORDING_TEETH[0], RECORDING_SPEED / 60.0)
+    return indicators(
+        recording[:, :length], RECORDING_RATE, RECORDING_TEETH[0], RECORDING_SPEED / 60.0
+    )
 
 
 def recording_comparisons(
@@ -169,7 +188,15 @@ def recording_comparisons(
             width = (right[2] - right[1]) / (channels[1] - channels[0])
             verdict = judge(None, MOST_WIDTH, width, width)
             found.append(
-                _row({**row, "unit": ""}, "width", (None, MOST_WIDTH), "asked", (width,) * 3, verdict, right[3])
+                _row(
+                    {**row, "unit": ""},
+                    "width",
+                    (None, MOST_WIDTH),
+                    "asked",
+                    (width,) * 3,
+                    verdict,
+                    right[3],
+                )
             )
         for control in CONTROLS[1:]:
             wrong = points(simulated[control][name])

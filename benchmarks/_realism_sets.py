@@ -28,7 +28,12 @@ CLASSES = ("healthy", "crack", "missing_tooth", "distributed_pitting")
 CRACK_SHARES = (0.25, 0.5)  # of the root chord, as asked
 
 # The recording: teeth and speed from its description; sampling rate and length as recorded.
-RECORDING_TEETH, RECORDING_SPEED, RECORDING_RATE, RECORDING_DURATION = (23, 46), 2000.0, 25600.0, 2.56
+RECORDING_TEETH, RECORDING_SPEED, RECORDING_RATE, RECORDING_DURATION = (
+    (23, 46),
+    2000.0,
+    25600.0,
+    2.56,
+)
 WRONG_TEETH = (27, 42)  # the same sum, so the same center distance
 ERROR_FACTOR = 3.0
 GRADE_STEPS = 2.0 * math.log2(ERROR_FACTOR)  # ISO 1328-1: a grade is a factor of sqrt(2)
@@ -66,7 +71,10 @@ def yardstick_words(base: Sequence[str], size: Size) -> list[str]:
     speeds = [round(share * gear["rated_speed_rpm"], 6) for share in size.speeds]
     torques = [round(share * gear["rated_torque_nm"], 6) for share in size.torques]
     vary = {key: _drawn(spec) for key, spec in config["plan"]["vary"].items()}
-    vary |= {key: {"distribution": "choice", "values": levels} for key, levels in ((SPEED, speeds), (TORQUE, torques))}
+    vary |= {
+        key: {"distribution": "choice", "values": levels}
+        for key, levels in ((SPEED, speeds), (TORQUE, torques))
+    }
     chord = root_chord(base)
     low, high = (round(share * chord * 1e3, 4) for share in CRACK_SHARES)
     cracks = {"crack_depth_mm": {"distribution": "uniform", "low": low, "high": high}}
@@ -114,7 +122,9 @@ def middle_grade(config: Configuration) -> float:
         return 0.5 * (float(spec["low"]) + float(spec["high"]))
     grade = config["quality"]["iso1328_grade"]
     if grade is None:
-        raise ConfigError(f"{GRADE} = null: perfect gears have no errors to be wrong about; choose another base")
+        raise ConfigError(
+            f"{GRADE} = null: perfect gears have no errors to be wrong about; choose another base"
+        )
     return float(grade)
 
 
@@ -143,7 +153,9 @@ def kept(folder: Path, words: Sequence[str]) -> Dataset:
     if (folder / OVERRIDES).is_file():
         written = yaml.safe_load((folder / OVERRIDES).read_text(encoding="utf-8"))
         if written != list(words):
-            raise ConfigError(f"{folder} holds a data set of other overrides; remove it, or choose another --data")
+            raise ConfigError(
+                f"{folder} holds a data set of other overrides; remove it, or choose another --data"
+            )
         return gensig.open_dataset(folder)
     return gensig.generate(*words, out=folder)
 
@@ -151,14 +163,18 @@ def kept(folder: Path, words: Sequence[str]) -> Dataset:
 def _steady_length(config: Configuration, duration: float) -> list[str]:
     """A length in seconds, whatever the base says about turns."""
     words = [f"operating.duration_s={duration:.6g}"]
-    return [*words, "operating.turns=null"] if config["operating"].get("turns") is not None else words
+    return (
+        [*words, "operating.turns=null"] if config["operating"].get("turns") is not None else words
+    )
 
 
 def _drawn(spec: Any) -> dict[str, Any]:
     """A distribution that a grid draws from instead of crossing it."""
     plain = copy.deepcopy(dict(spec))
     if plain.get("distribution") == "choice":
-        raise ConfigError("a base whose plan.vary has distribution: choice would be crossed; pin that key in --base")
+        raise ConfigError(
+            "a base whose plan.vary has distribution: choice would be crossed; pin that key in --base"
+        )
     return {**plain, "levels": None}
 
 

@@ -50,11 +50,17 @@ def to_rate(signal: ArrayLike, sampling_rate: float, rate: float) -> FloatArray:
 
     x = np.asarray(signal, dtype=float)
     ratio = Fraction(rate / sampling_rate).limit_denominator(4096)
-    return resample_poly(x - x.mean(axis=-1, keepdims=True), ratio.numerator, ratio.denominator, axis=-1)
+    return resample_poly(
+        x - x.mean(axis=-1, keepdims=True), ratio.numerator, ratio.denominator, axis=-1
+    )
 
 
 def record_values(
-    acceleration: ArrayLike, angle: ArrayLike, sampling_rate: float, rotation_frequency: float, n_teeth: int
+    acceleration: ArrayLike,
+    angle: ArrayLike,
+    sampling_rate: float,
+    rotation_frequency: float,
+    n_teeth: int,
 ) -> dict[str, FloatArray]:
     """Indicators of one record.
 
@@ -69,7 +75,9 @@ def record_values(
     full = np.asarray(acceleration, dtype=float)
     full = full - full.mean(axis=-1, keepdims=True)
     x = to_rate(full, sampling_rate, RATE)
-    turned = np.interp(np.arange(x.shape[-1]) / RATE, np.arange(full.shape[-1]) / sampling_rate, angle)
+    turned = np.interp(
+        np.arange(x.shape[-1]) / RATE, np.arange(full.shape[-1]) / sampling_rate, angle
+    )
     turns = resample_by_angle(x, turned, samples_per_turn_for(RATE, rotation_frequency))
     average, residual = turns.mean(axis=-2), residual_turns(turns, n_teeth)
     return {
@@ -90,7 +98,15 @@ def record_values(
 def read_table(data: Dataset) -> Table:
     """Indicators of all records that did not fail; the faulted gear is that of the record's fault, else the pinion."""
     usable = np.flatnonzero(data.usable)
-    names = ("label_name", "unit_id", "gearbox_id", "specimen_id", "condition_id", "speed_set_rpm", "torque_nm")
+    names = (
+        "label_name",
+        "unit_id",
+        "gearbox_id",
+        "specimen_id",
+        "condition_id",
+        "speed_set_rpm",
+        "torque_nm",
+    )
     columns = {name: np.asarray(data.column(name))[usable] for name in names}
     rows = [_values_at(data, index) for index in usable.tolist()]
     indicators = {name: np.array([row[name] for row in rows]) for name in rows[0]}
@@ -100,7 +116,9 @@ def read_table(data: Dataset) -> Table:
 def _values_at(data: Dataset, index: int) -> dict[str, FloatArray]:
     teeth = {gear: int(data.attributes[f"n_teeth_{gear}"]) for gear in ("pinion", "wheel")}
     gear = str(data.column("fault_gear")[index]) or "pinion"
-    slower = teeth["pinion"] / teeth[gear]  # turns of the faulted gear for one of the driving pinion
+    slower = (
+        teeth["pinion"] / teeth[gear]
+    )  # turns of the faulted gear for one of the driving pinion
     angle = slower * np.asarray(data.trace(index, "shaft_angle"))
     rotation = slower * float(data.column("speed_rpm")[index]) / 60.0
     return record_values(data.signals(index), angle, data.sampling_rate, rotation, teeth[gear])
@@ -121,7 +139,11 @@ def _quantities(table: Table) -> Iterator[tuple[str, str, FloatArray]]:
     for name in ("kurtosis", "kurtosis_full_band", "nonsynchronous_share"):
         yield f"healthy.{name}", ALL, values[name][healthy]
     for one, other in _pairs(columns, healthy, healthy, another=True):
-        yield "healthy.mesh_amplitude_ratio", ALL, values["mesh"][one, :, 0] / values["mesh"][other, :, 0]
+        yield (
+            "healthy.mesh_amplitude_ratio",
+            ALL,
+            values["mesh"][one, :, 0] / values["mesh"][other, :, 0],
+        )
     for unit in np.unique(columns["unit_id"][healthy]):
         mine = healthy[columns["unit_id"][healthy] == unit]
         yield "healthy.harmonic_decades", ALL, harmonic_decades(values["mesh"][mine])
@@ -176,7 +198,11 @@ def _slow_and_light(columns: Mapping[str, NDArray[Any]]) -> NDArray[np.bool_]:
 
 
 def _pairs(
-    columns: Mapping[str, NDArray[Any]], faulty: NDArray[np.intp], healthy: NDArray[np.intp], *, another: bool
+    columns: Mapping[str, NDArray[Any]],
+    faulty: NDArray[np.intp],
+    healthy: NDArray[np.intp],
+    *,
+    another: bool,
 ) -> Iterator[tuple[int, int]]:
     """Faulty and healthy records of one gearbox at one set-point, of another specimen or of the same."""
     groups: dict[tuple[Any, ...], list[int]] = {}

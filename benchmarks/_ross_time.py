@@ -25,7 +25,12 @@ def job() -> dict[str, Any]:
     system = ours.machine(PAIR)
     bodies = {"pinion": system.pinion.support, "wheel": system.wheel.support}
     supports = {
-        name: {"kxx": one.stiffness_x, "kyy": one.stiffness_y, "cxx": one.damping_x, "cyy": one.damping_y}
+        name: {
+            "kxx": one.stiffness_x,
+            "kyy": one.stiffness_y,
+            "cxx": one.damping_x,
+            "cyy": one.damping_y,
+        }
         for name, one in bodies.items()
     }
     values = ours.job(system)
@@ -61,7 +66,11 @@ def stored() -> dict[str, Any] | None:
 def stored_rate() -> float | None:
     """Rate of ROSS as a share of that of the scalar code, None where ROSS never ran."""
     found = stored()
-    return None if found is None else found["ross_simulated_s_per_core_s"] / found["scalar_simulated_s_per_core_s"]
+    return (
+        None
+        if found is None
+        else found["ross_simulated_s_per_core_s"] / found["scalar_simulated_s_per_core_s"]
+    )
 
 
 def lines() -> list[str]:

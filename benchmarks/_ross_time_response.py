@@ -36,15 +36,23 @@ def main() -> None:
 
 def two_shafts(job: dict[str, Any]) -> Any:
     """Both rotors and their mesh, whose stiffness varies."""
-    steel = ross.Material(name="steel", rho=job["density"], E=job["youngs_modulus"], Poisson=job["poisson_ratio"])
-    driving, driven = (rotor(job["gears"][name], job["supports"][name], steel) for name in ("pinion", "wheel"))
-    return ross.MultiRotor(driving, driven, coupled_nodes=(MIDDLE, MIDDLE), update_mesh_stiffness=True)
+    steel = ross.Material(
+        name="steel", rho=job["density"], E=job["youngs_modulus"], Poisson=job["poisson_ratio"]
+    )
+    driving, driven = (
+        rotor(job["gears"][name], job["supports"][name], steel) for name in ("pinion", "wheel")
+    )
+    return ross.MultiRotor(
+        driving, driven, coupled_nodes=(MIDDLE, MIDDLE), update_mesh_stiffness=True
+    )
 
 
 def rotor(gear: dict[str, Any], support: dict[str, float], steel: Any) -> Any:
     """A shaft as thick as the bore, with its gear; either bearing has half of the support."""
     bore = 2.0 * gear["bore_radius"]
-    shaft = [ross.ShaftElement(L=gear["width"], idl=0.0, odl=bore, material=steel) for _ in range(2)]
+    shaft = [
+        ross.ShaftElement(L=gear["width"], idl=0.0, odl=bore, material=steel) for _ in range(2)
+    ]
     values = {name: value for name, value in gear.items() if name != "bore_radius"}
     disk = ross.GearElementTVMS(n=MIDDLE, material=steel, bore_diameter=bore, **values)
     half = {name: 0.5 * value for name, value in support.items()}
@@ -55,7 +63,10 @@ def response(pair: Any, job: dict[str, Any], n_steps: int) -> Any:
     """ROSS's time response under the torques of both shafts, from rest."""
     times = np.arange(n_steps) / job["sampling_rate"]
     force = np.zeros((n_steps, pair.ndof))
-    for gear, torque in ((pair.mesh.driving_gear, job["torque"]), (pair.mesh.driven_gear, -job["wheel_torque"])):
+    for gear, torque in (
+        (pair.mesh.driving_gear, job["torque"]),
+        (pair.mesh.driven_gear, -job["wheel_torque"]),
+    ):
         force[:, list(gear.dof_global_index.values())[-1]] = torque
     return pair.run_time_response(job["speed"], force, times, method="newmark")
 

@@ -17,10 +17,21 @@ from unittest import mock
 
 import ross
 
-HEADER = ("pair", "quantity", "point", "pinion_curvature_radius_mm", "share_of_path", "value", "unit", "ross_version")
+HEADER = (
+    "pair",
+    "quantity",
+    "point",
+    "pinion_curvature_radius_mm",
+    "share_of_path",
+    "value",
+    "unit",
+    "ross_version",
+)
 TERMS = {"bending": "_inv_kb", "shear": "_inv_ks", "axial": "_inv_ka", "foundation": "_inv_kf"}
 
-Row = tuple[str, str, float | None, float | None, float, str]  # quantity, point, m, share, value, unit
+Row = tuple[
+    str, str, float | None, float | None, float, str
+]  # quantity, point, m, share, value, unit
 
 
 def main() -> None:
@@ -31,13 +42,18 @@ def main() -> None:
         writer = csv.writer(file, lineterminator="\n")
         writer.writerow(HEADER)
         for name, quantity, point, radius, share, value, unit in rows:
-            place = ["" if radius is None else f"{radius * 1e3:.9g}", "" if share is None else f"{share:.9g}"]
+            place = [
+                "" if radius is None else f"{radius * 1e3:.9g}",
+                "" if share is None else f"{share:.9g}",
+            ]
             writer.writerow([name, quantity, point, *place, f"{value:.9g}", unit, ross.__version__])
 
 
 def pair_rows(pair: dict[str, Any]) -> Iterator[Row]:
     """Every quantity that ROSS computes for one pair."""
-    material = ross.Material(name="steel", rho=pair["density"], E=pair["youngs_modulus"], Poisson=pair["poisson_ratio"])
+    material = ross.Material(
+        name="steel", rho=pair["density"], E=pair["youngs_modulus"], Poisson=pair["poisson_ratio"]
+    )
     gears = {name: read_gear(pair["gears"][name], material) for name in ("pinion", "wheel")}
     mesh = ross.Mesh(gears["pinion"], gears["wheel"])
     yield "contact_ratio", "", None, None, mesh.contact_ratio, "1"
@@ -57,7 +73,9 @@ def pair_rows(pair: dict[str, Any]) -> Iterator[Row]:
 
 def read_gear(values: dict[str, Any], material: Any) -> Any:
     """ROSS's gear from SI values; ROSS takes the bore as a diameter."""
-    return ross.GearElementTVMS(n=0, material=material, bore_diameter=2.0 * values.pop("bore_radius"), **values)
+    return ross.GearElementTVMS(
+        n=0, material=material, bore_diameter=2.0 * values.pop("bore_radius"), **values
+    )
 
 
 def body_rows(name: str, gear: Any) -> Iterator[Row]:
@@ -104,7 +122,10 @@ def contact_angle(curvature: float, gear: Any) -> float:
 
 def pair_stiffness(contact: dict[str, Any], gears: dict[str, Any], mesh: Any) -> float:
     """ROSS's series of both gears and the contact, at the contact of rigid involutes."""
-    teeth = sum(1.0 / gear._compute_stiffness(contact_angle(contact[name], gear)) for name, gear in gears.items())
+    teeth = sum(
+        1.0 / gear._compute_stiffness(contact_angle(contact[name], gear))
+        for name, gear in gears.items()
+    )
     return float(1.0 / (1.0 / mesh.hertzian_stiffness + teeth))
 
 

@@ -102,7 +102,11 @@ def accelerations(m, time, q, v, work, a):
         tilt = m.pinion_tilt[tooth_p] + m.wheel_tilt[tooth_w]
         gap_slope = low + part * step + tilt
         gap = m.table[kind_p, kind_w, cell, 2]
-        gap += part * (m.table[kind_p, kind_w, cell + 1, 2] - gap) - bend * step + tilt * (position - mesh.pitch_point)
+        gap += (
+            part * (m.table[kind_p, kind_w, cell + 1, 2] - gap)
+            - bend * step
+            + tilt * (position - mesh.pitch_point)
+        )
         bite = approach - gap - m.pinion_error[tooth_p] - m.wheel_error[tooth_w]
         if bite > 0.0:
             first, last = min(first, k), k + 1
@@ -138,7 +142,11 @@ def accelerations(m, time, q, v, work, a):
         friction += sliding
         moment_p -= sliding * arm
         moment_w += sliding * (mesh.tangent_length - arm)
-    a[0], a[1], a[2] = friction, normal, moment_p - mesh.pinion_radius * (normal - mesh.consistent * along)
+    a[0], a[1], a[2] = (
+        friction,
+        normal,
+        moment_p - mesh.pinion_radius * (normal - mesh.consistent * along),
+    )
     a[3], a[4], a[5] = -friction, -normal, moment_w + mesh.wheel_radius * normal
     for i in range(N_DOF):
         a[i] = (a[i] + m.force[i] - m.stiffness[i] * q[i] - m.damper[i] * v[i]) * m.inverse_mass[i]
@@ -161,7 +169,10 @@ def integrate(m, state, step, first_step, n_steps, channels, means):
         for stage in range(4):
             ahead = 0.0 if stage == 0 else step if stage == 3 else 0.5 * step
             lowest = min(lowest, accelerations(m, time + ahead, q_now, v_now, work, a))
-            weight, reach = 1.0 if stage == 0 or stage == 3 else 2.0, step if stage == 2 else 0.5 * step
+            weight, reach = (
+                1.0 if stage == 0 or stage == 3 else 2.0,
+                step if stage == 2 else 0.5 * step,
+            )
             for i in range(N_DOF):
                 q_sum[i] += weight * v_now[i]
                 v_sum[i] += weight * a[i]
@@ -181,7 +192,9 @@ def right_hand_side(m: Machine) -> Callable[[float, Array], Array]:
     def slope(time, state):
         rates = np.empty(2 * N_DOF)
         rates[:N_DOF] = state[N_DOF:]
-        accelerations(m, time, state[:N_DOF], state[N_DOF:], np.empty((N_PAIRS, N_KEPT)), rates[N_DOF:])
+        accelerations(
+            m, time, state[:N_DOF], state[N_DOF:], np.empty((N_PAIRS, N_KEPT)), rates[N_DOF:]
+        )
         return rates
 
     return slope

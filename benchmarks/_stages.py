@@ -23,7 +23,11 @@ from gensig.record.inputs import InputReader
 from gensig.systems import pair_machine, spur_pair
 
 PLAN, TABLES, EQUATIONS = "machine and plan row", "mesh tables", "equations and packing"
-SETTLING, RECORDING, CHECKING = "integration: settling", "integration: recording", "integration: error check"
+SETTLING, RECORDING, CHECKING = (
+    "integration: settling",
+    "integration: recording",
+    "integration: error check",
+)
 LOW_PASS, NOISE, WRITING, OTHER = "low-pass", "noise and labels", "HDF5 writing", "other"
 INTEGRATION = (SETTLING, RECORDING, CHECKING)
 CLOSING = "closing the folder"  # index, card and pictures: once a data set, whatever its size
@@ -107,7 +111,9 @@ class Stages:
 
         return counted
 
-    def _clocked(self, function: Callable[..., Any], stage: str, n_whole: int) -> Callable[..., Any]:
+    def _clocked(
+        self, function: Callable[..., Any], stage: str, n_whole: int
+    ) -> Callable[..., Any]:
         @functools.wraps(function)
         def clocked(*given: Any, **named: Any) -> Any:
             name = stage

@@ -36,7 +36,11 @@ def runs(overrides: Sequence[str], duration: float) -> list[tuple[str, Run]]:
     found = []
     for fault in FAULTS:
         for speed, torque in CONDITIONS:
-            words = [f"fault={fault}", f"operating.speed_rpm={speed}", f"operating.torque_nm={torque}"]
+            words = [
+                f"fault={fault}",
+                f"operating.speed_rpm={speed}",
+                f"operating.torque_nm={torque}",
+            ]
             config = read_request(
                 [*words, f"operating.duration_s={duration}", "solver.max_error=null", *overrides]
             ).config
@@ -44,7 +48,11 @@ def runs(overrides: Sequence[str], duration: float) -> list[tuple[str, Run]]:
             n_channels = len(system.sensing.channels)
             run = Run(
                 system=system,
-                faults=tuple(one for part in fault_parts(config["fault"]) for one in read_faults(part, "fault")),
+                faults=tuple(
+                    one
+                    for part in fault_parts(config["fault"])
+                    for one in read_faults(part, "fault")
+                ),
                 specimen=draw_specimen(rng, system.pair.pinion, system.pair.wheel, system.quality),
                 gearbox=draw_gearbox(rng, n_channels, system.quality, system.sensing.gain_scatter),
             )
@@ -71,16 +79,23 @@ def records(all_runs: Sequence[Run], oversampling: int, precision: str) -> list[
 def main() -> None:
     """Measure and print."""
     parser = argparse.ArgumentParser(description=__doc__)
-    parser.add_argument("overrides", nargs="*", help="configuration overrides, such as quality.iso1328_grade=null")
-    parser.add_argument("--duration", type=float, default=0.2, help="s of each record (default 0.2)")
-    parser.add_argument("--steps", type=int, nargs="+", default=[4, 5, 8], help="steps a sample (default 4 5 8)")
+    parser.add_argument(
+        "overrides", nargs="*", help="configuration overrides, such as quality.iso1328_grade=null"
+    )
+    parser.add_argument(
+        "--duration", type=float, default=0.2, help="s of each record (default 0.2)"
+    )
+    parser.add_argument(
+        "--steps", type=int, nargs="+", default=[4, 5, 8], help="steps a sample (default 4 5 8)"
+    )
     parser.add_argument("--json", help="also write the figures to this file")
     arguments = parser.parse_args()
     named = runs(arguments.overrides, arguments.duration)
     exact = records([run for _, run in named], REFERENCE, "float64")
     ways = [(n, "float64") for n in arguments.steps] + [(arguments.steps[0], "float32")]
     table: dict[str, dict[str, Any]] = {
-        name: {"contact_loss": one.contact_loss_fraction} for (name, _), one in zip(named, exact, strict=True)
+        name: {"contact_loss": one.contact_loss_fraction}
+        for (name, _), one in zip(named, exact, strict=True)
     }
     for oversampling, precision in ways:
         found = records([run for _, run in named], oversampling, precision)
@@ -95,14 +110,24 @@ def main() -> None:
                 table[name][f"{way} %"] = 100.0 * float(judged.indicators[0])
     columns = [f"x{n} {precision}" for n, precision in ways]
     print(
-        f"{'':<38}{'loss %':>8}" + "".join(f"{column:>13}" for column in columns) + "   third-octave dB, indicators %"
+        f"{'':<38}{'loss %':>8}"
+        + "".join(f"{column:>13}" for column in columns)
+        + "   third-octave dB, indicators %"
     )
     for name, row in table.items():
-        levels = "   " + " ".join(f"{row[f'{c} dB']:.3f},{row[f'{c} %']:.2f}" for c in columns if f"{c} dB" in row)
-        print(f"{name:<38}{100.0 * row['contact_loss']:>8.2f}" + "".join(f"{row[c]:>13.1e}" for c in columns) + levels)
+        levels = "   " + " ".join(
+            f"{row[f'{c} dB']:.3f},{row[f'{c} %']:.2f}" for c in columns if f"{c} dB" in row
+        )
+        print(
+            f"{name:<38}{100.0 * row['contact_loss']:>8.2f}"
+            + "".join(f"{row[c]:>13.1e}" for c in columns)
+            + levels
+        )
     for column in columns:
         steady = [row[column] for row in table.values() if row["contact_loss"] <= BOUNCING]
-        print(f"{column}: largest error with contact lost for at most 1 % of the time {max(steady):.1e}")
+        print(
+            f"{column}: largest error with contact lost for at most 1 % of the time {max(steady):.1e}"
+        )
     if arguments.json:
         Path(arguments.json).write_text(json.dumps(table, indent=1) + "\n", encoding="utf-8")
 

@@ -75,7 +75,12 @@ def judge_worlds(folder: Path) -> dict[str, Any]:
                 f"healthy found {row['recall'][worlds.HEALTHY]:.2f}"
             )
         print(f"  {'trained there':<24}{_said(there)} on its own test units", flush=True)
-        found[name] = {"n_records": judged.label.size, "n_units": n_units, "variants": table, "trained_there": there}
+        found[name] = {
+            "n_records": judged.label.size,
+            "n_units": n_units,
+            "variants": table,
+            "trained_there": there,
+        }
     return found
 
 
@@ -95,7 +100,9 @@ def judge_control(folder: Path) -> dict[str, Any]:
         rows = control.judge_control(file, models)
         found[name] = {"own": own, "rows": rows}
         print(f"\nnegative control, trained on {name}; on its own unseen units {_said(own)}")
-        print("P(fault): channel, load %, variant: healthy, broken, difference; windows unlike the training")
+        print(
+            "P(fault): channel, load %, variant: healthy, broken, difference; windows unlike the training"
+        )
         for row in rows:
             _print_control(row)
     return found
@@ -103,7 +110,13 @@ def judge_control(folder: Path) -> dict[str, Any]:
 
 def _print_control(row: Mapping[str, Any]) -> None:
     low, high = row["interval"]
-    verdict = "both refused" if row["refuses_both"] else "contains 0" if row["contains_zero"] else "DIFFERS"
+    verdict = (
+        "both refused"
+        if row["refuses_both"]
+        else "contains 0"
+        if row["contains_zero"]
+        else "DIFFERS"
+    )
     print(
         f"  {row['channel']} {row['load']:>3} {row['variant']:<8}{row['fault_if_healthy']:.3f} "
         f"{row['fault_if_broken']:.3f} {row['difference']:+.3f} [{low:+.3f}, {high:+.3f}]  "
@@ -149,11 +162,17 @@ def _one_thread() -> Any:
 
 
 def _parser() -> argparse.ArgumentParser:
-    parser = argparse.ArgumentParser(prog="python -m benchmarks.bridge", description=(__doc__ or "").split("\n")[0])
-    parser.add_argument(
-        "--data", type=Path, help="folder of data sets and models: read where they are there, else made"
+    parser = argparse.ArgumentParser(
+        prog="python -m benchmarks.bridge", description=(__doc__ or "").split("\n")[0]
     )
-    parser.add_argument("--json", type=Path, help="also write all figures, with the machine, to this file")
+    parser.add_argument(
+        "--data",
+        type=Path,
+        help="folder of data sets and models: read where they are there, else made",
+    )
+    parser.add_argument(
+        "--json", type=Path, help="also write all figures, with the machine, to this file"
+    )
     return parser
 
 

@@ -41,7 +41,9 @@ TORQUES = (5, 20, 50, 100)  # N m on the pinion
 FAULTS = ("healthy", "missing_tooth", "pitting")
 CHANNEL = "pinion_y"
 DURATION = 0.2  # s; six turns of the pinion
-N_TURNS = 3  # of which are compared, the last ones; whole turns: every mesh harmonic has its own line
+N_TURNS = (
+    3  # of which are compared, the last ones; whole turns: every mesh harmonic has its own line
+)
 N_HARMONICS = 6
 MOST_SHIFT = 5.0  # samples
 N_LOADS, MORE_LOADS = 41, 81
@@ -67,17 +69,35 @@ class Case:
     def roll(self) -> Array:
         """Phases of one turn of the pinion, (phase,) m along the line of action."""
         pair = self.system.pair
-        return pair.base_pitch * (np.arange(pair.pinion.n_teeth * POINTS_PER_PITCH) + 0.5) / POINTS_PER_PITCH
+        return (
+            pair.base_pitch
+            * (np.arange(pair.pinion.n_teeth * POINTS_PER_PITCH) + 0.5)
+            / POINTS_PER_PITCH
+        )
 
 
 @lru_cache(maxsize=64)
 def case(torque: float, fault: str, *changes: str) -> Case:
     """The default pair at its default speed."""
-    words = [f"operating.torque_nm={torque:g}", f"operating.duration_s={DURATION:g}", f"fault={fault}"]
+    words = [
+        f"operating.torque_nm={torque:g}",
+        f"operating.duration_s={DURATION:g}",
+        f"fault={fault}",
+    ]
     # the tooth bends as one piece: only the contact shall differ
-    own = ("solver.oversampling=8", "solver.max_error=null", "mesh.bending=whole", f"sensing.channels=[{CHANNEL}]")
+    own = (
+        "solver.oversampling=8",
+        "solver.max_error=null",
+        "mesh.bending=whole",
+        f"sensing.channels=[{CHANNEL}]",
+    )
     config = read_request([*words, *own, *changes]).config
-    return Case(torque=torque, fault=fault, system=read_system(config), faults=tuple(read_faults(config["fault"])))
+    return Case(
+        torque=torque,
+        fault=fault,
+        system=read_system(config),
+        faults=tuple(read_faults(config["fault"])),
+    )
 
 
 @lru_cache(maxsize=64)
@@ -93,8 +113,12 @@ def mesh_of(this: Case, law: str, n_loads: int = N_LOADS) -> Mesh:
     secant = mesh_at_loads(table, loads)
     if law == "secant":
         return secant
-    compliance = secant.compliance + change_with_load(this, table, loads[:, None], resharing=law == "reshared")
-    return secant._replace(compliance=compliance, slope=np.gradient(compliance, table.position, axis=2))
+    compliance = secant.compliance + change_with_load(
+        this, table, loads[:, None], resharing=law == "reshared"
+    )
+    return secant._replace(
+        compliance=compliance, slope=np.gradient(compliance, table.position, axis=2)
+    )
 
 
 def change_with_load(this: Case, table: PairTable, loads: Array, *, resharing: bool) -> Array:
@@ -103,9 +127,13 @@ def change_with_load(this: Case, table: PairTable, loads: Array, *, resharing: b
     arguments = system.pair, table.position, system.material, system.mesh
     width, force = system.pair.pinion.face_width, system.mesh_force
     law = flank_sides(*arguments, force)["pinion"].law
-    at_force = pair_table(system.pair, system.material, system.mesh, load=force).pinion.compliance[0]
+    at_force = pair_table(system.pair, system.material, system.mesh, load=force).pinion.compliance[
+        0
+    ]
     # the load at which the secant was taken, from what it costs
-    own = force * np.exp((at_force - table.pinion.compliance[0]) * width / law.factor * law.log_weight)
+    own = force * np.exp(
+        (at_force - table.pinion.compliance[0]) * width / law.factor * law.log_weight
+    )
     side = flank_sides(*arguments, own)["pinion"]
     sound = law.compliance(width, loads) - law.compliance(width, own)
     change = np.repeat(sound[None], len(table.pinion.present), axis=0)
@@ -122,10 +150,15 @@ def change_with_load(this: Case, table: PairTable, loads: Array, *, resharing: b
             moments = np.cumsum(widths * np.take_along_axis(gaps, order, axis=0), axis=0)
             carried = loads * law.compliance(bearing, loads) * bearing  # load x unit compliance
             # the approach at which the first n slices would carry the load; the least of them is the true one
-            pressed = np.min([(carried + m) / w for m, w in zip(moments, widths.cumsum(axis=0), strict=True)], axis=0)
+            pressed = np.min(
+                [(carried + m) / w for m, w in zip(moments, widths.cumsum(axis=0), strict=True)],
+                axis=0,
+            )
             change[table.pinion.kind[number]] = pressed / loads - secant
         else:
-            change[table.pinion.kind[number]] = law.compliance(bearing, loads) - law.compliance(bearing, own)
+            change[table.pinion.kind[number]] = law.compliance(bearing, loads) - law.compliance(
+                bearing, own
+            )
     return change
 
 
@@ -154,16 +187,31 @@ def record(this: Case, law: str, *, oversampling: int = 8, n_loads: int = N_LOAD
 
 def last_turns(this: Case, signal: Array) -> Array:
     """The part of a record, (sample,), that is compared."""
-    return signal[-round(N_TURNS * this.system.sensing.sampling_rate * 2.0 * math.pi / this.system.operating.speed) :]
+    return signal[
+        -round(
+            N_TURNS
+            * this.system.sensing.sampling_rate
+            * 2.0
+            * math.pi
+            / this.system.operating.speed
+        ) :
+    ]
 
 
 def static(this: Case, law: str) -> tuple[Array, Array]:
     """Approach and tangent stiffness under the set torque over one turn of the pinion, (phase,) m and N/m."""
     dynamics, roll = this.dynamics, this.roll
     approach, stiffness = np.empty_like(roll), np.empty_like(roll)
-    highest = 4.0 * static_mesh(dynamics.table, pair_states(dynamics.table, roll), dynamics.mesh_force).approach.max()
+    highest = (
+        4.0
+        * static_mesh(
+            dynamics.table, pair_states(dynamics.table, roll), dynamics.mesh_force
+        ).approach.max()
+    )
     numbers = mesh_numbers(dynamics)
-    static_approach(mesh_of(this, law), numbers, roll, dynamics.mesh_force, highest, approach, stiffness)
+    static_approach(
+        mesh_of(this, law), numbers, roll, dynamics.mesh_force, highest, approach, stiffness
+    )
     return approach, stiffness
 
 
@@ -196,7 +244,9 @@ def delayed(signal: Array, reference: Array) -> tuple[float, float]:
         return away(np.fft.irfft(ours * np.exp(turn * shift), len(signal)), reference)
 
     near = min(np.arange(-MOST_SHIFT, MOST_SHIFT, 0.1), key=left)
-    best = minimize_scalar(left, bounds=(near - 0.1, near + 0.1), method="bounded", options={"xatol": 1e-4})
+    best = minimize_scalar(
+        left, bounds=(near - 0.1, near + 0.1), method="bounded", options={"xatol": 1e-4}
+    )
     return float(best.fun), float(best.x)
 
 
@@ -216,7 +266,15 @@ def static_rows() -> Iterator[Sequence[str]]:
             approach = f"{x.mean() * 1e6:.3f} {x_full.mean() * 1e6:.3f}"
             swing = f"{np.ptp(x) * 1e6:.3f} {np.ptp(x_full) * 1e6:.3f}"
             stiffness = f"{k.mean() * 1e-8:.3f} {k_full.mean() * 1e-8:.3f} | {percent(k_full.mean() / k.mean() - 1.0)}"
-            yield f"{torque}", fault, approach, swing, stiffness, f"{f:.0f} {f_full:.0f}", percent(f_full / f - 1.0)
+            yield (
+                f"{torque}",
+                fault,
+                approach,
+                swing,
+                stiffness,
+                f"{f:.0f} {f_full:.0f}",
+                percent(f_full / f - 1.0),
+            )
 
 
 def dynamic_rows() -> Iterator[Sequence[str]]:
@@ -242,13 +300,21 @@ def check_rows() -> Iterator[Sequence[str]]:
     for fault in FAULTS:
         own = [case(torque, fault) for torque in TORQUES]
         gensigs = [last_turns(c, c.system.simulate(c.faults).acceleration[0]) for c in own]
-        simulated = [away(record(c, "secant"), theirs) for c, theirs in zip(own, gensigs, strict=True)]
+        simulated = [
+            away(record(c, "secant"), theirs) for c, theirs in zip(own, gensigs, strict=True)
+        ]
         this, linear = own[1], case(20, fault, "mesh.contact=linear")
-        theirs = static_mesh(this.dynamics.table, pair_states(this.dynamics.table, this.roll), this.dynamics.mesh_force)
+        theirs = static_mesh(
+            this.dynamics.table,
+            pair_states(this.dynamics.table, this.roll),
+            this.dynamics.mesh_force,
+        )
         approach, stiffness = static(this, "secant")
         finer = [away(*(record(c, "full", oversampling=n) for n in (8, 16))) for c in own[1::2]]
         pitted = own[1::2] if fault == "pitting" else []
-        loads = [away(*(record(c, "reshared", n_loads=n) for n in (N_LOADS, MORE_LOADS))) for c in pitted]
+        loads = [
+            away(*(record(c, "reshared", n_loads=n) for n in (N_LOADS, MORE_LOADS))) for c in pitted
+        ]
         yield (
             fault,
             " ".join(f"{value:.0e}" for value in simulated),
@@ -276,12 +342,20 @@ def table(head: str, rows: Iterator[Sequence[str]]) -> None:
 def main() -> None:
     """Print every table."""
     begun = time.perf_counter()
-    print("Static, secant and full law: approach in um, tangent stiffness in 1e8 N/m, mesh resonance in Hz\n")
-    table("| N m | fault | mean | peak to peak | mean stiffness | % | resonance | % |", static_rows())
-    print(f"{CHANNEL} in m/s2, secant and full law; changes from the secant; difference over the full law's RMS\n")
+    print(
+        "Static, secant and full law: approach in um, tangent stiffness in 1e8 N/m, mesh resonance in Hz\n"
+    )
+    table(
+        "| N m | fault | mean | peak to peak | mean stiffness | % | resonance | % |", static_rows()
+    )
+    print(
+        f"{CHANNEL} in m/s2, secant and full law; changes from the secant; difference over the full law's RMS\n"
+    )
     head = "| N m | fault | RMS | % | mesh harmonics 1..6, % | difference, once shifted, % | shift, us |"
     table(head, dynamic_rows())
-    print(f"Differences that should be none; records at {TORQUES} N m, finer ones at {TORQUES[1::2]}, the rest at 20\n")
+    print(
+        f"Differences that should be none; records at {TORQUES} N m, finer ones at {TORQUES[1::2]}, the rest at 20\n"
+    )
     table(
         "| fault | secant, gensig's record | static approach | stiffness | linear contact: full, secant | "
         "full, 8 and 16 steps a sample | face shared anew, 41 and 81 loads |",

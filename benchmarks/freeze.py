@@ -44,7 +44,9 @@ def freeze(name: str, data: Path, reports: Sequence[Path]) -> Benchmark:
         name=name,
         generator_version=str(dataset.manifest.generator_version),
         plan_sha256=sha256(data / "plan.csv"),
-        split_sha256={protocol: sha256(data / "splits" / f"{protocol}.csv") for protocol in results},
+        split_sha256={
+            protocol: sha256(data / "splits" / f"{protocol}.csv") for protocol in results
+        },
         signal_rms={
             str(dataset.column("record_id")[record]): [
                 float(f"{v:.{DIGITS}g}") for v in signal_rms(dataset, int(record))
@@ -60,7 +62,9 @@ def _results(report: Path) -> dict[str, dict[str, dict[str, float]]]:
     metrics = json.loads((report / "metrics.json").read_text(encoding="utf-8"))
     return {
         protocol: {
-            method: {key: round(values["balanced_accuracy"][key], 4) for key in ("mean", "low", "high")}
+            method: {
+                key: round(values["balanced_accuracy"][key], 4) for key in ("mean", "low", "high")
+            }
             for method, values in result["methods"].items()
             if isinstance(values["balanced_accuracy"], dict) and method not in CONTROLS
         }
@@ -70,7 +74,9 @@ def _results(report: Path) -> dict[str, dict[str, dict[str, float]]]:
 
 
 def main() -> None:
-    parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
+    parser = argparse.ArgumentParser(
+        description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter
+    )
     parser.add_argument("name")
     parser.add_argument("data", type=Path)
     parser.add_argument("report", type=Path, nargs="+")

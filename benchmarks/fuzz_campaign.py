@@ -21,11 +21,18 @@ import h5py
 
 from benchmarks._fuzz_judge import verdicts
 
-OVERRIDES = ("fault=crack", "plan.n_records=4", "dataset.records_per_shard=2", "operating.duration_s=0.02")
+OVERRIDES = (
+    "fault=crack",
+    "plan.n_records=4",
+    "dataset.records_per_shard=2",
+    "operating.duration_s=0.02",
+)
 
 
 def main() -> int:
-    parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
+    parser = argparse.ArgumentParser(
+        description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter
+    )
     parser.add_argument("--mutants", type=int, default=5000)
     parser.add_argument("--first", type=int, default=0)
     parser.add_argument("--folder", type=Path)
@@ -47,7 +54,10 @@ def main() -> int:
                 harmful.append(verdict)
                 print(f"mutant {verdict.seed} ({verdict.kind}): {verdict.fault}", flush=True)
             if sum(noticed.values()) % 500 == 0:
-                print(f"{sum(noticed.values())} of {len(seeds)}, {time.monotonic() - begin:.0f} s", flush=True)
+                print(
+                    f"{sum(noticed.values())} of {len(seeds)}, {time.monotonic() - begin:.0f} s",
+                    flush=True,
+                )
     figures = {
         "mutants": len(seeds),
         "harmful": len(harmful),

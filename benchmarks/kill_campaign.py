@@ -67,7 +67,9 @@ class Command(Run):
 
     def __init__(self, *words: str) -> None:
         self._process = subprocess.Popen(
-            [sys.executable, "-m", "gensig.cli", *words], stdout=subprocess.DEVNULL, stderr=subprocess.DEVNULL
+            [sys.executable, "-m", "gensig.cli", *words],
+            stdout=subprocess.DEVNULL,
+            stderr=subprocess.DEVNULL,
         )
 
     @property
@@ -127,7 +129,11 @@ def workers_of(run: Run) -> list[int]:
     """Worker processes of a running command; not the helper that cleans up after them."""
     with suppress(OSError):
         children = Path(f"/proc/{run.pid}/task/{run.pid}/children").read_text().split()
-        return [pid for pid in map(int, children) if b"spawn_main" in Path(f"/proc/{pid}/cmdline").read_bytes()]
+        return [
+            pid
+            for pid in map(int, children)
+            if b"spawn_main" in Path(f"/proc/{pid}/cmdline").read_bytes()
+        ]
     return []
 
 
@@ -210,10 +216,16 @@ def campaign(n_kills: int, seed: int, folder: Path) -> tuple[Counter[str], list[
                 outcome["of these before the manifest"] += 1
         for attempt in ("first", "second"):  # a folder without a manifest is begun first
             if not is_whole(out) and (status := start(out, command=False).wait(LONGEST)):
-                problems.append(f"set {number}: the {attempt} run after the kills ended with {status}")
+                problems.append(
+                    f"set {number}: the {attempt} run after the kills ended with {status}"
+                )
         outcome["sets"] += 1
         if outcome["sets"] % 10 == 0:
-            print(f"{n_kills_of(outcome)} of {n_kills} kills, {len(problems)} problem(s)", file=sys.stderr, flush=True)
+            print(
+                f"{n_kills_of(outcome)} of {n_kills} kills, {len(problems)} problem(s)",
+                file=sys.stderr,
+                flush=True,
+            )
         if not is_whole(out) or verify(out).problems:
             problems += [f"set {number}: {line}" for line in verify(out).problems[:3]]
             continue

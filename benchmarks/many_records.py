@@ -45,15 +45,27 @@ def memory(process: int) -> int:
 
 def main() -> int:
     """Measure and print; 1 where the limit is passed."""
-    parser = argparse.ArgumentParser(prog="python -m benchmarks.many_records", description=__doc__.split("\n")[0])
+    parser = argparse.ArgumentParser(
+        prog="python -m benchmarks.many_records", description=__doc__.split("\n")[0]
+    )
     parser.add_argument("--records", type=int, default=100_000, help="(default 100,000)")
-    parser.add_argument("--minutes", type=float, default=240.0, help="stop after so many (default 240)")
+    parser.add_argument(
+        "--minutes", type=float, default=240.0, help="stop after so many (default 240)"
+    )
     arguments = parser.parse_args()
     print_machine(machine())
     with tempfile.TemporaryDirectory() as folder:
         out, begun, peak = Path(folder) / "set", time.monotonic(), 0
         code = "import sys; from gensig.cli import main; sys.exit(main(sys.argv[1:]))"
-        command = [sys.executable, "-c", code, "generate", "--quiet", *WORDS, f"plan.n_records={arguments.records}"]
+        command = [
+            sys.executable,
+            "-c",
+            code,
+            "generate",
+            "--quiet",
+            *WORDS,
+            f"plan.n_records={arguments.records}",
+        ]
         with subprocess.Popen([*command, f"out={out}"]) as run:
             while run.poll() is None and time.monotonic() - begun < 60.0 * arguments.minutes:
                 peak = max(peak, sum(memory(one) for one in family(run.pid)))
@@ -62,7 +74,9 @@ def main() -> int:
                 run.send_signal(signal.SIGINT)
                 try:
                     run.wait(timeout=30.0)
-                except subprocess.TimeoutExpired:  # a shell that starts jobs in the background lets them ignore it
+                except (
+                    subprocess.TimeoutExpired
+                ):  # a shell that starts jobs in the background lets them ignore it
                     run.terminate()
         n_shards = len(list((out / "shards").glob("shard-*.h5")))
     told = "within" if peak < LIMIT_MB * 1e6 else "beyond"

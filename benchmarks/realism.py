@@ -34,7 +34,14 @@ from benchmarks._realism_recording import (
 from benchmarks._realism_sets import CONTROLS, QUICK, Size, kept, recording_words, yardstick_words
 from benchmarks._realism_values import quantities, read_table
 from gensig.errors import GensigError
-from gensig.validation.realism import RESULTS, Comparison, compare, read_ranges, table, write_results
+from gensig.validation.realism import (
+    RESULTS,
+    Comparison,
+    compare,
+    read_ranges,
+    table,
+    write_results,
+)
 from gensig.version import __version__
 
 ROOT = Path(__file__).resolve().parent.parent
@@ -47,12 +54,22 @@ def main(arguments: Sequence[str] | None = None) -> int:
     """Run the comparison; 0 when it was made, whatever it says."""
     options = _parser().parse_args(arguments)
     if options.stored and not re.fullmatch(r"[0-9a-f]{7,40}", options.frozen or ""):
-        print("benchmarks.realism: --stored needs --frozen COMMIT, the commit that froze the ranges", file=sys.stderr)
+        print(
+            "benchmarks.realism: --stored needs --frozen COMMIT, the commit that froze the ranges",
+            file=sys.stderr,
+        )
         return 2
     if options.stored and options.quick:
-        print("benchmarks.realism: --quick simulates too few units to store; leave it out", file=sys.stderr)
+        print(
+            "benchmarks.realism: --quick simulates too few units to store; leave it out",
+            file=sys.stderr,
+        )
         return 2
-    size, base, begun = QUICK if options.quick else Size(), shlex.split(options.base), time.perf_counter()
+    size, base, begun = (
+        QUICK if options.quick else Size(),
+        shlex.split(options.base),
+        time.perf_counter(),
+    )
     named = machine()
     print_machine(named)
     pictures = FIGURES if options.stored else options.figures
@@ -74,11 +91,15 @@ def main(arguments: Sequence[str] | None = None) -> int:
         options.json.write_text(text + "\n", encoding="utf-8")
     if options.stored:
         write_results(RESULTS, heading, found)
-        print(f"stored in {RESULTS.name}; write the reasons of misses into its last column, then run {PAGE}")
+        print(
+            f"stored in {RESULTS.name}; write the reasons of misses into its last column, then run {PAGE}"
+        )
     return 0
 
 
-def compare_all(base: Sequence[str], size: Size, folder: Path, pictures: Path | None) -> list[Comparison]:
+def compare_all(
+    base: Sequence[str], size: Size, folder: Path, pictures: Path | None
+) -> list[Comparison]:
     """Make or open all data sets and put them beside what is measured.
 
     Parameters
@@ -91,7 +112,9 @@ def compare_all(base: Sequence[str], size: Size, folder: Path, pictures: Path | 
     recording = find_recording()
     if recording is None:
         print(f"The real recording is left out: ${VARIABLE} names no folder that holds it.")
-    recorded = None if recording is None else recording_indicators(recording, size.recording_duration)
+    recorded = (
+        None if recording is None else recording_indicators(recording, size.recording_duration)
+    )
     simulated = {}
     for control in CONTROLS:
         name = re.sub(r"\W+", "_", f"recording {control.replace('/', 'over')}")
@@ -112,7 +135,9 @@ def yardstick_comparisons(base: Sequence[str], size: Size, folder: Path) -> list
     told = f"{data.n_records} records, {found.n_failed} failed, at least {least:.0f} turns of the faulted shaft"
     print(f"yardstick: {told}", flush=True)
     values = quantities(found)
-    return [compare(measured, values.get(place, math.nan)) for place, measured in read_ranges().items()]
+    return [
+        compare(measured, values.get(place, math.nan)) for place, measured in read_ranges().items()
+    ]
 
 
 def _plain(value: Any) -> Any:
@@ -120,16 +145,28 @@ def _plain(value: Any) -> Any:
 
 
 def _parser() -> argparse.ArgumentParser:
-    parser = argparse.ArgumentParser(prog="python -m benchmarks.realism", description=(__doc__ or "").split("\n")[0])
-    parser.add_argument("--base", default=BASE, help="overrides to start from, quoted (default: %(default)s)")
+    parser = argparse.ArgumentParser(
+        prog="python -m benchmarks.realism", description=(__doc__ or "").split("\n")[0]
+    )
+    parser.add_argument(
+        "--base", default=BASE, help="overrides to start from, quoted (default: %(default)s)"
+    )
     parser.add_argument("--quick", action="store_true", help="8 units instead of 40")
     parser.add_argument(
-        "--data", type=Path, help="folder of the data sets: read where they are there, else made and kept"
+        "--data",
+        type=Path,
+        help="folder of the data sets: read where they are there, else made and kept",
     )
     parser.add_argument("--figures", type=Path, help="folder to draw the figures in")
-    parser.add_argument("--json", type=Path, help="also write the table, with the machine, to this file")
-    parser.add_argument("--stored", action="store_true", help="store the results and figures for docs/validation.md")
-    parser.add_argument("--frozen", help="commit that froze all ranges of the simulation; --stored needs it")
+    parser.add_argument(
+        "--json", type=Path, help="also write the table, with the machine, to this file"
+    )
+    parser.add_argument(
+        "--stored", action="store_true", help="store the results and figures for docs/validation.md"
+    )
+    parser.add_argument(
+        "--frozen", help="commit that froze all ranges of the simulation; --stored needs it"
+    )
     return parser
 
 

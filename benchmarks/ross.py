@@ -40,7 +40,9 @@ STEPS = (
 )
 SCALES = {"m/N": (1e12, "1e-12 m/N"), "N/m": (1e-8, "1e8 N/m"), "rad": (1.0, "rad"), "1": (1.0, "")}
 
-StoredValues = dict[str, dict[tuple[str, str], tuple[float, str]]]  # pair: (quantity, point): value, unit
+StoredValues = dict[
+    str, dict[tuple[str, str], tuple[float, str]]
+]  # pair: (quantity, point): value, unit
 
 
 class PeerError(Exception):
@@ -52,7 +54,9 @@ def main(arguments: Sequence[str] | None = None) -> int:
     options = _parser().parse_args(arguments)
     try:
         if not options.stored:
-            python = make_environment(options.env, options.ross_version, shlex.split(options.pip_args))
+            python = make_environment(
+                options.env, options.ross_version, shlex.split(options.pip_args)
+            )
             if not options.time_only:
                 run_ross(python, options.output)
             time_ross(python)
@@ -67,10 +71,35 @@ def main(arguments: Sequence[str] | None = None) -> int:
     for pair, values in stored.items():
         print("\n".join([f"### {pair}", "", *comparison(pair, values, every=options.all), ""]))
         print(
-            "\n".join(["Body term with one of ROSS's choices at a time, ratio:", "", *body_evidence(pair, values), ""])
+            "\n".join(
+                [
+                    "Body term with one of ROSS's choices at a time, ratio:",
+                    "",
+                    *body_evidence(pair, values),
+                    "",
+                ]
+            )
         )
-        print("\n".join(["From the paper's terms to the default, one choice after the other:", "", *steps(pair), ""]))
-        print("\n".join(["Where ROSS's mesh puts its contacts, curvature radii:", "", *path_evidence(pair), ""]))
+        print(
+            "\n".join(
+                [
+                    "From the paper's terms to the default, one choice after the other:",
+                    "",
+                    *steps(pair),
+                    "",
+                ]
+            )
+        )
+        print(
+            "\n".join(
+                [
+                    "Where ROSS's mesh puts its contacts, curvature radii:",
+                    "",
+                    *path_evidence(pair),
+                    "",
+                ]
+            )
+        )
     return 0
 
 
@@ -78,14 +107,25 @@ def make_environment(folder: Path, version: str, pip_args: Sequence[str]) -> Pat
     """Interpreter of an environment that holds ROSS, made or completed where needed."""
     python = folder / ("Scripts/python.exe" if sys.platform == "win32" else "bin/python")
     if folder.exists() and any(folder.iterdir()) and not (folder / "pyvenv.cfg").exists():
-        raise PeerError(f"{folder} is not empty and no virtual environment; choose another folder with --env")
+        raise PeerError(
+            f"{folder} is not empty and no virtual environment; choose another folder with --env"
+        )
     if not python.exists():
-        _run([sys.executable, "-m", "venv", str(folder)], f"no virtual environment could be made in {folder}")
+        _run(
+            [sys.executable, "-m", "venv", str(folder)],
+            f"no virtual environment could be made in {folder}",
+        )
     asked = f"{DISTRIBUTION}=={version}"
     check = f"import importlib.metadata as m; assert m.version('{DISTRIBUTION}') == '{version}'"
-    if subprocess.run([python, "-I", "-c", check], capture_output=True, check=False).returncode != 0:
+    if (
+        subprocess.run([python, "-I", "-c", check], capture_output=True, check=False).returncode
+        != 0
+    ):
         pip = [str(python), "-m", "pip", "install", "--quiet", "--disable-pip-version-check"]
-        _run([*pip, *pip_args, asked, BESIDE], f"pip could not install {asked}; see --pip-args, --ross-version")
+        _run(
+            [*pip, *pip_args, asked, BESIDE],
+            f"pip could not install {asked}; see --pip-args, --ross-version",
+        )
     return python
 
 
@@ -107,7 +147,10 @@ def time_ross(python: Path) -> None:
         asked, answered = Path(folder) / "job.json", Path(folder) / "time.json"
         asked.write_text(json.dumps(_ross_time.job()))
         script = Path(__file__).with_name("_ross_time_response.py")
-        _run([str(python), "-I", str(script), str(asked), str(answered)], "ROSS gave no time response")
+        _run(
+            [str(python), "-I", str(script), str(asked), str(answered)],
+            "ROSS gave no time response",
+        )
         _ross_time.store(json.loads(answered.read_text()))
 
 
@@ -117,14 +160,23 @@ def read_values(path: Path) -> tuple[StoredValues, str]:
         rows = list(csv.DictReader(file))
     values: StoredValues = {}
     for row in rows:
-        values.setdefault(row["pair"], {})[row["quantity"], row["point"]] = (float(row["value"]), row["unit"])
+        values.setdefault(row["pair"], {})[row["quantity"], row["point"]] = (
+            float(row["value"]),
+            row["unit"],
+        )
     return values, rows[0]["ross_version"]
 
 
-def comparison(pair: str, ross: dict[tuple[str, str], tuple[float, str]], *, every: bool) -> Iterator[str]:
+def comparison(
+    pair: str, ross: dict[tuple[str, str], tuple[float, str]], *, every: bool
+) -> Iterator[str]:
     """ROSS's value, gensig's by the paper's terms, the same with ROSS's choices put in, and gensig's default."""
     paper = ours.machine(pair, ours.PAPER)
-    columns = (ours.gensig_values(paper), ours.ross_choices(paper), ours.gensig_values(ours.machine(pair)))
+    columns = (
+        ours.gensig_values(paper),
+        ours.ross_choices(paper),
+        ours.gensig_values(ours.machine(pair)),
+    )
     names = ("paper's terms", "ratio", "with ROSS's choices", "ratio", "default", "ratio")
     yield from _head("quantity", "at", "unit", "ROSS", *names)
     for (quantity, point), (value, unit) in ross.items():
@@ -161,7 +213,9 @@ def body_evidence(pair: str, ross: dict[tuple[str, str], tuple[float, str]]) -> 
         for index, point in enumerate(points):
             if point in SHOWN:
                 value = ross[f"{gear.name}_foundation_compliance", point][0]
-                yield _line([gear.name, point, *(f"{values[index] / value:.4f}" for values in found)])
+                yield _line(
+                    [gear.name, point, *(f"{values[index] / value:.4f}" for values in found)]
+                )
 
 
 def path_evidence(pair: str) -> Iterator[str]:
@@ -170,8 +224,12 @@ def path_evidence(pair: str) -> Iterator[str]:
     points = ours.positions(gears)
     position = np.array(list(points.values()))
     (_, pinion), (_, wheel) = ours.sides(gears, position)
-    own_pinion, own_wheel = ours.ross_path(ours.ross_rounding(gears), position / gears.path_of_contact)
-    yield from _head("at", "pinion, mm", "ROSS's pinion, mm", "wheel, mm", "ROSS's wheel, mm", "sum off by, mm")
+    own_pinion, own_wheel = ours.ross_path(
+        ours.ross_rounding(gears), position / gears.path_of_contact
+    )
+    yield from _head(
+        "at", "pinion, mm", "ROSS's pinion, mm", "wheel, mm", "ROSS's wheel, mm", "sum off by, mm"
+    )
     for index, point in enumerate(points):
         radii = (pinion[index], own_pinion[index], wheel[index], own_wheel[index])
         off = own_pinion[index] + own_wheel[index] - gears.tangent_length
@@ -180,11 +238,15 @@ def path_evidence(pair: str) -> Iterator[str]:
 
 def steps(pair: str) -> Iterator[str]:
     """Stiffness at C and mid in the double zone while the paper's choices give way to the default's."""
-    yield from _head("choice", "pair_stiffness at C, 1e8 N/m", "mesh_stiffness at cycle 0.375, 1e8 N/m")
+    yield from _head(
+        "choice", "pair_stiffness at C, 1e8 N/m", "mesh_stiffness at cycle 0.375, 1e8 N/m"
+    )
     chosen = list(ours.PAPER)
     for change in ("", *STEPS):
         key = change.partition("=")[0]
-        chosen = [word for word in chosen if not word.startswith(f"{key}=")] + [change] * bool(change)
+        chosen = [word for word in chosen if not word.startswith(f"{key}=")] + [change] * bool(
+            change
+        )
         values = ours.gensig_values(ours.machine(pair, chosen))
         found = (values["pair_stiffness", "C"], values["mesh_stiffness", "cycle 0.375"])
         yield _line([change or "the paper's", *(f"{value * 1e-8:.4f}" for value in found)])
@@ -203,25 +265,45 @@ def _run(command: Sequence[str], complaint: str) -> None:
     one_thread = {**os.environ, **dict.fromkeys(THREAD_VARIABLES, "1")}
     result = subprocess.run(command, capture_output=True, text=True, check=False, env=one_thread)
     if result.returncode != 0:
-        lines = [line.strip() for line in result.stderr.splitlines() if line.strip()] or ["no message"]
+        lines = [line.strip() for line in result.stderr.splitlines() if line.strip()] or [
+            "no message"
+        ]
         said = next((line for line in reversed(lines) if line.startswith("ERROR")), lines[-1])
         raise PeerError(f"{complaint} ({said})")
 
 
 def _parser() -> argparse.ArgumentParser:
-    parser = argparse.ArgumentParser(prog="python -m benchmarks.ross", description=__doc__.split("\n")[0])
+    parser = argparse.ArgumentParser(
+        prog="python -m benchmarks.ross", description=__doc__.split("\n")[0]
+    )
     parser.add_argument(
         "--env",
         type=Path,
         default=Path(tempfile.gettempdir()) / "gensig-peers" / ".venv-ross",
         help="folder of ROSS's virtual environment, about 1.5 GB (default: %(default)s)",
     )
-    parser.add_argument("--pip-args", default="", help='options for pip, for instance --pip-args="--no-cache-dir"')
-    parser.add_argument("--ross-version", default=VERSION, help="release to install (default: %(default)s)")
-    parser.add_argument("--output", type=Path, default=VALUES, help="where ROSS's values are stored and read")
-    parser.add_argument("--stored", action="store_true", help="compare with the stored values, without ROSS")
-    parser.add_argument("--time-only", action="store_true", help="only time the time response, or show what is stored")
-    parser.add_argument("--all", action="store_true", help="print every point, not only A, C, E and three of a cycle")
+    parser.add_argument(
+        "--pip-args", default="", help='options for pip, for instance --pip-args="--no-cache-dir"'
+    )
+    parser.add_argument(
+        "--ross-version", default=VERSION, help="release to install (default: %(default)s)"
+    )
+    parser.add_argument(
+        "--output", type=Path, default=VALUES, help="where ROSS's values are stored and read"
+    )
+    parser.add_argument(
+        "--stored", action="store_true", help="compare with the stored values, without ROSS"
+    )
+    parser.add_argument(
+        "--time-only",
+        action="store_true",
+        help="only time the time response, or show what is stored",
+    )
+    parser.add_argument(
+        "--all",
+        action="store_true",
+        help="print every point, not only A, C, E and three of a cycle",
+    )
     return parser
 
 

@@ -56,10 +56,14 @@ ALONE = "import sys; from benchmarks import scaling; scaling.{}(*sys.argv[1:])"
 def peak_memory() -> int:
     """Most bytes of memory that this process ever held."""
     status = Path("/proc/self/status")
-    if status.exists():  # what getrusage tells is that of the process that started this one, if it held more
+    if (
+        status.exists()
+    ):  # what getrusage tells is that of the process that started this one, if it held more
         lines = status.read_text(encoding="utf-8").splitlines()
         return next(int(line.split()[1]) * 1024 for line in lines if line.startswith("VmHWM:"))
-    return resource.getrusage(resource.RUSAGE_SELF).ru_maxrss * (1 if sys.platform == "darwin" else 1024)
+    return resource.getrusage(resource.RUSAGE_SELF).ru_maxrss * (
+        1 if sys.platform == "darwin" else 1024
+    )
 
 
 def make_set(n_records: str, *words: str) -> None:
@@ -93,7 +97,9 @@ def _begin(out: Path, n_records: str, *words: str) -> None:
 
 
 def _finish(out: Path) -> None:
-    n_failed, problems = run_folder(out, executor=LocalExecutor(n_workers=1), on_shard=lambda _: None)
+    n_failed, problems = run_folder(
+        out, executor=LocalExecutor(n_workers=1), on_shard=lambda _: None
+    )
     if n_failed or problems:
         raise SimulationError(f"{n_failed} records failed, problems: {problems}")
 
@@ -133,14 +139,19 @@ def against_duration(runs: int) -> dict[str, float]:
     return {**found, **straight("second", DURATIONS, list(found.values()), LANES)}
 
 
-def straight(unit: str, sizes: Sequence[float], found: Sequence[float], per: int = 1) -> dict[str, float]:
+def straight(
+    unit: str, sizes: Sequence[float], found: Sequence[float], per: int = 1
+) -> dict[str, float]:
     """Constant and slope of the line through measured costs, and the largest relative distance from it."""
     x, y = np.asarray(sizes, dtype=np.float64), np.asarray(found)
-    (constant, slope), *_ = np.linalg.lstsq(np.stack([1.0 / y, x / y], axis=1), np.ones_like(y), rcond=None)
+    (constant, slope), *_ = np.linalg.lstsq(
+        np.stack([1.0 / y, x / y], axis=1), np.ones_like(y), rcond=None
+    )
     return {
         f"straight line through all: for no {unit}, ms": constant / per * 1e3,
         f"straight line through all: for each {unit} more, ms": slope / per * 1e3,
-        "largest distance from that line, %": 100.0 * float(np.abs((constant + slope * x) / y - 1.0).max()),
+        "largest distance from that line, %": 100.0
+        * float(np.abs((constant + slope * x) / y - 1.0).max()),
     }
 
 
@@ -148,7 +159,10 @@ def against_number(runs: int) -> dict[str, float]:
     """CPU milliseconds a record by the number of records of a data set, made by one process from plan to index."""
     found = []
     for n_records in COUNTS:
-        told = [alone(make_set, str(n_records), *QUICKSTART, *SHORT) for _ in range(runs if n_records < 1000 else 1)]
+        told = [
+            alone(make_set, str(n_records), *QUICKSTART, *SHORT)
+            for _ in range(runs if n_records < 1000 else 1)
+        ]
         found.append(min(spent for spent, _ in told))
     values = {f"{n} short records": spent / n * 1e3 for n, spent in zip(COUNTS, found, strict=True)}
     return {**values, **straight("record", COUNTS, found)}
@@ -160,7 +174,10 @@ def memory(_runs: int) -> dict[str, float]:
     for n_records in LONG_COUNTS:
         with tempfile.TemporaryDirectory() as folder:
             out = str(Path(folder) / "set")
-            planning, working = alone(make_plan, str(n_records), out, *QUICKSTART, *LONG), alone(make_shard, out)
+            planning, working = (
+                alone(make_plan, str(n_records), out, *QUICKSTART, *LONG),
+                alone(make_shard, out),
+            )
         name = f"{n_records} records of 1 s and four channels"
         found |= {f"{name}: planning": planning[1] / 1e6, f"{name}: worker": working[1] / 1e6}
     return found
@@ -177,7 +194,9 @@ def against_teeth(runs: int) -> tuple[dict[str, float], dict[str, float]]:
 
     for n_teeth in TEETH:
         teeth = list(range(n_teeth))
-        group = side_by_side("operating.duration_s=0.2", "fault=distributed_pitting", f"fault.tooth={teeth}")
+        group = side_by_side(
+            "operating.duration_s=0.2", "fault=distributed_pitting", f"fault.tooth={teeth}"
+        )
         name = f"{n_teeth} distinct pitted {'tooth' if n_teeth == 1 else 'teeth'}"
         tables[name], motions[name] = partial(table, group[0]), partial(simulate, group)
         table(group[0])
@@ -193,7 +212,9 @@ def against_freedom(runs: int) -> dict[str, float]:
     """CPU milliseconds a record of 1 s by degrees of freedom: with a motor, and with a load too."""
     works = {}
     for n_dof, words in ROTORS.items():
-        group = side_by_side("operating.duration_s=1", *words, channels="[pinion_x,pinion_y,wheel_x,wheel_y]")
+        group = side_by_side(
+            "operating.duration_s=1", *words, channels="[pinion_x,pinion_y,wheel_x,wheel_y]"
+        )
         simulate(group[:1])
         works[f"{n_dof} degrees of freedom"] = partial(simulate, group)
     return {name: value / LANES * 1e3 for name, value in in_turn(works, runs).items()}
@@ -204,9 +225,13 @@ def main() -> None:
     arguments, named, begun = begin("benchmarks.scaling", __doc__ or "")
     sections: dict[str, dict[str, float]] = {}
 
-    def show(measure: Callable[[int], dict[str, float] | tuple[dict[str, float], ...]], *titles: str) -> None:
+    def show(
+        measure: Callable[[int], dict[str, float] | tuple[dict[str, float], ...]], *titles: str
+    ) -> None:
         found = measure(arguments.runs)
-        for title, values in zip(titles, found if isinstance(found, tuple) else (found,), strict=True):
+        for title, values in zip(
+            titles, found if isinstance(found, tuple) else (found,), strict=True
+        ):
             sections[title] = values
             print_figures(title, values)
 
@@ -214,7 +239,11 @@ def main() -> None:
     show(memory, "peak memory, MB")
     show(against_duration, f"duration of {LANES} records, one channel: CPU s")
     show(against_freedom, "degrees of freedom, 1 s and four channels: CPU ms a record")
-    show(against_teeth, "distinct teeth: CPU ms of a table", "distinct teeth: CPU ms a record of 0.2 s, table known")
+    show(
+        against_teeth,
+        "distinct teeth: CPU ms of a table",
+        "distinct teeth: CPU ms a record of 0.2 s, table known",
+    )
     print(f"\n{time.perf_counter() - begun:.0f} s")
     write_json(arguments.json, named, sections)
 

@@ -22,14 +22,21 @@ SPEED = 1688.0 * math.pi / 30.0
 RATE = 10240.0
 CALM = 500.0, 5.0  # N m of the engine and of a pump cam, with loads on the ends of all branches
 LEAD_IN = 0.02  # s, so that all steps begin in the same state
-CHANNELS = [("speed", 13), ("speed", 42), ("acceleration", 42), *[("mesh_force", mesh) for mesh in range(8)]]
+CHANNELS = [
+    ("speed", 13),
+    ("speed", 42),
+    ("acceleration", 42),
+    *[("mesh_force", mesh) for mesh in range(8)],
+]
 
 
 def engine_run(oversampling: int, duration: float, *, loaded: bool) -> tuple[LineMotion, float]:
     """A motion of the engine, and the CPU seconds that it took; ``loaded`` teeth stay together, others rattle."""
     line, torques = engine_line(), engine_torques()
     if loaded:
-        torques = engine_torques(*CALM) + [ShaftTorque(dof=dof, table=np.array([-DRAG])) for dof in END_GEARS]
+        torques = engine_torques(*CALM) + [
+            ShaftTorque(dof=dof, table=np.array([-DRAG])) for dof in END_GEARS
+        ]
     begin = time.process_time()
     motion = integrate_line(
         line,
@@ -46,13 +53,20 @@ def engine_run(oversampling: int, duration: float, *, loaded: bool) -> tuple[Lin
 def main() -> None:
     """Print one line a step."""
     parser = argparse.ArgumentParser(description=__doc__.splitlines()[0])
-    parser.add_argument("--duration", type=float, default=10.0, help="simulated seconds of the timed runs")
-    parser.add_argument("--checked", type=float, default=0.3, help="simulated seconds of the runs for the errors")
-    parser.add_argument("--oversampling", type=int, nargs="+", default=[5, 10, 20], help="steps per sample")
+    parser.add_argument(
+        "--duration", type=float, default=10.0, help="simulated seconds of the timed runs"
+    )
+    parser.add_argument(
+        "--checked", type=float, default=0.3, help="simulated seconds of the runs for the errors"
+    )
+    parser.add_argument(
+        "--oversampling", type=int, nargs="+", default=[5, 10, 20], help="steps per sample"
+    )
     words = parser.parse_args()
     engine_run(2, 0.01, loaded=False)  # compiles
     print(
-        "step us | CPU s for", f"{words.duration:g} s | rounds | energy residual | largest share apart, on back flanks"
+        "step us | CPU s for",
+        f"{words.duration:g} s | rounds | energy residual | largest share apart, on back flanks",
     )
     for oversampling in words.oversampling:
         motion, spent = engine_run(oversampling, words.duration, loaded=False)
@@ -66,7 +80,10 @@ def main() -> None:
     for oversampling in words.oversampling:
         found, _ = engine_run(oversampling, words.checked, loaded=True)
         errors = [
-            float(in_band_error(found.signals[c][None, None], exact.signals[c][None, None], RATE)[0]) for c in CHANNELS
+            float(
+                in_band_error(found.signals[c][None, None], exact.signals[c][None, None], RATE)[0]
+            )
+            for c in CHANNELS
         ]
         told = " ".join(f"{error:.1e}" for error in errors)
         print(f"{1e6 / RATE / oversampling:7.2f} | {found.energy_residual:.1e} | {told}")

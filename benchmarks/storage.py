@@ -53,15 +53,24 @@ def simulated(config: Configuration) -> list[Record]:
         clean = record.signals["acceleration"]
         rms = np.sqrt(np.mean(np.square(clean), axis=1, keepdims=True))
         noisy = clean + 0.1 * rms * rng.standard_normal(clean.shape, np.float32)
-        values = {**record.values, **{name: value for name, value in row.items() if name not in ("shard", "row")}}
-        records.append(Record(signals={**record.signals, "acceleration": noisy.astype(np.float32)}, values=values))
+        values = {
+            **record.values,
+            **{name: value for name, value in row.items() if name not in ("shard", "row")},
+        }
+        records.append(
+            Record(
+                signals={**record.signals, "acceleration": noisy.astype(np.float32)}, values=values
+            )
+        )
     return records
 
 
 def shard(config: Configuration, records: list[Record], out: Path, runs: int) -> dict[str, float]:
     """Figures of one way to store."""
     begin_folder(config, [], out)
-    params = [name.removeprefix("params/") for name in records[0].values if name.startswith("params/")]
+    params = [
+        name.removeprefix("params/") for name in records[0].values if name.startswith("params/")
+    ]
     path, digests = shard_path(out, 0), []
 
     def write() -> None:
@@ -94,7 +103,9 @@ def plain(records: list[Record], path: Path, runs: int) -> dict[str, float]:
         return _figures(records, writing, path, runs, file["acceleration"].__getitem__)
 
 
-def _figures(records: list[Record], writing: float, path: Path, runs: int, read: Any) -> dict[str, float]:
+def _figures(
+    records: list[Record], writing: float, path: Path, runs: int, read: Any
+) -> dict[str, float]:
     n_bytes = sum(record.signals["acceleration"].nbytes for record in records)
     order = np.random.default_rng(1).permutation(len(records)).tolist()
     reading = least(lambda: [read(place) for place in order], runs)
@@ -114,30 +125,53 @@ def _figures(records: list[Record], writing: float, path: Path, runs: int, read:
 def main() -> None:
     """Measure and print."""
     parser = argparse.ArgumentParser(description=__doc__)
-    parser.add_argument("--records", type=int, default=64, help="records of 1 s with 4 channels (default 64)")
+    parser.add_argument(
+        "--records", type=int, default=64, help="records of 1 s with 4 channels (default 64)"
+    )
     parser.add_argument("--runs", type=int, default=3, help="the least of so many (default 3)")
     parser.add_argument("--folder", help="where to write (default: the folder for temporary files)")
     parser.add_argument("--json", help="also write the figures to this file")
     arguments = parser.parse_args()
-    words = ["experiment=quickstart", f"plan.n_records={arguments.records}", "sensing.snr_db=null", "plan.vary={}"]
+    words = [
+        "experiment=quickstart",
+        f"plan.n_records={arguments.records}",
+        "sensing.snr_db=null",
+        "plan.vary={}",
+    ]
     config = read_request([*words, f"dataset.records_per_shard={arguments.records}"]).config
     records = simulated(config)
     found: dict[str, dict[str, float]] = {}
     with tempfile.TemporaryDirectory(dir=arguments.folder) as name:
-        found["h5py alone, contiguous float32"] = plain(records, Path(name) / "plain.h5", arguments.runs)
+        found["h5py alone, contiguous float32"] = plain(
+            records, Path(name) / "plain.h5", arguments.runs
+        )
         for sample_type in SAMPLE_TYPES:
             for compression in COMPRESSIONS:
-                stored = config.with_keys("dataset", compression=compression, sample_type=sample_type)
+                stored = config.with_keys(
+                    "dataset", compression=compression, sample_type=sample_type
+                )
                 out = Path(name) / f"{sample_type}-{compression}"
                 found[f"{sample_type}, {compression}"] = shard(stored, records, out, arguments.runs)
     header = ("stored as", "write MB/s", "ratio", "read 1 record ms", "error dB")
     print("{:<32}{:>12}{:>8}{:>18}{:>10}".format(*header))
-    for way, (write, ratio, read, error) in ((way, values.values()) for way, values in found.items()):
-        print(f"{way:<32}{write:>12.0f}{ratio:>8.2f}{read:>18.2f}{f'{error:.1f}' if error > -np.inf else 'none':>10}")
+    for way, (write, ratio, read, error) in (
+        (way, values.values()) for way, values in found.items()
+    ):
+        print(
+            f"{way:<32}{write:>12.0f}{ratio:>8.2f}{read:>18.2f}{f'{error:.1f}' if error > -np.inf else 'none':>10}"
+        )
     if arguments.json:
-        machine = {"machine": platform.processor() or platform.machine(), "records": arguments.records}
-        exact = {way: {k: v if np.isfinite(v) else None for k, v in values.items()} for way, values in found.items()}
-        Path(arguments.json).write_text(json.dumps({**machine, "ways": exact}, indent=1) + "\n", encoding="utf-8")
+        machine = {
+            "machine": platform.processor() or platform.machine(),
+            "records": arguments.records,
+        }
+        exact = {
+            way: {k: v if np.isfinite(v) else None for k, v in values.items()}
+            for way, values in found.items()
+        }
+        Path(arguments.json).write_text(
+            json.dumps({**machine, "ways": exact}, indent=1) + "\n", encoding="utf-8"
+        )
 
 
 if __name__ == "__main__":

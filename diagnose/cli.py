@@ -22,7 +22,17 @@ VERBS = {
 }
 
 
-OF_GENSIG = ("generate", "plan", "resume", "inspect", "verify", "simulate", "options", "completion", "reproduce")
+OF_GENSIG = (
+    "generate",
+    "plan",
+    "resume",
+    "inspect",
+    "verify",
+    "simulate",
+    "options",
+    "completion",
+    "reproduce",
+)
 PROGRAM = "diagnose"
 
 

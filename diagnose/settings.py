@@ -35,7 +35,9 @@ class LifeSettings:
         _check_between("remaining_life.early_life_share", self.early_life_share, most=1)
         _check_between("remaining_life.coverage", self.coverage, most=1)
         if not isinstance(self.with_age, bool):
-            raise ConfigError(f"remaining_life.with_age must be true or false, not {self.with_age!r}")
+            raise ConfigError(
+                f"remaining_life.with_age must be true or false, not {self.with_age!r}"
+            )
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -104,7 +106,9 @@ class TrainSettings:
         if self.oracle not in ("auto", False):
             raise ConfigError(f"oracle must be auto or false, not {self.oracle!r}")
         if self.sham is not None and (not isinstance(self.sham, str) or not self.sham):
-            raise ConfigError(f"sham must be the folder of a data set made with plan.sham=true, not {self.sham!r}")
+            raise ConfigError(
+                f"sham must be the folder of a data set made with plan.sham=true, not {self.sham!r}"
+            )
         self._check_list("baselines", baseline_names(Role.RIVAL))
         self._check_list("heads", HEADS)
         if self.features not in tuple(FEATURES):
@@ -138,7 +142,9 @@ def settings_from(config: Configuration) -> TrainSettings:
         values[name] = _as_tuple(name, values[name])
     if values["seeds"] is None:
         raise ConfigError("seeds must be a list of different values, at least one")
-    values["baselines"] = () if values["baselines"] is False else _as_tuple("baselines", values["baselines"]) or ()
+    values["baselines"] = (
+        () if values["baselines"] is False else _as_tuple("baselines", values["baselines"]) or ()
+    )
     values["heads"] = () if values["heads"] is False else _as_tuple("heads", values["heads"]) or ()
     values["remaining_life"] = _life_settings(values["remaining_life"])
     values["data"], values["out"] = str(values["data"]), str(values["out"])
@@ -167,7 +173,11 @@ def _check_whole(name: str, value: Any, *, least: int) -> None:
 
 
 def _check_rate(name: str, value: Any) -> None:
-    if isinstance(value, bool) or not isinstance(value, int | float) or not 0 < value < float("inf"):
+    if (
+        isinstance(value, bool)
+        or not isinstance(value, int | float)
+        or not 0 < value < float("inf")
+    ):
         raise ConfigError(f"{name} must be null or a number of samples a second, not {value!r}")
 
 
@@ -179,4 +189,6 @@ def _check_number(name: str, value: Any) -> None:
 def _check_between(name: str, value: Any, *, most: float) -> None:
     """Refuse what is not above 0 and below `most`; for 1 that is a share."""
     if isinstance(value, bool) or not isinstance(value, int | float) or not 0 < value < most:
-        raise ConfigError(f"{name} must be a number above 0{' and below 1' if most == 1 else ''}, not {value!r}")
+        raise ConfigError(
+            f"{name} must be a number above 0{' and below 1' if most == 1 else ''}, not {value!r}"
+        )

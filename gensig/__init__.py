@@ -26,7 +26,15 @@ if TYPE_CHECKING:
     from gensig.production.streaming import RecordStream
     from gensig.systems.base import Machine
 
-__all__ = ["__version__", "fault_pairs", "generate", "load_faults", "load_system", "open_dataset", "stream"]
+__all__ = [
+    "__version__",
+    "fault_pairs",
+    "generate",
+    "load_faults",
+    "load_system",
+    "open_dataset",
+    "stream",
+]
 
 moved.install()
 
@@ -80,7 +88,9 @@ def generate(*overrides: str, out: str | Path, config_dir: str | Path | None = N
     request = read_request(overrides, config_dir=config_dir)
     executor = read_executor(request.config["executor"])
     if not executor.closes:
-        raise ConfigError("a task of an array job makes its share of a folder only; run it as `gensig generate`")
+        raise ConfigError(
+            "a task of an array job makes its share of a folder only; run it as `gensig generate`"
+        )
     begin_folder(request.config, request.overrides, Path(out))
     _, problems = run_folder(Path(out), executor=executor, on_shard=lambda _progress: None)
     if problems:
@@ -106,7 +116,9 @@ def stream(*overrides: str, epoch: int = 0, config_dir: str | Path | None = None
     from gensig.production.streaming import open_stream
 
     if len(sweep(overrides)) > 1:
-        raise ConfigError("a stream is one data set: give one value a key, and make a stream for each")
+        raise ConfigError(
+            "a stream is one data set: give one value a key, and make a stream for each"
+        )
     return open_stream(read_request(overrides, config_dir=config_dir).config, epoch=epoch)
 
 
@@ -130,5 +142,10 @@ def fault_pairs(
 
     config = read_request(overrides, config_dir=config_dir).config
     return make_pairs(
-        config, speeds_rpm=speeds_rpm, torques_nm=torques_nm, n_units=n_units, fixed_noise=fixed_noise, epoch=epoch
+        config,
+        speeds_rpm=speeds_rpm,
+        torques_nm=torques_nm,
+        n_units=n_units,
+        fixed_noise=fixed_noise,
+        epoch=epoch,
     )

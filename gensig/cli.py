@@ -60,7 +60,9 @@ def verb_parser(name: str) -> Parser:
     """The parser of a verb, with its help."""
     verb = VERBS[name]
     exits = {} if verb.one is None else {1: verb.one}
-    summary = f"{verb.summary[0].upper()}{verb.summary[1:]}".rstrip(".") + ("" if verb.summary.endswith("?") else ".")
+    summary = f"{verb.summary[0].upper()}{verb.summary[1:]}".rstrip(".") + (
+        "" if verb.summary.endswith("?") else "."
+    )
     heading = "examples" if "\n" in verb.example else "example"
     parser = Parser(f"{PROGRAM} {name}", summary, f"{heading}:\n  {verb.example}", exits)
     verb.arguments(parser)

@@ -18,11 +18,17 @@ class Material:
 
     def __post_init__(self) -> None:
         if not self.youngs_modulus > 0.0:
-            raise ConfigError(f"material.youngs_modulus_gpa = {self.youngs_modulus / 1e9:g} must be positive")
+            raise ConfigError(
+                f"material.youngs_modulus_gpa = {self.youngs_modulus / 1e9:g} must be positive"
+            )
         if not 0.0 <= self.poisson_ratio < 1.0:
-            raise ConfigError(f"material.poisson_ratio = {self.poisson_ratio:g} must be at least 0 and below 1")
+            raise ConfigError(
+                f"material.poisson_ratio = {self.poisson_ratio:g} must be at least 0 and below 1"
+            )
         if not self.density_kg_per_m3 > 0.0:
-            raise ConfigError(f"material.density_kg_per_m3 = {self.density_kg_per_m3:g} must be positive")
+            raise ConfigError(
+                f"material.density_kg_per_m3 = {self.density_kg_per_m3:g} must be positive"
+            )
 
     def in_plane(self, elasticity: str) -> Material:
         """The material whose plane-stress formulas are those of this one under ``plane_stress`` or ``plane_strain``.

@@ -25,7 +25,10 @@ UNITS: dict[str, tuple[float, str]] = {
     "w_per_mk": (1.0, "thermal conductivity"),
     "j_per_kgk": (1.0, "specific heat"),
     "per_k": (1.0, "thermal expansion"),
-    "degc": (1.0, "temperature"),  # degrees Celsius inside too: only differences and tables of steel are asked
+    "degc": (
+        1.0,
+        "temperature",
+    ),  # degrees Celsius inside too: only differences and tables of steel are asked
     "n_per_m": (1.0, "stiffness"),
     "ns_per_m": (1.0, "damping"),
     "nm_per_rad": (1.0, "torsional stiffness"),
@@ -170,17 +173,27 @@ def _convert(place: str, key: str, value: Any, hint: Any) -> Any:
     if isinstance(value, list | tuple):
         items = {typing.get_args(kind)[0] for kind in kinds if typing.get_origin(kind) is tuple}
         for item in items & {str, int, float}:
-            if item is float and all(type(entry) is float and math.isfinite(entry) for entry in value):
+            if item is float and all(
+                type(entry) is float and math.isfinite(entry) for entry in value
+            ):
                 suffix = split_unit(key)[1]  # looked up once: profiles are long
-                return tuple(value) if suffix is None else tuple(entry * UNITS[suffix][0] for entry in value)
+                return (
+                    tuple(value)
+                    if suffix is None
+                    else tuple(entry * UNITS[suffix][0] for entry in value)
+                )
             if all(_is_a(item, entry) for entry in value):
-                return tuple(to_si(key, float(entry)) if item is float else entry for entry in value)
+                return tuple(
+                    to_si(key, float(entry)) if item is float else entry for entry in value
+                )
     for kind in (float, int, bool, str):
         if kind in kinds and _is_a(kind, value):
             return to_si(key, float(value)) if kind is float else value
     if float in kinds and _is_a(float, value, finite=False):
         raise ConfigError(f"{place} = {value} is not finite")
-    raise ConfigError(f"{place} = {value!r} is not {' or '.join(_named(kind) for kind in kinds if kind is not None)}")
+    raise ConfigError(
+        f"{place} = {value!r} is not {' or '.join(_named(kind) for kind in kinds if kind is not None)}"
+    )
 
 
 def _is_a(kind: type, value: Any, *, finite: bool = True) -> bool:
@@ -197,4 +210,6 @@ def _named(kind: Any) -> str:
         return {str: "a list of names", int: "a list of whole numbers", float: "a list of numbers"}[
             typing.get_args(kind)[0]
         ]
-    return {float: "a number", int: "a whole number", bool: "true or false", str: "text"}.get(kind, "null")
+    return {float: "a number", int: "a whole number", bool: "true or false", str: "text"}.get(
+        kind, "null"
+    )

@@ -45,12 +45,17 @@ def helical_pair(pair: GearPair, helix_angle: float) -> GearPair:
 class Slices:
     """Independent slices with crowned flanks, each as soft as its share of a spur pair: forces without any table."""
 
-    def __init__(self, system, helix_angle: float, n_slices: int = 24, crowning: float = 8e-6) -> None:
+    def __init__(
+        self, system, helix_angle: float, n_slices: int = 24, crowning: float = 8e-6
+    ) -> None:
         self.pair, self.force = helical_pair(system.pair, helix_angle), system.mesh_force
         self.spur = loaded_pair_table(self.pair, system.material, system.mesh, force=self.force)
         across = (np.arange(n_slices) + 0.5) / n_slices
         self.lag = across * self.pair.face_width * math.tan(self.pair.base_helix_angle)
-        self.crowned, self.shared = crowning * (2.0 * across - 1.0) ** 2, self.spur.shared_compliance
+        self.crowned, self.shared = (
+            crowning * (2.0 * across - 1.0) ** 2,
+            self.spur.shared_compliance,
+        )
         own = self.spur.pinion.compliance[0] + self.spur.wheel.compliance[0] - self.shared
         self.own, self.gap = own * n_slices, self.spur.pinion.gap[0] + self.spur.wheel.gap[0]
 
@@ -72,7 +77,9 @@ class Slices:
     def table(self, depth) -> SlicedTable:
         """Chords between depths (chord,) m, the last of which goes on as from there to once and a half as deep."""
         per_pitch, pitch = self.spur.options.points_per_pitch, self.pair.base_pitch
-        position = pitch / per_pitch * np.arange(FIRST_PITCH * per_pitch, self.last_pitch * per_pitch + 1)
+        position = (
+            pitch / per_pitch * np.arange(FIRST_PITCH * per_pitch, self.last_pitch * per_pitch + 1)
+        )
         first = np.minimum(self.at(position)[1].min(axis=-1), FARTHEST)
         knots = np.append(depth, 1.5 * depth[-1] if len(depth) > 1 else 2e-5)
         forces = np.array([self.force_at(position, first + knot) for knot in knots])
@@ -107,5 +114,8 @@ def on_axial_supports(body: Body, stiffness_z=2e8, stiffness_tilt=1e5, damping_r
 def with_table(dynamics: PairDynamics, table: SlicedTable) -> PairDynamics:
     """The same machine on another table, its gears held along their axes."""
     return replace(
-        dynamics, table=table, pinion=on_axial_supports(dynamics.pinion), wheel=on_axial_supports(dynamics.wheel)
+        dynamics,
+        table=table,
+        pinion=on_axial_supports(dynamics.pinion),
+        wheel=on_axial_supports(dynamics.wheel),
     )

@@ -64,16 +64,38 @@ def examples(epilog: str | None) -> list[str]:
 def parsers() -> dict[str, argparse.ArgumentParser]:
     """The parser of every verb of both commands, by 'command verb'."""
     mine = {f"gensig {name}": gensig.cli.verb_parser(name) for name in VERBS}
-    return mine | {f"diagnose {name}": diagnose.cli.verb_parser(name) for name in diagnose.cli.VERBS}
+    return mine | {
+        f"diagnose {name}": diagnose.cli.verb_parser(name) for name in diagnose.cli.VERBS
+    }
 
 
 def page() -> str:
     """The whole page."""
-    lines = [HEAD + "| status | meaning |", "|---|---|", *(f"| {status} | {text} |" for status, text in EXITS.items())]
-    lines += ["", "Beside these, or in place of them:", "", "| command | status | meaning |", "|---|---|---|"]
-    for command, exits, names in (("gensig", gensig_exits, VERBS), ("diagnose", diagnose_exits, diagnose.cli.VERBS)):
-        lines += [f"| `{command} {name}` | {at} | {text} |" for name in names for at, text in exits(name).items()]
-    summaries = {"gensig": {name: verb.summary for name, verb in VERBS.items()}, "diagnose": diagnose.cli.VERBS}
+    lines = [
+        HEAD + "| status | meaning |",
+        "|---|---|",
+        *(f"| {status} | {text} |" for status, text in EXITS.items()),
+    ]
+    lines += [
+        "",
+        "Beside these, or in place of them:",
+        "",
+        "| command | status | meaning |",
+        "|---|---|---|",
+    ]
+    for command, exits, names in (
+        ("gensig", gensig_exits, VERBS),
+        ("diagnose", diagnose_exits, diagnose.cli.VERBS),
+    ):
+        lines += [
+            f"| `{command} {name}` | {at} | {text} |"
+            for name in names
+            for at, text in exits(name).items()
+        ]
+    summaries = {
+        "gensig": {name: verb.summary for name, verb in VERBS.items()},
+        "diagnose": diagnose.cli.VERBS,
+    }
     by_name = parsers()
     for command, verbs in summaries.items():
         lines += ["", f"## {command}"]

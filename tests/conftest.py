@@ -33,7 +33,11 @@ FIRST = (
 
 @pytest.hookimpl(trylast=True)
 def pytest_collection_modifyitems(items: list[pytest.Item]) -> None:
-    items.sort(key=lambda item: next((k for k, name in enumerate(FIRST) if item.nodeid.startswith(name)), len(FIRST)))
+    items.sort(
+        key=lambda item: next(
+            (k for k, name in enumerate(FIRST) if item.nodeid.startswith(name)), len(FIRST)
+        )
+    )
 
 
 @pytest.fixture(scope="session", autouse=True)
@@ -125,7 +129,9 @@ def dynamics_of() -> Callable[..., PairDynamics]:
 
     def make(system: SpurPair, faults=(), *, phase=0.3, **errors: Any) -> PairDynamics:
         counts = {"pinion": system.pair.pinion.n_teeth, "wheel": system.pair.wheel.n_teeth}
-        perfect = {f"{gear}_{key}": np.zeros(n) for gear, n in counts.items() for key in ("error", "tilt")}
+        perfect = {
+            f"{gear}_{key}": np.zeros(n) for gear, n in counts.items() for key in ("error", "tilt")
+        }
         return PairDynamics(
             table=system.mesh_table(faults),
             pinion=system.pinion,

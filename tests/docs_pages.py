@@ -36,9 +36,20 @@ def blocks(text: str) -> Iterator[Block]:
             while not FENCE.match(lines[place + 1]):
                 place += 1
             place += 1
-            yield Block(line=begin + 1, language=found[1], code="\n".join(lines[begin + 1 : place]), mark=mark)
-        elif line.startswith("    ") and not in_list and (not lines[place - 1].strip() or above.startswith("#")):
-            while place + 1 < len(lines) and (lines[place + 1].startswith("    ") or not lines[place + 1].strip()):
+            yield Block(
+                line=begin + 1,
+                language=found[1],
+                code="\n".join(lines[begin + 1 : place]),
+                mark=mark,
+            )
+        elif (
+            line.startswith("    ")
+            and not in_list
+            and (not lines[place - 1].strip() or above.startswith("#"))
+        ):
+            while place + 1 < len(lines) and (
+                lines[place + 1].startswith("    ") or not lines[place + 1].strip()
+            ):
                 place += 1
             code = "\n".join(text[4:] for text in lines[begin : place + 1])
             yield Block(line=begin + 1, language="", code=code, mark=mark)
@@ -68,7 +79,10 @@ def command_lines(text: str) -> Iterator[tuple[int, list[str]]]:
                 continue
             words = shlex.split(line, comments=True)
             while words:
-                end = next((k for k, word in enumerate(words) if word in ("&&", "||", "|", ">", "&")), len(words))
+                end = next(
+                    (k for k, word in enumerate(words) if word in ("&&", "||", "|", ">", "&")),
+                    len(words),
+                )
                 if words[0] in COMMANDS:
                     yield block.line, words[:end]
                 words = words[end + 1 :]
@@ -82,8 +96,13 @@ def anchors(text: str) -> set[str]:
         if FENCE.match(line):
             fenced = not fenced
         if heading := re.match(r"#{1,6} (.*)", line) if not fenced else None:
-            plain = re.sub(r"\[([^\]]*)\]\([^)]*\)", r"\1", heading[1]).replace("`", "").strip().lower()
+            plain = (
+                re.sub(r"\[([^\]]*)\]\([^)]*\)", r"\1", heading[1]).replace("`", "").strip().lower()
+            )
             slug = re.sub(r"[^\w\- ]", "", plain).replace(" ", "-")
-            n_before = sum(name == slug or re.fullmatch(rf"{re.escape(slug)}-\d+", name) is not None for name in found)
+            n_before = sum(
+                name == slug or re.fullmatch(rf"{re.escape(slug)}-\d+", name) is not None
+                for name in found
+            )
             found.add(f"{slug}-{n_before}" if n_before else slug)
     return found

@@ -16,10 +16,25 @@ CONFIGS = Path(__file__).resolve().parents[1] / "configs"
 TABLE = CONFIGS / "tables" / "engine_shafting.csv"
 OPTION = CONFIGS / "excitation" / "engine_v20.yaml"
 LOSS = {"shaft": 0.03, "rigid": 0.0, "coupling": 0.15, "gear_mesh": 0.08}
-DAMPER_STATES = {"as_printed": 1.0, "half_ring": 0.5, "detached": 1e-6}  # of the damper's outer inertia
+DAMPER_STATES = {
+    "as_printed": 1.0,
+    "half_ring": 0.5,
+    "detached": 1e-6,
+}  # of the damper's outer inertia
 RPM = np.pi / 30.0
 SPEED, TORQUE = 1688 * RPM, 12680.0
-SLOTS_OF_BANK_A = (0, 1, 4, 5, 8, 9, 12, 13, 16, 17)  # of 20, 36 degrees each; bank B fires two slots later
+SLOTS_OF_BANK_A = (
+    0,
+    1,
+    4,
+    5,
+    8,
+    9,
+    12,
+    13,
+    16,
+    17,
+)  # of 20, 36 degrees each; bank B fires two slots later
 IN_SEQUENCE = tuple(range(1, 11))
 
 
@@ -79,7 +94,9 @@ def with_throws(values, throws_of_bank_a):
     """The engine with the throws of bank A firing in another order, bank B 72 degrees later."""
     values = copy.deepcopy(values)
     slot = dict(zip(throws_of_bank_a, SLOTS_OF_BANK_A, strict=True))
-    fires = {slot[throw]: f"A{throw}" for throw in slot} | {(slot[throw] + 2) % 20: f"B{throw}" for throw in slot}
+    fires = {slot[throw]: f"A{throw}" for throw in slot} | {
+        (slot[throw] + 2) % 20: f"B{throw}" for throw in slot
+    }
     values["layout"]["throw_angles_deg"] = [36 * slot[throw] % 360 for throw in sorted(slot)]
     values["layout"]["firing_order"] = [fires[place] for place in range(20)]
     return values

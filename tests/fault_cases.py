@@ -41,16 +41,30 @@ class Case:
         return one(self.kind, gear=gear, tooth=tooth, **{**self.fixed, self.key: value})
 
 
-def case(kind: str, key: str, *rising: Any, nothing: Any = 0.0, grows: bool = True, slack: float = 1e-9, **fixed: Any):
-    return Case(kind=kind, key=key, nothing=nothing, rising=rising, fixed=fixed, grows=grows, slack=slack)
+def case(
+    kind: str,
+    key: str,
+    *rising: Any,
+    nothing: Any = 0.0,
+    grows: bool = True,
+    slack: float = 1e-9,
+    **fixed: Any,
+):
+    return Case(
+        kind=kind, key=key, nothing=nothing, rising=rising, fixed=fixed, grows=grows, slack=slack
+    )
 
 
 CASES = {
     "crack_depth": case("crack", "crack_depth_mm", 0.3, 1.0, 2.0, 2.5),
     "crack_gamma": case("crack", "crack_depth_mm", 0.3, 1.0, 2.0, 2.5, crack_start="gamma_mid"),
     "crack_width": case("crack", "crack_width_mm", 2.0, 7.0, 15.0, FULL, crack_depth_mm=2.0),
-    "crack_front": case("crack", "crack_width_mm", 5.0, 15.0, FULL, crack_depth_mm=2.0, crack_front="parabolic"),
-    "crack_compression": case("crack", "crack_depth_mm", 0.3, 1.0, 2.0, 2.5, crack_side="compression"),
+    "crack_front": case(
+        "crack", "crack_width_mm", 5.0, 15.0, FULL, crack_depth_mm=2.0, crack_front="parabolic"
+    ),
+    "crack_compression": case(
+        "crack", "crack_depth_mm", 0.3, 1.0, 2.0, 2.5, crack_side="compression"
+    ),
     "pit_width": case("pitting", "pit_width_mm", 1, 4, 12, 19, FULL),
     "pit_length": case("pitting", "pit_length_mm", 0.2, 0.5, 1.0, 1.5),
     "pit_depth": case("pitting", "pit_depth_mm", 0.01, 0.1, 0.5),
@@ -68,9 +82,13 @@ CASES = {
     "misalignment": case("misalignment", "misalignment_um", 1, 15, 60),
     "misalignment_other_end": case("misalignment", "misalignment_um", -1, -15, -60),
     "tip_relief": case("tip_relief", "relief_um", 1, 15, 50),
-    "tip_relief_parabolic": case("tip_relief", "relief_um", 1, 15, 50, relief_length_mm=8.0, relief_curve="parabolic"),
+    "tip_relief_parabolic": case(
+        "tip_relief", "relief_um", 1, 15, 50, relief_length_mm=8.0, relief_curve="parabolic"
+    ),
     "profile_form": case("profile_error", "profile_form_um", 5, 20, 50, profile_slope_um=0.0),
-    "profile_slope": case("profile_error", "profile_slope_um", 5, 20, 50, profile_form_um=0.0, grows=False),
+    "profile_slope": case(
+        "profile_error", "profile_slope_um", 5, 20, 50, profile_form_um=0.0, grows=False
+    ),
     "pitch_error": case("pitch_error", "pitch_error_um", 1, 20, 50),
     "pitch_error_proud": case("pitch_error", "pitch_error_um", -1, -20, -50, grows=False),
     "runout": case("runout", "eccentricity_um", 5, 40, 80),
@@ -82,7 +100,9 @@ KINDS = tuple(FAULTS)
 @cache
 def option(kind: str) -> Mapping[str, Any]:
     """The fault option of that name as its file has it, without what it varies."""
-    values = yaml.safe_load((files("gensig.configs") / "fault" / f"{kind}.yaml").read_text(encoding="utf-8"))
+    values = yaml.safe_load(
+        (files("gensig.configs") / "fault" / f"{kind}.yaml").read_text(encoding="utf-8")
+    )
     return {key: value for key, value in values.items() if key != "vary"}
 
 
@@ -109,7 +129,9 @@ def deflection(system: SpurPair, *faults: Fault, tooth: int = 0) -> np.ndarray:
     """
     gear = faults[0].gear if faults else "pinion"
     table = heavy_table(system, *faults)
-    side, mate = (side_of(table, name) for name in (gear, "wheel" if gear == "pinion" else "pinion"))
+    side, mate = (
+        side_of(table, name) for name in (gear, "wheel" if gear == "pinion" else "pinion")
+    )
     row = side.kind[tooth]
     if not side.present[row]:
         return np.full(np.count_nonzero(on_path(table)), np.inf)

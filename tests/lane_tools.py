@@ -29,7 +29,9 @@ def group_laws(group: Group, motions: np.ndarray) -> np.ndarray:
     """The same for a group: instant k is asked of lane k % LANES."""
     motions = np.atleast_2d(np.asarray(motions, dtype=np.float64))
     n = len(motions)
-    padded = np.concatenate([motions, np.repeat(motions[-1:], -n % LANES, axis=0)]).reshape(-1, LANES, 4)
+    padded = np.concatenate([motions, np.repeat(motions[-1:], -n % LANES, axis=0)]).reshape(
+        -1, LANES, 4
+    )
     found = np.empty((len(padded), N_LAW, LANES))
     scratch = _kernels.scratch(len(group.force) // LANES, 0)
     for some, law in zip(padded, found, strict=True):
@@ -65,7 +67,9 @@ def advance(
 
 def _advance(group, q, v, step, first_step, n_steps, channels=()):
     index = np.array(channels, dtype=np.int64)
-    state = np.repeat(np.array([q - group.rest[:, 0], v], dtype=np.float64)[:, :, None], LANES, axis=2)
+    state = np.repeat(
+        np.array([q - group.rest[:, 0], v], dtype=np.float64)[:, :, None], LANES, axis=2
+    )
     means = np.empty((n_steps, len(index), LANES))
     work, wide, near = _kernels.scratch(len(q), len(index))
     _kernels.integrate(
@@ -73,7 +77,11 @@ def _advance(group, q, v, step, first_step, n_steps, channels=()):
         np.empty(0), -1, 1, np.empty(0), work, wide, near,
     )  # fmt: skip
     center = wide.reshape(-1, LANES)[CENTER, 0] * group.rotation.reshape(-1, LANES)[:, 0]
-    return state[0, :, 0] + group.rest[:, 0] + center, state[1, :, 0].copy(), means[:, :, 0].T.copy()
+    return (
+        state[0, :, 0] + group.rest[:, 0] + center,
+        state[1, :, 0].copy(),
+        means[:, :, 0].T.copy(),
+    )
 
 
 def trajectory(
@@ -87,10 +95,13 @@ def trajectory(
     return tuple(np.array(part) for part in zip(*states, strict=True))
 
 
-def right_hand_side(dynamics: PairDynamics, time: float, q: np.ndarray, v: np.ndarray) -> np.ndarray:
+def right_hand_side(
+    dynamics: PairDynamics, time: float, q: np.ndarray, v: np.ndarray
+) -> np.ndarray:
     """q'' at one instant, (dof,): the mean accelerations over two brief steps, led back to their begin."""
     channels = tuple(range(len(dynamics.dofs)))
     short, long = (
-        advance(dynamics, q, v, step, round(time / step), 1, channels)[2][:, 0] for step in (BRIEF, 2 * BRIEF)
+        advance(dynamics, q, v, step, round(time / step), 1, channels)[2][:, 0]
+        for step in (BRIEF, 2 * BRIEF)
     )
     return 2 * short - long

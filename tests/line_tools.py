@@ -18,7 +18,11 @@ STIFFNESS = 3e8  # N/m
 
 
 def two_gears(
-    *, stiffness: np.ndarray | None = None, damping: float = 0.0, drive: tuple[float, float] | None = None, **mesh
+    *,
+    stiffness: np.ndarray | None = None,
+    damping: float = 0.0,
+    drive: tuple[float, float] | None = None,
+    **mesh,
 ) -> GearedLine:
     """Two inertias and one mesh between them; ``drive`` is a spring and a damper of the first to the nominal angle."""
     table = np.full((1, 8), STIFFNESS) if stiffness is None else stiffness
@@ -26,7 +30,15 @@ def two_gears(
     held, damped = np.zeros((2, 2, 2))
     if drive is not None:
         held[0, 0], damped[0, 0] = drive
-    one = phase_mesh("pair", direction=direction, roll_dof=0, n_teeth=TEETH, stiffness=table, damping=damping, **mesh)
+    one = phase_mesh(
+        "pair",
+        direction=direction,
+        roll_dof=0,
+        n_teeth=TEETH,
+        stiffness=table,
+        damping=damping,
+        **mesh,
+    )
     return GearedLine(
         names=("first", "second"),
         mass=np.diag(INERTIAS),
@@ -68,7 +80,9 @@ def state_after(
     course: LineCourse | None = None,
 ) -> tuple[np.ndarray, np.ndarray, LineMotion]:
     """q and v (dof,) after ``n_steps`` steps from time 0, and what the run tells of itself."""
-    solver = LineSolver(sampling_rate=0.5 * n_steps / duration, oversampling=2, max_energy_residual=1e-3)
+    solver = LineSolver(
+        sampling_rate=0.5 * n_steps / duration, oversampling=2, max_energy_residual=1e-3
+    )
     run = _Run(line, course or constant_speed(0.0), torques or [], solver, start, [])
     run.begin(0)
     run.skip(n_steps)
@@ -76,7 +90,9 @@ def state_after(
     return *told.end, told
 
 
-def law_at(mesh: LineMesh, turned: float, approach: float, rate: float = 0.0, roll_rate: float = 0.0) -> np.ndarray:
+def law_at(
+    mesh: LineMesh, turned: float, approach: float, rate: float = 0.0, roll_rate: float = 0.0
+) -> np.ndarray:
     """What a mesh does, (N_LAW,), when it has rolled so many pitches beyond its start phase."""
     n = len(mesh.direction)
     line = GearedLine(
@@ -100,7 +116,9 @@ class _Unchecked:
 
 
 def steps(sampling_rate: float, oversampling: int) -> LineSolver:
-    return LineSolver(sampling_rate=sampling_rate, oversampling=oversampling, max_energy_residual=1e-3)
+    return LineSolver(
+        sampling_rate=sampling_rate, oversampling=oversampling, max_energy_residual=1e-3
+    )
 
 
 def order_of(errors: list[float], ratio: float = 2.0) -> float:

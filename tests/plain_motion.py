@@ -12,7 +12,9 @@ from gensig.dynamics.pair import PairDynamics
 
 Slope = Callable[[float, np.ndarray], np.ndarray]
 
-LIKELY = np.repeat([1e-6, 1e-2], 6) * np.tile([1, 1, 20, 1, 1, 20], 2)  # m, rad, m/s, rad/s: usual sizes
+LIKELY = np.repeat([1e-6, 1e-2], 6) * np.tile(
+    [1, 1, 20, 1, 1, 20], 2
+)  # m, rad, m/s, rad/s: usual sizes
 
 
 def equations(dynamics: PairDynamics) -> tuple[Slope, np.ndarray]:
@@ -30,7 +32,10 @@ def equations(dynamics: PairDynamics) -> tuple[Slope, np.ndarray]:
     felt[[6, 9], 1] = 1, -1
     felt[[8, 11, 8], [2, 3, 4]] = 1, 1, radius
     felt[6:] /= system.mass[:, None]
-    start, rate = np.array([dynamics.start_roll, 0, 0, radius * speed]), np.array([radius * speed, 0, 0, 0])
+    start, rate = (
+        np.array([dynamics.start_roll, 0, 0, radius * speed]),
+        np.array([radius * speed, 0, 0, 0]),
+    )
 
     def slope(t, y):
         return free @ y + pushed + felt @ law(*(start + rate * t + seen @ y))[:5]
@@ -38,7 +43,9 @@ def equations(dynamics: PairDynamics) -> tuple[Slope, np.ndarray]:
     return slope, free
 
 
-def solved(slope: Slope, start: np.ndarray, times: np.ndarray, method: str, rtol: float) -> np.ndarray:
+def solved(
+    slope: Slope, start: np.ndarray, times: np.ndarray, method: str, rtol: float
+) -> np.ndarray:
     """States at some times, (time, state); ``start`` is the state at the first."""
     span = times[0], times[-1]
     solution = solve_ivp(

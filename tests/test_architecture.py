@@ -30,7 +30,11 @@ def run(*command: str, folder: Path = ROOT) -> subprocess.CompletedProcess[str]:
 )
 def test_house_rule(command: tuple[str, ...]) -> None:
     if command[0] == "importlinter.cli":
-        result = run(sys.executable, "-c", "from importlinter.cli import lint_imports_command as main; main()")
+        result = run(
+            sys.executable,
+            "-c",
+            "from importlinter.cli import lint_imports_command as main; main()",
+        )
     else:
         result = run(sys.executable, "-m", *command)
     assert result.returncode == 0, result.stdout + result.stderr
@@ -44,7 +48,10 @@ def test_house_rule(command: tuple[str, ...]) -> None:
         ("import gensig.production.folder", ("torch", "sklearn", "hydra", "matplotlib")),
         ("import gensig.production.streaming", ("torch", "sklearn", "hydra", "matplotlib")),
         # half a second each, which the first record of a session would wait for
-        ("import gensig.record.simulate", ("scipy.signal", "scipy.optimize", "scipy.stats", "scipy.interpolate")),
+        (
+            "import gensig.record.simulate",
+            ("scipy.signal", "scipy.optimize", "scipy.stats", "scipy.interpolate"),
+        ),
         ("import diagnose.data", ("numba", "gensig.systems", "gensig.mesh")),
     ],
 )
@@ -112,7 +119,12 @@ def folder_imports(graph: grimp.ImportGraph, package: str, imported: str) -> dic
     for module in sorted(graph.modules):
         for other in graph.find_modules_directly_imported_by(module):
             source, target = module.split("."), other.split(".")
-            if source[0] == package and target[0] == imported and len(source) > 1 and len(target) > 1:
+            if (
+                source[0] == package
+                and target[0] == imported
+                and len(source) > 1
+                and len(target) > 1
+            ):
                 arrows.setdefault(source[1], set()).add(target[1])
     return arrows
 
@@ -130,23 +142,35 @@ def test_diagnose_imports_no_physics(graph) -> None:
 
 def test_hydra_is_imported_by_the_options_alone(graph) -> None:
     source = re.compile(r"^\s*(?:from|import) (?:hydra|omegaconf)\b", re.MULTILINE)
-    files = {path.relative_to(ROOT).parent.as_posix() for path in python_files() if source.search(path.read_text())}
+    files = {
+        path.relative_to(ROOT).parent.as_posix()
+        for path in python_files()
+        if source.search(path.read_text())
+    }
     assert files == {"gensig/options"}
 
 
 def test_no_import_runs_in_a_circle(graph) -> None:
     arrows = {module: graph.find_modules_directly_imported_by(module) for module in graph.modules}
-    assert len(list(TopologicalSorter(arrows).static_order())) == len(graph.modules)  # raises for a circle
+    assert len(list(TopologicalSorter(arrows).static_order())) == len(
+        graph.modules
+    )  # raises for a circle
 
 
 def python_files() -> list[Path]:
-    return [path for folder in ("gensig", "diagnose") for path in sorted((ROOT / folder).rglob("*.py"))]
+    return [
+        path for folder in ("gensig", "diagnose") for path in sorted((ROOT / folder).rglob("*.py"))
+    ]
 
 
 def test_no_file_is_too_long_to_hold() -> None:
     files = python_files()
     assert len(files) > 40
-    long = {str(path.relative_to(ROOT)): n for path in files if (n := len(path.read_text().splitlines())) > 500}
+    long = {
+        str(path.relative_to(ROOT)): n
+        for path in files
+        if (n := len(path.read_text().splitlines())) > 500
+    }
     assert not long
 
 
@@ -183,5 +207,7 @@ def test_imports_of_0_9_keep_working(statement: str) -> None:
 
 
 def test_a_moved_module_is_the_same_object() -> None:
-    code = "import diagnose.metrics, diagnose.scoring.metrics as new; assert diagnose.metrics is new"
+    code = (
+        "import diagnose.metrics, diagnose.scoring.metrics as new; assert diagnose.metrics is new"
+    )
     assert run(sys.executable, "-c", code).returncode == 0

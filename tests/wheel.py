@@ -18,11 +18,21 @@ from collections.abc import Mapping, Sequence
 from pathlib import Path
 
 ROOT = Path(__file__).resolve().parents[1]
-PACKAGES = {"gensig": "gensig", "diagnose": "diagnose", "configs": "gensig/configs"}  # folder here -> folder installed
+PACKAGES = {
+    "gensig": "gensig",
+    "diagnose": "diagnose",
+    "configs": "gensig/configs",
+}  # folder here -> folder installed
 # they look at the tree, which the house rules judge and from which the wheel is made
-OF_THE_TREE = ("tests/test_architecture.py", "tests/pipeline/test_packaging.py", "tests/unit/docs/test_docs_pages.py")
+OF_THE_TREE = (
+    "tests/test_architecture.py",
+    "tests/pipeline/test_packaging.py",
+    "tests/unit/docs/test_docs_pages.py",
+)
 # gensig is that of the wheel, and the cache of Numba lies beside its files, wherever those of this run lie
-ENVIRONMENT = {key: value for key, value in os.environ.items() if key not in ("PYTHONPATH", "NUMBA_CACHE_DIR")}
+ENVIRONMENT = {
+    key: value for key, value in os.environ.items() if key not in ("PYTHONPATH", "NUMBA_CACHE_DIR")
+}
 BACKEND = "import sys; from setuptools import build_meta; print(getattr(build_meta, sys.argv[1])(sys.argv[2]))"
 
 
@@ -30,7 +40,9 @@ def files_of_the_tree() -> list[str]:
     """What belongs to the project, relative to its root: by git, or by the list that a source distribution carries."""
     if (ROOT / ".git").exists():
         command = ["git", "ls-files", "--cached", "--others", "--exclude-standard"]
-        names = subprocess.run(command, cwd=ROOT, capture_output=True, text=True, check=True).stdout.split("\n")
+        names = subprocess.run(
+            command, cwd=ROOT, capture_output=True, text=True, check=True
+        ).stdout.split("\n")
     else:
         names = (ROOT / "gensig.egg-info" / "SOURCES.txt").read_text(encoding="utf-8").split("\n")
         names = [name for name in names if not name.startswith("gensig.egg-info")]
@@ -71,10 +83,22 @@ def environment_with(wheel: Path, folder: Path) -> Path:
     """Interpreter of a fresh environment: the wheel, and everything else from this environment."""
     venv.create(folder / "env")
     python = folder / "env" / "bin" / "python"
-    command = [sys.executable, "-m", "pip", "--python", str(python), "install", "--quiet", "--no-deps", "--no-compile"]
+    command = [
+        sys.executable,
+        "-m",
+        "pip",
+        "--python",
+        str(python),
+        "install",
+        "--quiet",
+        "--no-deps",
+        "--no-compile",
+    ]
     subprocess.run([*command, str(wheel)], check=True, capture_output=True)
     # a path line appends the folder without reading its own .pth files, so the editable gensig there stays unseen
-    (site_packages(python) / "test_environment.pth").write_text(sysconfig.get_paths()["purelib"] + "\n")
+    (site_packages(python) / "test_environment.pth").write_text(
+        sysconfig.get_paths()["purelib"] + "\n"
+    )
     return python
 
 
@@ -86,7 +110,9 @@ def lend_compiled(python: Path) -> None:
     for part, one in (("dynamics", integrate), ("mesh", lower_envelope)):
         package = site_packages(python) / "gensig" / part
         for source in (ROOT / "gensig" / part).glob("*.py"):
-            shutil.copystat(source, package / source.name)  # the cache knows a file by its time and size
+            shutil.copystat(
+                source, package / source.name
+            )  # the cache knows a file by its time and size
         (package / "__pycache__").mkdir(exist_ok=True)
         for compiled in Path(one.stats.cache_path).glob("*.nb[ci]"):
             shutil.copy(compiled, package / "__pycache__")
@@ -95,7 +121,11 @@ def lend_compiled(python: Path) -> None:
 def site_packages(python: Path) -> Path:
     """Where an interpreter's environment has its packages."""
     code = "import sysconfig; print(sysconfig.get_paths()['purelib'])"
-    return Path(subprocess.run([python, "-c", code], capture_output=True, text=True, check=True).stdout.strip())
+    return Path(
+        subprocess.run(
+            [python, "-c", code], capture_output=True, text=True, check=True
+        ).stdout.strip()
+    )
 
 
 def take_packages_out(source: Path, python: Path) -> None:
@@ -105,15 +135,21 @@ def take_packages_out(source: Path, python: Path) -> None:
     (source / "configs").symlink_to(site_packages(python) / PACKAGES["configs"])
 
 
-def run_tests(source: Path, python: Path, arguments: Sequence[str], environment: Mapping[str, str]) -> int:
+def run_tests(
+    source: Path, python: Path, arguments: Sequence[str], environment: Mapping[str, str]
+) -> int:
     """Exit status of pytest in a source distribution without packages."""
     code = "import gensig, diagnose; print(gensig.__file__, diagnose.__file__)"
     command = [python, "-c", code]
-    paths = subprocess.run(command, cwd=source, env=environment, capture_output=True, text=True, check=True).stdout
+    paths = subprocess.run(
+        command, cwd=source, env=environment, capture_output=True, text=True, check=True
+    ).stdout
     if not all(path.startswith(str(site_packages(python))) for path in paths.split()):
         raise RuntimeError(f"these are not the packages of the wheel: {paths}")
     ignored = [f"--ignore={name}" for name in OF_THE_TREE]
-    return subprocess.run([python, "-m", "pytest", *ignored, *arguments], cwd=source, env=environment).returncode
+    return subprocess.run(
+        [python, "-m", "pytest", *ignored, *arguments], cwd=source, env=environment
+    ).returncode
 
 
 def main(arguments: Sequence[str]) -> int:

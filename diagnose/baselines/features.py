@@ -42,11 +42,17 @@ INDICATORS = (
 )
 FURTHER = (
     "spectral_kurtosis",
-    *(f"{name}_{gear}" for gear in GEARS for name in ("fm0", "m6a", "m8a", "energy_ratio", "na4", "nb4")),
+    *(
+        f"{name}_{gear}"
+        for gear in GEARS
+        for name in ("fm0", "m6a", "m8a", "energy_ratio", "na4", "nb4")
+    ),
 )
 FEATURES = {"basic": INDICATORS, "all": INDICATORS + FURTHER}
 BURST_WINDOW = 0.005  # s, assumed: shorter than a turn, longer than a gearbox mode rings
-Cache = dict[tuple[tuple[str, ...], int, int, int], FloatArray]  # channels, record, first and last sample
+Cache = dict[
+    tuple[tuple[str, ...], int, int, int], FloatArray
+]  # channels, record, first and last sample
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -90,7 +96,9 @@ def indicators(
     averages = {gear: np.full((x.shape[0], 1), np.nan) for gear in GEARS}
     for gear in GEARS:
         try:
-            average = time_synchronous_average(x, sampling_rate, rotation_frequency[gear], min_turns=min_turns)
+            average = time_synchronous_average(
+                x, sampling_rate, rotation_frequency[gear], min_turns=min_turns
+            )
             averages[gear] = average
             columns += [fm4(average, n_teeth[gear]), sideband_ratio(average, n_teeth[gear])]
         except ValueError:
@@ -102,7 +110,10 @@ def indicators(
 
 
 def _further(
-    x: FloatArray, sampling_rate: float, averages: Mapping[str, FloatArray], n_teeth: Mapping[str, int]
+    x: FloatArray,
+    sampling_rate: float,
+    averages: Mapping[str, FloatArray],
+    n_teeth: Mapping[str, int],
 ) -> list[FloatArray]:
     """Columns of `FURTHER`, (channel,) each."""
     columns = [_or_unknown(_bursts, x, sampling_rate)]
@@ -110,7 +121,9 @@ def _further(
         for indicator in (fm0, m6a, m8a, energy_ratio):
             columns.append(_or_unknown(indicator, averages[gear], n_teeth[gear]))
         for of_history in (na4, nb4):
-            columns.append(_or_unknown(of_history, averages[gear][:, None], n_teeth[gear]).reshape(-1))
+            columns.append(
+                _or_unknown(of_history, averages[gear][:, None], n_teeth[gear]).reshape(-1)
+            )
     return columns
 
 
@@ -119,7 +132,9 @@ def _bursts(x: FloatArray, sampling_rate: float) -> FloatArray:
     return spectral_kurtosis(x, sampling_rate, round(BURST_WINDOW * sampling_rate))[1].max(axis=-1)
 
 
-def _or_unknown(indicator: Callable[..., FloatArray], signal: FloatArray, *values: float) -> FloatArray:
+def _or_unknown(
+    indicator: Callable[..., FloatArray], signal: FloatArray, *values: float
+) -> FloatArray:
     """The indicator, NaN where the signal is too short for it."""
     try:
         return indicator(signal, *values)
@@ -128,7 +143,12 @@ def _or_unknown(indicator: Callable[..., FloatArray], signal: FloatArray, *value
 
 
 def feature_table(
-    task: Task, segments: Segments, *, features: str = "basic", cache: Cache | None = None, n_threads: int = 1
+    task: Task,
+    segments: Segments,
+    *,
+    features: str = "basic",
+    cache: Cache | None = None,
+    n_threads: int = 1,
 ) -> FeatureTable:
     """Indicators of every stretch, one column per channel and indicator.
 
@@ -141,11 +161,15 @@ def feature_table(
     """
     known: Cache = {} if cache is None else cache
     speed, n_teeth = known_rotation(task)
-    keys = list(zip(segments.record.tolist(), segments.start.tolist(), segments.stop.tolist(), strict=True))
+    keys = list(
+        zip(segments.record.tolist(), segments.start.tolist(), segments.stop.tolist(), strict=True)
+    )
 
     def compute(key: tuple[int, int, int]) -> FloatArray:
         frequency = {gear: values[key[0]] for gear, values in speed.items()}
-        return indicators(signals[key], task.dataset.sampling_rate, frequency, n_teeth, features=features).ravel()
+        return indicators(
+            signals[key], task.dataset.sampling_rate, frequency, n_teeth, features=features
+        ).ravel()
 
     missing = [key for key in keys if (task.channel_names, *key) not in known]
     with ThreadPoolExecutor(max_workers=n_threads) as pool:
@@ -156,7 +180,9 @@ def feature_table(
             known.update(zip(names, pool.map(compute, block), strict=True))
     return FeatureTable(
         values=np.stack([known[(task.channel_names, *key)] for key in keys]),
-        names=tuple(f"{channel}/{name}" for channel in task.channel_names for name in FEATURES[features]),
+        names=tuple(
+            f"{channel}/{name}" for channel in task.channel_names for name in FEATURES[features]
+        ),
         label=task.labels()[segments.record],
         record=segments.record,
     )
@@ -173,4 +199,6 @@ def _n_teeth(attributes: Mapping[str, Any], gear: str) -> int:
     try:
         return int(attributes[f"n_teeth_{gear}"])
     except KeyError:
-        raise DatasetError(f"the data set does not say n_teeth_{gear}; indicators need it (baselines=false)") from None
+        raise DatasetError(
+            f"the data set does not say n_teeth_{gear}; indicators need it (baselines=false)"
+        ) from None

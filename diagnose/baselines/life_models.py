@@ -34,11 +34,15 @@ def operating_names(task: Task) -> tuple[str, ...]:
 
 def operating_values(task: Task, record: IntArray) -> FloatArray:
     """(record, column) of `OPERATING`."""
-    columns = [np.asarray(task.dataset.column(name), dtype=float)[record] for name in operating_names(task)]
+    columns = [
+        np.asarray(task.dataset.column(name), dtype=float)[record] for name in operating_names(task)
+    ]
     return np.stack(columns, axis=1) if columns else np.zeros((record.size, 0))
 
 
-def indicator_table(task: Task, lives: Lives, segments: Segments, *, features: str, cache: Cache) -> Table:
+def indicator_table(
+    task: Task, lives: Lives, segments: Segments, *, features: str, cache: Cache
+) -> Table:
     """Indicators of each snapshot, their change since the first snapshot of the life, and the operating condition.
 
     A machine is watched from its first day, and machines differ: the change tells more than the level. The first
@@ -52,7 +56,9 @@ def indicator_table(task: Task, lives: Lives, segments: Segments, *, features: s
         first[mine] = mine[np.argmin(age[mine])]
     change = table.values - table.values[first]
     operating = operating_values(task, segments.record)
-    return Table(values=np.concatenate([table.values, change, operating], axis=1), record=segments.record)
+    return Table(
+        values=np.concatenate([table.values, change, operating], axis=1), record=segments.record
+    )
 
 
 def age_table(lives: Lives, segments: Segments) -> Table:
@@ -88,13 +94,17 @@ def fit_regression(
     -------
     what was chosen, and a function that gives (record,) targets of a table
     """
-    known = np.flatnonzero(np.isfinite(train.values).any(axis=0))  # the boosting's bins need a value
+    known = np.flatnonzero(
+        np.isfinite(train.values).any(axis=0)
+    )  # the boosting's bins need a value
     weight, held_out = (balanced_weights(lives.name[table.record]) for table in (train, validation))
     scored = []
     for name, make in _candidates().items():
         model = make()
         step = {} if name == "gradient boosting" else {"model__sample_weight": weight}
-        model.fit(train.values[:, known], target[train.record], **(step or {"sample_weight": weight}))
+        model.fit(
+            train.values[:, known], target[train.record], **(step or {"sample_weight": weight})
+        )
         error = model.predict(validation.values[:, known]) - target[validation.record]
         scored.append((float(np.average(error**2, weights=held_out)), name, model))
     _, name, best = min(scored, key=lambda row: row[0])
@@ -118,7 +128,9 @@ def _candidates() -> dict[str, Callable[[], Any]]:
         return Pipeline([*steps, ("model", Ridge(alpha=penalty))])
 
     def boosting() -> Any:
-        return HistGradientBoostingRegressor(max_iter=100, max_leaf_nodes=8, learning_rate=0.1, random_state=0)
+        return HistGradientBoostingRegressor(
+            max_iter=100, max_leaf_nodes=8, learning_rate=0.1, random_state=0
+        )
 
     ridges: dict[str, Callable[[], Any]] = {
         f"ridge, penalty {penalty:g}": lambda penalty=penalty: ridge(penalty)  # type: ignore[misc]

@@ -78,10 +78,16 @@ def fit_minirocket(windows: FloatArray, *, n_features: int, rng: np.random.Gener
         weight = _kernels_on_channels(n_channels, rng)
         example = torch.from_numpy(windows[rng.integers(n_windows, size=len(KERNELS))])
         output = torch.nn.functional.conv1d(
-            example.reshape(1, -1, n_samples), weight, dilation=dilation, padding=4 * dilation, groups=len(KERNELS)
+            example.reshape(1, -1, n_samples),
+            weight,
+            dilation=dilation,
+            padding=4 * dilation,
+            groups=len(KERNELS),
         )[0]
         share = quantile[used : used + len(KERNELS) * count].reshape(len(KERNELS), count)
-        bias = np.stack([np.quantile(row, part) for row, part in zip(output.numpy(), share, strict=True)])
+        bias = np.stack(
+            [np.quantile(row, part) for row, part in zip(output.numpy(), share, strict=True)]
+        )
         banks.append(
             Bank(
                 dilation=dilation,
@@ -102,7 +108,9 @@ def minirocket_features(windows: FloatArray, banks: list[Bank]) -> FloatArray:
     import torch
 
     blocks = torch.from_numpy(windows).split(2)
-    return np.concatenate([np.concatenate([_shares(block, bank) for bank in banks], axis=1) for block in blocks])
+    return np.concatenate(
+        [np.concatenate([_shares(block, bank) for bank in banks], axis=1) for block in blocks]
+    )
 
 
 def _shares(windows: torch.Tensor, bank: Bank) -> FloatArray:

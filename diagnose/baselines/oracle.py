@@ -27,7 +27,9 @@ def has_twin(dataset: Dataset) -> bool:
     return TWIN in getattr(dataset, "signal_names", ())
 
 
-def oracle_windows(task: Task, segments: Segments, inputs: NetworkInput, *, training: bool = False) -> WindowSet:
+def oracle_windows(
+    task: Task, segments: Segments, inputs: NetworkInput, *, training: bool = False
+) -> WindowSet:
     """Inputs of a network (2 x channel, sample): the record, then the record less its twin, both by the same divisor.
 
     Under ``normalise=rms`` that is the twin's RMS over the stretch, channel by channel. Record and difference say what
@@ -38,7 +40,9 @@ def oracle_windows(task: Task, segments: Segments, inputs: NetworkInput, *, trai
 
 
 def _record_and_difference(task: Task, record: int, start: int, stop: int) -> NDArray[np.float32]:
-    signal, twin = (read_signal(task, record, start, stop, name=name) for name in ("acceleration", TWIN))
+    signal, twin = (
+        read_signal(task, record, start, stop, name=name) for name in ("acceleration", TWIN)
+    )
     both = np.concatenate([signal, signal - twin])
     if task.normalise == "none":
         return both
@@ -72,8 +76,12 @@ def oracle_table(task: Task, segments: Segments, cache: Cache) -> FeatureTable:
         faulty, sound, rest = (band_levels(part) for part in three)
         cache[key] = np.concatenate([*columns, rest, faulty - sound], axis=1).ravel()
     n_bands = cache[keys[0]].size // len(task.channel_names) - 3 * len(INDICATORS)
-    of_channel = [f"{part}/{name}" for part in ("record", "twin", "difference") for name in INDICATORS]
-    of_channel += [f"{part}/band_{band}" for part in ("difference", "ratio") for band in range(n_bands // 2)]
+    of_channel = [
+        f"{part}/{name}" for part in ("record", "twin", "difference") for name in INDICATORS
+    ]
+    of_channel += [
+        f"{part}/band_{band}" for part in ("difference", "ratio") for band in range(n_bands // 2)
+    ]
     return FeatureTable(
         values=np.stack([cache[key] for key in keys]),
         names=tuple(f"{channel}/{name}" for channel in task.channel_names for name in of_channel),

@@ -52,7 +52,9 @@ def _is_probed(name: str, results: bool) -> bool:
     return results or role != "result" or name in READ_OFF
 
 
-def probe_values(dataset: Dataset, n_classes: int, *, results: bool) -> tuple[FloatArray, tuple[str, ...]]:
+def probe_values(
+    dataset: Dataset, n_classes: int, *, results: bool
+) -> tuple[FloatArray, tuple[str, ...]]:
     """Values (record, feature) of all records and their names: columns, text as numbers, and the place in the file.
 
     All records are of one length, so that length tells nothing.
@@ -65,7 +67,9 @@ def probe_values(dataset: Dataset, n_classes: int, *, results: bool) -> tuple[Fl
         values = np.asarray(dataset.column(name))
         numbers = np.unique(values, return_inverse=True)[1] if values.dtype.kind in "US" else values
         rows = numbers.reshape(dataset.n_records, -1)
-        parts |= {name if rows.shape[1] == 1 else f"{name}/{k}": rows[:, k] for k in range(rows.shape[1])}
+        parts |= {
+            name if rows.shape[1] == 1 else f"{name}/{k}": rows[:, k] for k in range(rows.shape[1])
+        }
     return np.stack([part.astype(float) for part in parts.values()], axis=1), tuple(parts)
 
 

@@ -44,16 +44,21 @@ def references(task: Task) -> IntArray:
     ConfigError    for a data set that does not tell its units and the places of its teeth
     """
     if missing := [name for name in NEEDED if name not in task.dataset.column_names]:
-        raise ConfigError(f"baseline reference: the data set does not say {missing[0]}; leave that baseline out")
+        raise ConfigError(
+            f"baseline reference: the data set does not say {missing[0]}; leave that baseline out"
+        )
     unit = np.asarray(task.dataset.column("unit_id"))
     speed = np.asarray(task.dataset.column("speed_rpm"), dtype=float)
     sound = np.flatnonzero(
-        (np.asarray(task.dataset.column("fault_gear")) == "") & np.asarray(task.dataset.usable, dtype=bool)
+        (np.asarray(task.dataset.column("fault_gear")) == "")
+        & np.asarray(task.dataset.usable, dtype=bool)
     )
     found = np.full(unit.size, -1)
     for record in range(unit.size):
         own = sound[unit[sound] == unit[record]]
-        if own.size >= 2:  # of one alone its own sound record would have no reference, which tells the class
+        if (
+            own.size >= 2
+        ):  # of one alone its own sound record would have no reference, which tells the class
             others = own[own != record]
             found[record] = others[np.argmin(np.abs(speed[others] - speed[record]))]
     return found
@@ -75,14 +80,18 @@ def reference_table(task: Task, segments: Segments, known: Levels) -> FeatureTab
             "plan.n_repeats=2, or leave that baseline out"
         )
     rows = []
-    for key in zip(segments.record.tolist(), segments.start.tolist(), segments.stop.tolist(), strict=True):
+    for key in zip(
+        segments.record.tolist(), segments.start.tolist(), segments.stop.tolist(), strict=True
+    ):
         other = int(reference[key[0]])
         own = _levels(task, known, *key)
         if other < 0:
             rows.append(np.full(len(_names(task)), np.nan))
             continue
         whole = _levels(task, known, other, 0, int(task.dataset.n_samples))
-        rows.append(np.concatenate([_measures(changed_teeth(own[gear], whole[gear])) for gear in GEARS]))
+        rows.append(
+            np.concatenate([_measures(changed_teeth(own[gear], whole[gear])) for gear in GEARS])
+        )
     return FeatureTable(
         values=np.array(rows),
         names=_names(task),
@@ -134,7 +143,12 @@ def _names(task: Task) -> tuple[str, ...]:
     """Of the columns, in the order of `_measures`, gear by gear."""
     names = []
     for gear in GEARS:
-        names += [f"{name}/{gear}/{band}/{one}" for one in OF_CHANNEL for name in task.channel_names for band in _BANDS]
+        names += [
+            f"{name}/{gear}/{band}/{one}"
+            for one in OF_CHANNEL
+            for name in task.channel_names
+            for band in _BANDS
+        ]
         names += [f"{OF_ALL}/{gear}/{band}" for band in (*_BANDS, "all")]
     return tuple(names)
 
@@ -145,7 +159,9 @@ def _measures(changes: FloatArray) -> FloatArray:
     joint = np.concatenate([power.mean(axis=0), power.mean(axis=(0, 1))[None]])
     with np.errstate(divide="ignore", invalid="ignore"):
         outstanding = np.log(joint.max(axis=-1) / np.median(joint, axis=-1))
-    columns = np.concatenate([changes.max(axis=-1).ravel(), changes.min(axis=-1).ravel(), outstanding])
+    columns = np.concatenate(
+        [changes.max(axis=-1).ravel(), changes.min(axis=-1).ravel(), outstanding]
+    )
     return np.where(np.isfinite(columns), columns, np.nan)
 
 
@@ -156,20 +172,31 @@ def _levels(task: Task, known: Levels, record: int, start: int, stop: int) -> di
         column = {name: float(task.dataset.column(name)[record]) for name in NEEDED[2:]}
         speed, n_teeth = known_rotation(task)
         rate, signal = float(task.dataset.sampling_rate), read_signal(task, record, start, stop)
-        passed = column["start_phase"] + start / rate * float(speed["pinion"][record]) * n_teeth["pinion"]
+        passed = (
+            column["start_phase"]
+            + start / rate * float(speed["pinion"][record]) * n_teeth["pinion"]
+        )
         known[key] = {
             gear: _of_gear(
-                signal, rate, float(speed[gear][record]), n_teeth[gear], column[f"start_tooth_{gear}"] + passed
+                signal,
+                rate,
+                float(speed[gear][record]),
+                n_teeth[gear],
+                column[f"start_tooth_{gear}"] + passed,
             )
             for gear in GEARS
         }
     return known[key]
 
 
-def _of_gear(signal: FloatArray, rate: float, rotation: float, n_teeth: int, start: float) -> FloatArray:
+def _of_gear(
+    signal: FloatArray, rate: float, rotation: float, n_teeth: int, start: float
+) -> FloatArray:
     shares = [(low * PASS_SHARE * rate, high * PASS_SHARE * rate) for low, high in BANDS]
     try:
-        levels = [tooth_levels(signal, rate, rotation, n_teeth, band=band, start=start) for band in shares]
+        levels = [
+            tooth_levels(signal, rate, rotation, n_teeth, band=band, start=start) for band in shares
+        ]
     except ValueError:
         return np.full((len(signal), len(BANDS), n_teeth), np.nan)
     return np.stack(levels, axis=1)

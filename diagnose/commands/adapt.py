@@ -30,17 +30,39 @@ def parser() -> Parser:
 
 def add_arguments(parser: ArgumentParser) -> None:
     """What can be typed behind the verb."""
-    parser.add_argument("--model", required=True, metavar="DIR", help="folder that diagnose train wrote below models/")
-    parser.add_argument("--healthy", required=True, nargs="+", metavar="RECORDING", help="as diagnose predict takes")
-    parser.add_argument("--method", required=True, choices=("adabn", "coral"), help="see docs/howto/bridge.md")
-    parser.add_argument("--out", required=True, metavar="DIR", help="folder to write; must not exist or be empty")
-    parser.add_argument("--sampling-rate", type=float, metavar="HZ", help="samples a second, where files are silent")
     parser.add_argument(
-        "--speed-rpm", type=float, metavar="RPM", help="of the driving shaft; one not trained is refused"
+        "--model",
+        required=True,
+        metavar="DIR",
+        help="folder that diagnose train wrote below models/",
     )
-    parser.add_argument("--channels", nargs="+", metavar="NAME", help="for the model's channels, in their order")
-    parser.add_argument("--unit", default="m/s2", help="m/s2 or g, where the column does not say (default: m/s2)")
-    parser.add_argument("--array", metavar="NAME", help="array of .npz, .h5 or .mat files (default: acceleration)")
+    parser.add_argument(
+        "--healthy", required=True, nargs="+", metavar="RECORDING", help="as diagnose predict takes"
+    )
+    parser.add_argument(
+        "--method", required=True, choices=("adabn", "coral"), help="see docs/howto/bridge.md"
+    )
+    parser.add_argument(
+        "--out", required=True, metavar="DIR", help="folder to write; must not exist or be empty"
+    )
+    parser.add_argument(
+        "--sampling-rate", type=float, metavar="HZ", help="samples a second, where files are silent"
+    )
+    parser.add_argument(
+        "--speed-rpm",
+        type=float,
+        metavar="RPM",
+        help="of the driving shaft; one not trained is refused",
+    )
+    parser.add_argument(
+        "--channels", nargs="+", metavar="NAME", help="for the model's channels, in their order"
+    )
+    parser.add_argument(
+        "--unit", default="m/s2", help="m/s2 or g, where the column does not say (default: m/s2)"
+    )
+    parser.add_argument(
+        "--array", metavar="NAME", help="array of .npz, .h5 or .mat files (default: acceleration)"
+    )
 
 
 def run(words: Sequence[str]) -> int:

@@ -24,7 +24,11 @@ examples:
   diagnose detectability fault=crack --plot crack.png --json crack.json
   diagnose detectability fault=pitting sensing=housing --speeds 600 1200 2400 --torques 10 40 --n-units 12"""
 FIGURE_TYPES = (".png", ".svg", ".pdf")
-NOT_READ = {"out": "--json and --plot", "plan": "--n-units, --speeds, --torques", "executor": "--workers"}
+NOT_READ = {
+    "out": "--json and --plot",
+    "plan": "--n-units, --speeds, --torques",
+    "executor": "--workers",
+}
 READ_OF_PLAN = ("plan.n_gearboxes", "plan.sham", "plan.vary")
 
 
@@ -38,12 +42,22 @@ def parser() -> Parser:
 def add_arguments(parser: ArgumentParser) -> None:
     """What can be typed behind the verb."""
     parser.add_argument("overrides", nargs="*", metavar="OVERRIDES", help="see above")
-    parser.add_argument("--config-dir", metavar="DIR", help="folder with groups and options of your own")
+    parser.add_argument(
+        "--config-dir", metavar="DIR", help="folder with groups and options of your own"
+    )
     shares = "of the driving pinion (default: shares of the set-point,"
     parser.add_argument("--speeds", nargs="+", metavar="RPM", help=f"{shares} a quarter to twice)")
     parser.add_argument("--torques", nargs="+", metavar="NM", help=f"{shares} a quarter to twice)")
-    parser.add_argument("--bandwidths", nargs="+", metavar="HZ", help="upper frequencies (default: 1000 to 20000)")
-    parser.add_argument("--n-units", type=int, default=8, metavar="K", help="machines of the same build (default: 8)")
+    parser.add_argument(
+        "--bandwidths", nargs="+", metavar="HZ", help="upper frequencies (default: 1000 to 20000)"
+    )
+    parser.add_argument(
+        "--n-units",
+        type=int,
+        default=8,
+        metavar="K",
+        help="machines of the same build (default: 8)",
+    )
     fixed = "the noise of the set-point everywhere, as a sensor's own is (default: the same snr_db everywhere)"
     parser.add_argument("--fixed-noise", action="store_true", help=fixed)
     parser.add_argument("--workers", type=int, metavar="N", help="processes (default: one a core)")
@@ -54,12 +68,16 @@ def add_arguments(parser: ArgumentParser) -> None:
 def run(words: Sequence[str]) -> int:
     """Make the maps, write them, print the best test and the worst."""
     arguments = parser().parse_intermixed_args(words)
-    figure, table = _file("--plot", arguments.plot, FIGURE_TYPES), _file("--json", arguments.json, (".json",))
+    figure, table = (
+        _file("--plot", arguments.plot, FIGURE_TYPES),
+        _file("--json", arguments.json, (".json",)),
+    )
     if arguments.workers is not None and arguments.workers < 1:
         raise ConfigError(f"--workers {arguments.workers} must be at least 1")
     overrides = list(arguments.overrides)
     speeds, torques, bandwidths = (
-        _numbers(f"--{name}", getattr(arguments, name), overrides) for name in ("speeds", "torques", "bandwidths")
+        _numbers(f"--{name}", getattr(arguments, name), overrides)
+        for name in ("speeds", "torques", "bandwidths")
     )
     _say_unread(overrides)
     import gensig
@@ -87,7 +105,9 @@ def run(words: Sequence[str]) -> int:
     if table is not None:
         import json
 
-        table.write_text(json.dumps(content(maps, again), indent=1, allow_nan=False) + "\n", encoding="utf-8")
+        table.write_text(
+            json.dumps(content(maps, again), indent=1, allow_nan=False) + "\n", encoding="utf-8"
+        )
     if figure is not None:
         from diagnose.detectability.figure import detectability_figure
 
@@ -100,9 +120,14 @@ def _say_unread(overrides: Sequence[str]) -> None:
     from gensig.options.compose import override_keys
 
     for key in override_keys(overrides):
-        flag = next((flag for name, flag in NOT_READ.items() if key == name or key.startswith(f"{name}.")), None)
+        flag = next(
+            (flag for name, flag in NOT_READ.items() if key == name or key.startswith(f"{name}.")),
+            None,
+        )
         if flag is not None and key not in READ_OF_PLAN:
-            print(f"diagnose: note: {key} is not read by detectability; use {flag}", file=sys.stderr)
+            print(
+                f"diagnose: note: {key} is not read by detectability; use {flag}", file=sys.stderr
+            )
 
 
 def _numbers(flag: str, given: Sequence[str] | None, overrides: list[str]) -> list[float] | None:

@@ -29,9 +29,18 @@ def parser() -> Parser:
 
 def add_arguments(parser: ArgumentParser) -> None:
     """What can be typed behind the verb."""
-    parser.add_argument("--to", required=True, choices=["onnx"], help="format; needs pip install 'gensig[onnx]'")
-    parser.add_argument("--model", required=True, metavar="DIR", help="folder that diagnose train wrote below models/")
-    parser.add_argument("--out", required=True, metavar="FILE", help="file to write, .onnx; must not exist")
+    parser.add_argument(
+        "--to", required=True, choices=["onnx"], help="format; needs pip install 'gensig[onnx]'"
+    )
+    parser.add_argument(
+        "--model",
+        required=True,
+        metavar="DIR",
+        help="folder that diagnose train wrote below models/",
+    )
+    parser.add_argument(
+        "--out", required=True, metavar="FILE", help="file to write, .onnx; must not exist"
+    )
 
 
 def run(words: Sequence[str]) -> int:

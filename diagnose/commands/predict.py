@@ -38,22 +38,65 @@ def parser() -> Parser:
 def add_arguments(parser: ArgumentParser) -> None:
     """What can be typed behind the verb."""
     parser.add_argument(
-        "recording", metavar="RECORDING", nargs="+", help="one or more: .csv, .wav, .npy, .npz, .h5, .hdf5 or .mat"
+        "recording",
+        metavar="RECORDING",
+        nargs="+",
+        help="one or more: .csv, .wav, .npy, .npz, .h5, .hdf5 or .mat",
     )
-    parser.add_argument("--model", required=True, metavar="DIR", help="folder that diagnose train wrote below models/")
-    parser.add_argument("--sampling-rate", type=float, metavar="HZ", help="samples a second, where the file is silent")
-    parser.add_argument("--speed-rpm", type=float, metavar="RPM", help="of the driving shaft: was it trained at such?")
-    parser.add_argument("--teeth", nargs=2, type=int, metavar=("DRIVING", "DRIVEN"), help="was it trained at such?")
-    parser.add_argument("--tacho", metavar="CHANNEL", help="pulses of the driving shaft, to follow its speed")
-    parser.add_argument("--pulses-per-turn", type=int, default=1, metavar="N", help="of --tacho (default: 1)")
-    parser.add_argument("--to-speed", type=float, metavar="RPM", help="play it at this speed of the training instead")
-    parser.add_argument("--as-recorded", action="store_true", help="no order tracking, even with --teeth or --tacho")
-    parser.add_argument("--channels", nargs="+", metavar="NAME", help="for the model's channels, in their order")
-    parser.add_argument("--unit", default="m/s2", help="m/s2 or g, where the column does not say (default: m/s2)")
-    parser.add_argument("--array", metavar="NAME", help="array of a .npz, .h5 or .mat file (default: acceleration)")
-    parser.add_argument("--torque-nm", type=float, metavar="NM", help="of the driving shaft, for remaining lives")
-    parser.add_argument("--life-time-h", type=float, metavar="H", help="since new, for remaining lives with the age")
-    parser.add_argument("--json", action="store_true", help="print everything, window by window, as JSON")
+    parser.add_argument(
+        "--model",
+        required=True,
+        metavar="DIR",
+        help="folder that diagnose train wrote below models/",
+    )
+    parser.add_argument(
+        "--sampling-rate",
+        type=float,
+        metavar="HZ",
+        help="samples a second, where the file is silent",
+    )
+    parser.add_argument(
+        "--speed-rpm",
+        type=float,
+        metavar="RPM",
+        help="of the driving shaft: was it trained at such?",
+    )
+    parser.add_argument(
+        "--teeth", nargs=2, type=int, metavar=("DRIVING", "DRIVEN"), help="was it trained at such?"
+    )
+    parser.add_argument(
+        "--tacho", metavar="CHANNEL", help="pulses of the driving shaft, to follow its speed"
+    )
+    parser.add_argument(
+        "--pulses-per-turn", type=int, default=1, metavar="N", help="of --tacho (default: 1)"
+    )
+    parser.add_argument(
+        "--to-speed",
+        type=float,
+        metavar="RPM",
+        help="play it at this speed of the training instead",
+    )
+    parser.add_argument(
+        "--as-recorded", action="store_true", help="no order tracking, even with --teeth or --tacho"
+    )
+    parser.add_argument(
+        "--channels", nargs="+", metavar="NAME", help="for the model's channels, in their order"
+    )
+    parser.add_argument(
+        "--unit", default="m/s2", help="m/s2 or g, where the column does not say (default: m/s2)"
+    )
+    parser.add_argument(
+        "--array", metavar="NAME", help="array of a .npz, .h5 or .mat file (default: acceleration)"
+    )
+    parser.add_argument(
+        "--torque-nm", type=float, metavar="NM", help="of the driving shaft, for remaining lives"
+    )
+    parser.add_argument(
+        "--life-time-h", type=float, metavar="H", help="since new, for remaining lives with the age"
+    )
+    parser.add_argument(
+        "--json", action="store_true", help="print everything, window by window, as JSON"
+    )
 
 
 def run(words: Sequence[str]) -> int:

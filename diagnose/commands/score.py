@@ -31,9 +31,15 @@ def parser() -> Parser:
 
 def add_arguments(parser: ArgumentParser) -> None:
     """What can be typed behind the verb."""
-    parser.add_argument("--data", required=True, metavar="DIR", help="data set made by gensig generate")
-    parser.add_argument("--predictions", required=True, metavar="FILE", help="CSV: record_id, predicted, ...")
-    parser.add_argument("--protocol", metavar="NAME", help="of a file without that column (default: by_unit)")
+    parser.add_argument(
+        "--data", required=True, metavar="DIR", help="data set made by gensig generate"
+    )
+    parser.add_argument(
+        "--predictions", required=True, metavar="FILE", help="CSV: record_id, predicted, ..."
+    )
+    parser.add_argument(
+        "--protocol", metavar="NAME", help="of a file without that column (default: by_unit)"
+    )
     parser.add_argument("--json", action="store_true", help="print everything as JSON")
 
 
@@ -51,7 +57,9 @@ def run(words: Sequence[str]) -> int:
     benchmark = result["benchmark"]
     if benchmark is not None:
         for difference in benchmark["differences"]:
-            print(f"diagnose: not comparable with {benchmark['name']}: {difference}", file=sys.stderr)
+            print(
+                f"diagnose: not comparable with {benchmark['name']}: {difference}", file=sys.stderr
+            )
         if not benchmark["differences"]:
             print(f"{benchmark['name']}: plan, splits and signals are the frozen ones")
     print("\n".join(score_table(result)))

@@ -55,7 +55,9 @@ def at_rate(dataset: Dataset, sampling_rate: float | None) -> Dataset:
             f"the nearest that is: {near:.9g}"
         )
     if change.n_samples(int(dataset.n_samples)) < 1:
-        raise ConfigError(f"sampling_rate_hz={sampling_rate:g} leaves no sample of a record of {dataset.folder}")
+        raise ConfigError(
+            f"sampling_rate_hz={sampling_rate:g} leaves no sample of a record of {dataset.folder}"
+        )
     return cast("Dataset", _Slower(dataset, change))
 
 

@@ -42,7 +42,10 @@ def groups_of(values: NDArray[Any], *, most: int) -> list[Group]:
     most : number of groups; fewer where values are equal. Names are not brought together
     """
     if values.dtype.kind in "US":
-        return [Group(member=values == name, low=None, high=None, name=str(name)) for name in np.unique(values)]
+        return [
+            Group(member=values == name, low=None, high=None, name=str(name))
+            for name in np.unique(values)
+        ]
     different = np.unique(values)
     if different.size <= most:
         place = np.searchsorted(different, values)
@@ -53,5 +56,7 @@ def groups_of(values: NDArray[Any], *, most: int) -> list[Group]:
     for index in np.unique(place):
         member = place == index
         inside = values[member]
-        groups.append(Group(member=member, low=float(inside.min()), high=float(inside.max()), name=None))
+        groups.append(
+            Group(member=member, low=float(inside.min()), high=float(inside.max()), name=None)
+        )
     return groups

@@ -29,7 +29,9 @@ MEANING = {
 }
 
 
-def choose_protocols(task: Task, wanted: Sequence[str] | None) -> tuple[tuple[str, ...], dict[str, str]]:
+def choose_protocols(
+    task: Task, wanted: Sequence[str] | None
+) -> tuple[tuple[str, ...], dict[str, str]]:
     """Protocols to run, and of those wanted that cannot be run, why.
 
     Parameters
@@ -50,12 +52,16 @@ def choose_protocols(task: Task, wanted: Sequence[str] | None) -> tuple[tuple[st
     if wanted is None:
         wanted = offered
     check_names("protocol", wanted, [*offered, *left_out])
-    left_out |= {name: why for name in wanted if name in offered and (why := _why_no_window(task, name))}
+    left_out |= {
+        name: why for name in wanted if name in offered and (why := _why_no_window(task, name))
+    }
     absent = {name: left_out[name] for name in wanted if name in left_out}
     found = tuple(name for name in wanted if name not in absent)
     if not found:
         reasons = "; ".join(f"{name}: {reason}" for name, reason in absent.items())
-        raise ConfigError(f"{dataset.folder} has none of the protocols to train on ({reasons or 'it has no splits'})")
+        raise ConfigError(
+            f"{dataset.folder} has none of the protocols to train on ({reasons or 'it has no splits'})"
+        )
     return found, absent
 
 
@@ -79,13 +85,17 @@ def channels_to_cross(
         if n == 0:
             return f"the data set has {len(available)} channel, and 2 are needed"
         if len(others) < n:
-            return f"{len(others)} channel(s) are left beside channels={','.join(trained)}; name fewer"
+            return (
+                f"{len(others)} channel(s) are left beside channels={','.join(trained)}; name fewer"
+            )
         return trained, tuple(others[:n])
     if channels is None or len(channels) != len(test_channels):
         raise ConfigError("test_channels needs channels beside it, the same number of them")
     check_names("channel", [*channels, *test_channels], available)
     if both := sorted(set(channels) & set(test_channels)):
-        raise ConfigError(f"channel {both[0]} is in channels and in test_channels; a sensor never seen is in one")
+        raise ConfigError(
+            f"channel {both[0]} is in channels and in test_channels; a sensor never seen is in one"
+        )
     return tuple(channels), tuple(test_channels)
 
 
@@ -93,7 +103,10 @@ def _why_no_window(task: Task, name: str) -> str | None:
     """Why a protocol that cuts records has no place for a window."""
     if name == CROSS_SENSOR:
         return None  # whole records
-    longest = max((stop - start for rows in task.dataset.split(name).values() for _, start, stop in rows), default=1.0)
+    longest = max(
+        (stop - start for rows in task.dataset.split(name).values() for _, start, stop in rows),
+        default=1.0,
+    )
     held = int(longest * n_samples(task.dataset) + 1e-6)
     if longest == 1.0 or held >= task.window_samples:
         return None

@@ -18,7 +18,10 @@ Targets = Mapping[str, NDArray[Any]]
 
 GEARS = ("none", "pinion", "wheel")  # the gear that has the fault
 
-BEFORE, AFTER = 0.3, 2.2  # base pitches about where a tooth comes into mesh, in which its fault may show; assumed
+BEFORE, AFTER = (
+    0.3,
+    2.2,
+)  # base pitches about where a tooth comes into mesh, in which its fault may show; assumed
 NEVER = -30.0  # log-probability of places that are not the fault's
 
 
@@ -36,7 +39,9 @@ def record_targets(dataset: Dataset, record: NDArray[np.integer]) -> dict[str, N
         found["severity"] = np.where(severity > 0, severity, np.float32(np.nan))
     if "fault_gear" in dataset.column_names:
         names = np.asarray(dataset.column("fault_gear"))[record]
-        found["gear"] = np.array([GEARS.index(str(name) or GEARS[0]) for name in names], dtype=np.int64)
+        found["gear"] = np.array(
+            [GEARS.index(str(name) or GEARS[0]) for name in names], dtype=np.int64
+        )
     return found
 
 

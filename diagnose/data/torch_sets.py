@@ -81,7 +81,9 @@ class VibrationDataset(torch.utils.data.Dataset[tuple[torch.Tensor, int]]):
 
     def __getitem__(self, index: int) -> tuple[torch.Tensor, int]:
         start = int(self.start[index])
-        signal = read_signal(self._task, int(self.record[index]), start, start + self._task.window_samples)
+        signal = read_signal(
+            self._task, int(self.record[index]), start, start + self._task.window_samples
+        )
         return torch.from_numpy(normalised(signal, self._task.normalise)), int(self.label[index])
 
 
@@ -182,7 +184,9 @@ class StreamingDataset(torch.utils.data.IterableDataset[Item]):
             mine = stream.take(sorted(windows)).shard(place, n_workers)
             if self.n_epochs is None and not len(mine):
                 return  # fewer conditions than workers: nothing will ever come
-            record_of = dict(zip(stream.column("record_id").tolist(), range(len(stream)), strict=True))
+            record_of = dict(
+                zip(stream.column("record_id").tolist(), range(len(stream)), strict=True)
+            )
             labels = task.labels()
             for record in mine:
                 if record.values["status"] == "ok":
@@ -208,15 +212,23 @@ def _whole_records(task: Task) -> Segments:
     """Every record of the task's classes."""
     record = np.flatnonzero(task.labels() >= 0)
     if record.size == 0:
-        raise ConfigError(f"the stream has no record of {', '.join(task.class_names)}; give a larger part of it")
-    return Segments(record=record, start=np.zeros_like(record), stop=np.full_like(record, task.dataset.n_samples))
+        raise ConfigError(
+            f"the stream has no record of {', '.join(task.class_names)}; give a larger part of it"
+        )
+    return Segments(
+        record=record,
+        start=np.zeros_like(record),
+        stop=np.full_like(record, task.dataset.n_samples),
+    )
 
 
 def _cut(task: Task, record: Any, starts: IntArray) -> Iterator[torch.Tensor]:
     """Windows (channel, sample) of one record, normalised as those of a stored one; refuses what is not finite."""
     signal = record.signals["acceleration"][task.channels]
     if not np.isfinite(signal).all():
-        raise DatasetError(f"record {record.values['record_id']}: its signal holds values that are not finite")
+        raise DatasetError(
+            f"record {record.values['record_id']}: its signal holds values that are not finite"
+        )
     for start in starts:
         window = np.ascontiguousarray(signal[:, start : start + task.window_samples])
         yield torch.from_numpy(normalised(window, task.normalise))

@@ -41,7 +41,9 @@ class Tracked:
     speed_range_rpm: tuple[float, float]
 
 
-def track_by_tacho(recording: Recording, tacho: FloatArray, name: str, *, pulses_per_turn: int) -> Tracked:
+def track_by_tacho(
+    recording: Recording, tacho: FloatArray, name: str, *, pulses_per_turn: int
+) -> Tracked:
     """Follow the pulses of a tachometer on the driving shaft; what lies before the first and after the last is lost.
 
     Parameters
@@ -55,7 +57,9 @@ def track_by_tacho(recording: Recording, tacho: FloatArray, name: str, *, pulses
     """
     rate = recording.sampling_rate
     if not np.all(np.isfinite(tacho)):
-        raise ConfigError(f"--tacho {name}: sample {int(np.argmin(np.isfinite(tacho)))} is no finite number")
+        raise ConfigError(
+            f"--tacho {name}: sample {int(np.argmin(np.isfinite(tacho)))} is no finite number"
+        )
     times = pulse_times(tacho, rate)
     if len(times) < 2 * pulses_per_turn + 1:
         raise ConfigError(
@@ -70,7 +74,9 @@ def track_by_tacho(recording: Recording, tacho: FloatArray, name: str, *, pulses
             f"--tacho {name}: at {instant:.4g} s the time between pulses jumps by {jump.max():.3g}, "
             "a pulse too few or too many; mend the channel, or leave --tacho out"
         )
-    turns = resample_by_pulses(_finer(recording), FINER * rate, times, pulses_per_turn=pulses_per_turn)
+    turns = resample_by_pulses(
+        _finer(recording), FINER * rate, times, pulses_per_turn=pulses_per_turn
+    )
     n_turns = turns.shape[-2]
     speed = 60.0 * speed_of_pulses(times[::pulses_per_turn])[1]
     mean = 60.0 * n_turns / (times[n_turns * pulses_per_turn] - times[0])
@@ -94,10 +100,14 @@ def track_by_mesh(recording: Recording, teeth: Teeth, speed_rpm: float) -> Track
         longer="record longer, or give --as-recorded",
     )
     turned = cycles / teeth.driving
-    fine = np.interp(np.arange(FINER * (turned.size - 1) + 1) / FINER, np.arange(turned.size), turned)
+    fine = np.interp(
+        np.arange(FINER * (turned.size - 1) + 1) / FINER, np.arange(turned.size), turned
+    )
     turns = resample_by_angle(_finer(recording)[:, : fine.size], 2.0 * np.pi * fine)
     passed = np.interp(np.arange(turns.shape[-2] + 1), turned, np.arange(turned.size) / rate)
-    return _tracked("mesh", turns, float(60.0 * turned[-1] / (turned.size - 1) * rate), 60.0 / np.diff(passed))
+    return _tracked(
+        "mesh", turns, float(60.0 * turned[-1] / (turned.size - 1) * rate), 60.0 / np.diff(passed)
+    )
 
 
 def at_constant_speed(tracked: Tracked, sampling_rate: float, speed_rpm: float) -> FloatArray:

@@ -49,10 +49,16 @@ def _slowest_turn(dataset: Dataset) -> tuple[str, float]:
     """The gear that a fault passes most seldom on, and the longest time that it takes for a turn, s."""
     names = dataset.column_names
     if "speed_rpm" not in names:
-        raise DatasetError(f"{dataset.folder} does not say speed_rpm, which the length of windows follows from")
-    speed = np.asarray(dataset.column("speed_rpm"), dtype=float)[np.asarray(dataset.usable, dtype=bool)]
+        raise DatasetError(
+            f"{dataset.folder} does not say speed_rpm, which the length of windows follows from"
+        )
+    speed = np.asarray(dataset.column("speed_rpm"), dtype=float)[
+        np.asarray(dataset.usable, dtype=bool)
+    ]
     slowest = 60.0 / float(speed.min()) if speed.size and speed.min() > 0 else 0.0
-    faulty = {str(name) for name in dataset.column("fault_gear")} if "fault_gear" in names else set()
+    faulty = (
+        {str(name) for name in dataset.column("fault_gear")} if "fault_gear" in names else set()
+    )
     teeth = {gear: dataset.attributes.get(f"n_teeth_{gear}") for gear in ("pinion", "wheel")}
     if "wheel" not in faulty or not (teeth["pinion"] and teeth["wheel"]):
         return NO_FAULT, slowest

@@ -44,7 +44,9 @@ class Task:
     stride_samples: int
     normalise: str
     one_class: bool = False
-    cross_channels: tuple[tuple[str, ...], tuple[str, ...]] | str = "no channels to test on are named"
+    cross_channels: tuple[tuple[str, ...], tuple[str, ...]] | str = (
+        "no channels to test on are named"
+    )
 
     def __post_init__(self) -> None:
         check_names("class", self.class_names, self.dataset.class_names)
@@ -53,7 +55,9 @@ class Task:
         if self.window_samples < 1 or self.stride_samples < 1:
             raise ConfigError("window_samples and stride_samples must be at least 1")
         if len(self.class_names) < 2 and not self.one_class:
-            raise ConfigError(f"one class only ({', '.join(self.class_names)}): nothing to tell apart")
+            raise ConfigError(
+                f"one class only ({', '.join(self.class_names)}): nothing to tell apart"
+            )
 
     @property
     def channels(self) -> list[int]:
@@ -142,12 +146,16 @@ def all_segments(task: Task) -> Segments:
     """Every whole record of the task's classes that did not fail."""
     record = np.flatnonzero(task.labels() >= 0)
     if record.size == 0:
-        raise DatasetError(f"{task.dataset.folder}: no usable record of {', '.join(task.class_names)}")
+        raise DatasetError(
+            f"{task.dataset.folder}: no usable record of {', '.join(task.class_names)}"
+        )
     length = n_samples(task.dataset)
     return Segments(record=record, start=np.zeros_like(record), stop=np.full_like(record, length))
 
 
-def plan_windows(segments: Segments, window_samples: int, stride_samples: int) -> tuple[IntArray, IntArray]:
+def plan_windows(
+    segments: Segments, window_samples: int, stride_samples: int
+) -> tuple[IntArray, IntArray]:
     """Windows that lie whole inside their segment.
 
     Returns
@@ -202,7 +210,9 @@ class WindowSet:
         -------
         (window, channel, sample) float32, normalised
         """
-        chosen = np.empty((len(windows), self.signals[0].shape[0], self.window_samples), dtype=np.float32)
+        chosen = np.empty(
+            (len(windows), self.signals[0].shape[0], self.window_samples), dtype=np.float32
+        )
         for row, window in enumerate(windows):
             signal = self.signals[self.segment[window]]
             last = signal.shape[-1] - self.window_samples
@@ -236,12 +246,18 @@ def load_windows(task: Task, segments: Segments, *, read: Read | None = None) ->
     )
 
 
-def read_signal(task: Task, record: int, start: int, stop: int, *, name: str = "acceleration") -> NDArray[np.float32]:
+def read_signal(
+    task: Task, record: int, start: int, stop: int, *, name: str = "acceleration"
+) -> NDArray[np.float32]:
     """(channel, sample) m/s^2 of the task's channels; refuses values that are not finite."""
-    signal = np.asarray(task.dataset.signals(record, start, stop, task.channels, name=name), dtype=np.float32)
+    signal = np.asarray(
+        task.dataset.signals(record, start, stop, task.channels, name=name), dtype=np.float32
+    )
     if not np.isfinite(signal).all():
         which = task.dataset.column("record_id")[record]
-        raise DatasetError(f"record {which} of {task.dataset.folder}: its signal holds values that are not finite")
+        raise DatasetError(
+            f"record {which} of {task.dataset.folder}: its signal holds values that are not finite"
+        )
     return signal
 
 
@@ -273,5 +289,9 @@ def check_names(kind: str, wanted: Sequence[Any], available: Sequence[str]) -> N
     for name in wanted:
         if name not in available:
             close = difflib.get_close_matches(str(name), list(available), n=2)
-            hint = f"did you mean {' or '.join(close)}?" if close else f"there is {', '.join(available)}"
+            hint = (
+                f"did you mean {' or '.join(close)}?"
+                if close
+                else f"there is {', '.join(available)}"
+            )
             raise ConfigError(f"no {kind} '{name}'; {hint}")

@@ -16,7 +16,9 @@ FloatArray = NDArray[np.floating]
 
 COLORS = "cividis"  # even steps for every kind of colour vision, and in print
 DARK = 0.55  # of the colour scale: below it white letters are read best
-LEAST_TOP = 1.0  # d' at the top of the scale of indicators, so that next to nothing does not look like much
+LEAST_TOP = (
+    1.0  # d' at the top of the scale of indicators, so that next to nothing does not look like much
+)
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -37,7 +39,10 @@ def detectability_figure(path: Path, maps: Maps) -> None:
 
     n_channels, n_bands = len(maps.channels), len(maps.bandwidths)
     small = max(4.6, 1.25 * n_bands)
-    figure = Figure(figsize=(1.2 * len(maps.torques_nm) + 3.0 + small, 2.0 * max(4.0, 1.15 * n_channels)), dpi=130)
+    figure = Figure(
+        figsize=(1.2 * len(maps.torques_nm) + 3.0 + small, 2.0 * max(4.0, 1.15 * n_channels)),
+        dpi=130,
+    )
     figure.set_layout_engine("constrained", hspace=0.03)
     FigureCanvasAgg(figure)
     parts: Any = figure.subfigures(2, 2, width_ratios=(1.2 * len(maps.torques_nm) + 3.0, small))
@@ -58,10 +63,14 @@ def fault_text(fault: dict[str, Any]) -> str:
 
 def _part_text(part: dict[str, Any]) -> str:
     sizes = [
-        (key.split("_"), value) for key, value in part.items() if isinstance(value, int | float) and key != "tooth"
+        (key.split("_"), value)
+        for key, value in part.items()
+        if isinstance(value, int | float) and key != "tooth"
     ]
     told = ", ".join(f"{' '.join(words[:-1])} {value:g} {words[-1]}" for words, value in sizes[:3])
-    return f"{str(part['kind']).replace('_', ' ')} on the {part['gear']}" + (f" ({told})" if told else "")
+    return f"{str(part['kind']).replace('_', ' ')} on the {part['gear']}" + (
+        f" ({told})" if told else ""
+    )
 
 
 def _rows(maps: Maps) -> list[_Row]:
@@ -102,7 +111,16 @@ def _large(figure: Any, maps: Maps, row: _Row) -> Any:
             text = f"{round(float(values[place]), 2) + 0.0:.2f}\n({row.texts[:, :, channel, band][place]:.2f})"
         color = "white" if row.norm(values[place]) < DARK else "black"
         weight = "bold" if place == (speed, torque) else "normal"
-        axes.text(place[1], place[0], text, ha="center", va="center", color=color, fontsize=9.5, fontweight=weight)
+        axes.text(
+            place[1],
+            place[0],
+            text,
+            ha="center",
+            va="center",
+            color=color,
+            fontsize=9.5,
+            fontweight=weight,
+        )
     axes.set_xticks(range(len(maps.torques_nm)), [f"{one:g}" for one in maps.torques_nm])
     axes.set_yticks(range(len(maps.speeds_rpm)), [f"{one:g}" for one in maps.speeds_rpm])
     inside = "d'" if row.texts is None else "d' (AUROC)"
@@ -134,4 +152,6 @@ def _many(figure: Any, maps: Maps, row: _Row) -> Any:
 
 def _image(axes: Any, values: FloatArray, row: _Row) -> Any:
     axes.set_facecolor("0.85")
-    return axes.imshow(np.ma.masked_invalid(values), cmap=COLORS, norm=row.norm, origin="lower", aspect="auto")
+    return axes.imshow(
+        np.ma.masked_invalid(values), cmap=COLORS, norm=row.norm, origin="lower", aspect="auto"
+    )

@@ -84,7 +84,11 @@ def read_bandwidths(given: Sequence[float] | None, pairs: Pairs) -> tuple[float,
         inside = [one for one in BANDWIDTHS_HZ if one < pairs.usable_frequency]
         return (*inside, pairs.usable_frequency)
     highest = 0.5 * pairs.sampling_rate
-    if not given or len(set(given)) < len(given) or not all(10.0 <= one <= highest for one in given):
+    if (
+        not given
+        or len(set(given)) < len(given)
+        or not all(10.0 <= one <= highest for one in given)
+    ):
         raise ConfigError(
             f"bandwidths in Hz: {', '.join(f'{one:g}' for one in given)}; give each once, from 10 to half the sampling "
             f"rate, {highest:g}"
@@ -92,7 +96,9 @@ def read_bandwidths(given: Sequence[float] | None, pairs: Pairs) -> tuple[float,
     return tuple(sorted(float(one) for one in given))
 
 
-def make_maps(pairs: Pairs, bandwidths: Sequence[float], *, n_workers: int, on_done: Callable[[str], None]) -> Maps:
+def make_maps(
+    pairs: Pairs, bandwidths: Sequence[float], *, n_workers: int, on_done: Callable[[str], None]
+) -> Maps:
     """Simulate every cell and let both observers look at it; the same bits for any number of workers.
 
     Raises
@@ -133,7 +139,8 @@ def look_at(pairs: Pairs, place: int, bandwidths: Sequence[float]) -> Cell:
     sound, faulty = _indicator_tables(pairs, cell, bandwidths)
     shape = sound.shape[1:3]
     seen = [
-        seen_by_indicators(sound[:, channel, band], faulty[:, channel, band]) for channel, band in np.ndindex(shape)
+        seen_by_indicators(sound[:, channel, band], faulty[:, channel, band])
+        for channel, band in np.ndindex(shape)
     ]
 
     def of_seen(name: str) -> NDArray[Any]:
@@ -158,7 +165,9 @@ def best_and_worst(values: FloatArray) -> tuple[tuple[int, ...], tuple[int, ...]
     GensigError    where there is no value at all
     """
     if np.isnan(values).all():
-        raise GensigError("no pair of records could be simulated or judged; longer records or fewer extremes may help")
+        raise GensigError(
+            "no pair of records could be simulated or judged; longer records or fewer extremes may help"
+        )
     largest, smallest = np.nanargmax(values), np.nanargmin(values)
     return tuple(map(int, np.unravel_index(largest, values.shape))), tuple(
         map(int, np.unravel_index(smallest, values.shape))
@@ -169,26 +178,41 @@ def confirm_best(maps: Maps, others: Pairs) -> Seen:
     """The best test of the indicators on machines that had no part in choosing it; ``others`` of the same map."""
     speed, torque, channel, band = place = best_and_worst(maps.seen)[0]
     cell = others.cell(speed * len(maps.torques_nm) + torque)
-    sound, faulty = (table[:, channel, band] for table in _indicator_tables(others, cell, maps.bandwidths))
-    return confirmed(sound, faulty, indicator=int(maps.indicator[place]), raises=bool(maps.raises[place]))
+    sound, faulty = (
+        table[:, channel, band] for table in _indicator_tables(others, cell, maps.bandwidths)
+    )
+    return confirmed(
+        sound, faulty, indicator=int(maps.indicator[place]), raises=bool(maps.raises[place])
+    )
 
 
-def _indicator_tables(pairs: Pairs, cell: PairCell, bandwidths: Sequence[float]) -> tuple[FloatArray, FloatArray]:
+def _indicator_tables(
+    pairs: Pairs, cell: PairCell, bandwidths: Sequence[float]
+) -> tuple[FloatArray, FloatArray]:
     """Indicators of the sound and of the faulty records, (unit, channel, band, indicator) each."""
-    shape = (pairs.n_units, len(pairs.channel_names), len(bandwidths), len(indicator_names(list(pairs.gears))))
+    shape = (
+        pairs.n_units,
+        len(pairs.channel_names),
+        len(bandwidths),
+        len(indicator_names(list(pairs.gears))),
+    )
     tables = np.full((2, *shape), np.nan)
     records = ((cell.sound, cell.sound_angle), (cell.faulty, cell.faulty_angle))
     for table, (signals, angles) in zip(tables, records, strict=True):
         for unit, (signal, angle) in enumerate(zip(signals, angles, strict=True)):
             if np.isfinite(signal).all():
-                table[unit] = band_indicators(signal, angle, pairs.sampling_rate, pairs.gears, bandwidths)
+                table[unit] = band_indicators(
+                    signal, angle, pairs.sampling_rate, pairs.gears, bandwidths
+                )
     return tables[0], tables[1]
 
 
 def _median(values: FloatArray, axis: int) -> FloatArray:
     """Median without NaN; NaN where there is nothing else."""
     counts = np.isfinite(values).any(axis=axis)
-    return np.where(counts, np.nanmedian(np.where(np.expand_dims(counts, axis), values, 0.0), axis=axis), np.nan)
+    return np.where(
+        counts, np.nanmedian(np.where(np.expand_dims(counts, axis), values, 0.0), axis=axis), np.nan
+    )
 
 
 _work: dict[str, Any] = {}
@@ -209,13 +233,17 @@ def _look_at_all(
                 on_done(_cell_text(pairs, place))
         return cells
     context = multiprocessing.get_context("spawn")
-    with ProcessPoolExecutor(min(n_workers, pairs.n_cells), context, _start_worker, (pairs, bandwidths)) as executor:
+    with ProcessPoolExecutor(
+        min(n_workers, pairs.n_cells), context, _start_worker, (pairs, bandwidths)
+    ) as executor:
         try:
             for place, cell in zip(places, executor.map(_look_in_worker, places), strict=True):
                 cells.append(cell)
                 on_done(_cell_text(pairs, place))
         except BrokenProcessPool:
-            raise GensigError("a worker process was killed (out of memory?); try --workers 1") from None
+            raise GensigError(
+                "a worker process was killed (out of memory?); try --workers 1"
+            ) from None
         except BaseException:
             executor.shutdown(wait=False, cancel_futures=True)
             raise

@@ -21,13 +21,18 @@ FloatArray = NDArray[np.floating]
 
 OF_SIGNAL = ("rms", "band_rms", "kurtosis", "crest_factor")
 OF_GEAR = ("envelope", "fm4", "sideband_ratio", "energy_ratio", "residual_rms")
-ENVELOPE_HARMONICS = 5  # of the gear's turns, assumed: a short event once a turn has about equal ones
+ENVELOPE_HARMONICS = (
+    5  # of the gear's turns, assumed: a short event once a turn has about equal ones
+)
 FEWEST_UNITS = 4  # all but one of them still have a spread
 LEAST_SPREAD = 1e-9  # of an indicator's logarithm: what rounding leaves of none
 
 
 def residual_energy(
-    residual: FloatArray, noise_density: FloatArray, sampling_rate: float, bandwidths: Sequence[float]
+    residual: FloatArray,
+    noise_density: FloatArray,
+    sampling_rate: float,
+    bandwidths: Sequence[float],
 ) -> FloatArray:
     """Square of d' that every band of a known residual brings against Gaussian noise of a known spectrum.
 
@@ -53,9 +58,17 @@ def residual_energy(
     if n_samples % 2 == 0:
         sides[-1] = 1.0
     power = sides * np.abs(np.fft.rfft(residual, axis=-1)) ** 2 / n_samples
-    energy = np.divide(power, noise_density, out=np.full(power.shape, np.nan), where=noise_density > 0.0)
+    energy = np.divide(
+        power, noise_density, out=np.full(power.shape, np.nan), where=noise_density > 0.0
+    )
     places = np.searchsorted(frequency, bandwidths, side="right")
-    return np.stack([energy[..., low:high].sum(axis=-1) for low, high in zip([0, *places], places, strict=False)], -1)
+    return np.stack(
+        [
+            energy[..., low:high].sum(axis=-1)
+            for low, high in zip([0, *places], places, strict=False)
+        ],
+        -1,
+    )
 
 
 def indicator_names(gears: Sequence[str]) -> tuple[str, ...]:
@@ -94,17 +107,31 @@ def band_indicators(
     turns = {gear: _turns(x, ratio * angle) for gear, (_, ratio) in gears.items()}
     orders = {gear: _orders(ratio * angle) for gear, (_, ratio) in gears.items()}
     spectrum = np.fft.rfft(x, axis=-1)
-    places = np.searchsorted(np.fft.rfftfreq(n_samples, 1.0 / sampling_rate), bandwidths, side="right")
+    places = np.searchsorted(
+        np.fft.rfftfreq(n_samples, 1.0 / sampling_rate), bandwidths, side="right"
+    )
     below = np.zeros(x.shape, dtype=np.complex128)
     for band, (low, high) in enumerate(zip([1, *places], places, strict=False)):
         one_sided = np.zeros(x.shape, dtype=np.complex128)
         one_sided[:, low:high] = 2.0 * spectrum[:, low:high]
         analytic = np.fft.ifft(one_sided, axis=-1)
         below += analytic
-        columns = [rms(below.real), rms(analytic.real), kurtosis(below.real), crest_factor(below.real)]
+        columns = [
+            rms(below.real),
+            rms(analytic.real),
+            kurtosis(below.real),
+            crest_factor(below.real),
+        ]
         for gear, (n_teeth, ratio) in gears.items():
             columns.append(_envelope_turns(np.abs(analytic), orders[gear]))
-            highest = 2.0 * math.pi * bandwidths[band] * n_samples / sampling_rate / (ratio * (angle[-1] - angle[0]))
+            highest = (
+                2.0
+                * math.pi
+                * bandwidths[band]
+                * n_samples
+                / sampling_rate
+                / (ratio * (angle[-1] - angle[0]))
+            )
             columns += _of_average(turns[gear], math.floor(highest), n_teeth)
         table[:, band] = np.stack(columns, axis=-1)
     with np.errstate(divide="ignore"):
@@ -135,7 +162,9 @@ def _envelope_turns(magnitude: FloatArray, orders: FloatArray | None) -> FloatAr
     kept = magnitude[:, : orders.shape[1]]
     mean = kept.mean(axis=-1)
     lines = 2.0 * np.abs(kept @ orders.T) / kept.shape[-1]
-    return np.divide(np.sqrt(np.sum(lines**2, axis=-1)), mean, out=np.full(len(kept), np.nan), where=mean > 0.0)
+    return np.divide(
+        np.sqrt(np.sum(lines**2, axis=-1)), mean, out=np.full(len(kept), np.nan), where=mean > 0.0
+    )
 
 
 def _of_average(average: FloatArray, highest_order: int, n_teeth: int) -> list[FloatArray]:
@@ -145,7 +174,9 @@ def _of_average(average: FloatArray, highest_order: int, n_teeth: int) -> list[F
     if highest <= n_teeth + (n_teeth - 1) // 2:  # no room for the mesh and its sidebands
         return [np.full(len(average), np.nan)] * (len(OF_GEAR) - 1)
     # fewer samples a turn: nothing is left above the highest order, not even rounding
-    turn = np.fft.irfft(np.fft.rfft(average)[:, : highest + 1], 2 * highest + 1) * ((2 * highest + 1) / n_samples)
+    turn = np.fft.irfft(np.fft.rfft(average)[:, : highest + 1], 2 * highest + 1) * (
+        (2 * highest + 1) / n_samples
+    )
     ratios = [fm4(turn, n_teeth), sideband_ratio(turn, n_teeth), energy_ratio(turn, n_teeth)]
     return [*ratios, rms(residual_signal(turn, n_teeth))]
 
@@ -165,7 +196,9 @@ class Seen:
     raises: bool
 
 
-NOTHING_SEEN = Seen(d_prime=math.nan, standard_error=math.nan, auroc=math.nan, indicator=-1, raises=True)
+NOTHING_SEEN = Seen(
+    d_prime=math.nan, standard_error=math.nan, auroc=math.nan, indicator=-1, raises=True
+)
 
 
 def seen_by_indicators(sound: FloatArray, faulty: FloatArray) -> Seen:
@@ -223,7 +256,11 @@ def confirmed(sound: FloatArray, faulty: FloatArray, *, indicator: int, raises: 
     sign = 1.0 if raises else -1.0
     scores = sign * np.stack([sound[:, indicator], faulty[:, indicator]])
     scores = scores[:, np.isfinite(scores).all(axis=0)]
-    return _judged(*scores, indicator=indicator, raises=raises) if scores.shape[1] >= FEWEST_UNITS else NOTHING_SEEN
+    return (
+        _judged(*scores, indicator=indicator, raises=raises)
+        if scores.shape[1] >= FEWEST_UNITS
+        else NOTHING_SEEN
+    )
 
 
 def _judged(sound: FloatArray, faulty: FloatArray, *, indicator: int, raises: bool) -> Seen:

@@ -30,7 +30,9 @@ FloatArray = NDArray[np.floating]
 HEALTHY = "healthy"
 PREFIX = "adaptation."
 MOST_WINDOWS = 500  # of the training, evenly spaced, whose features are stored
-LEAST_WINDOWS = 8  # assumed; a second at the default length: moments of fewer are those of the moment
+LEAST_WINDOWS = (
+    8  # assumed; a second at the default length: moments of fewer are those of the moment
+)
 HEAD = "head"  # of every network: what makes scores of features
 RIDGE = 1.0  # on covariances of features of unit variance, as published
 
@@ -66,7 +68,11 @@ def statistics_from(tensors: Mapping[str, NDArray[Any]]) -> Statistics | None:
     ------
     DatasetError    for tensors that are no such thing
     """
-    held = {name.removeprefix(PREFIX): value for name, value in tensors.items() if name.startswith(PREFIX)}
+    held = {
+        name.removeprefix(PREFIX): value
+        for name, value in tensors.items()
+        if name.startswith(PREFIX)
+    }
     if not held:
         return None
     whole = {name: np.asarray(value, dtype=float) for name, value in held.items()}
@@ -77,11 +83,17 @@ def statistics_from(tensors: Mapping[str, NDArray[Any]]) -> Statistics | None:
     if not {"features", "levels"} <= set(whole) or set(mean) != set(variance):
         raise DatasetError("its healthy statistics are not whole; train the model again")
     if not all(np.isfinite(value).all() for value in whole.values()) or whole["features"].ndim != 2:
-        raise DatasetError("its healthy statistics hold what is no statistic; train the model again")
-    return Statistics(mean=mean, variance=variance, features=whole["features"], levels=whole["levels"])
+        raise DatasetError(
+            "its healthy statistics hold what is no statistic; train the model again"
+        )
+    return Statistics(
+        mean=mean, variance=variance, features=whole["features"], levels=whole["levels"]
+    )
 
 
-def healthy_statistics(model: nn.Module, train: WindowSet, class_names: tuple[str, ...]) -> Statistics | None:
+def healthy_statistics(
+    model: nn.Module, train: WindowSet, class_names: tuple[str, ...]
+) -> Statistics | None:
     """Statistics of the healthy training windows; None where no class is called so."""
     if HEALTHY not in class_names:
         return None
@@ -92,7 +104,10 @@ def healthy_statistics(model: nn.Module, train: WindowSet, class_names: tuple[st
 def chosen_windows(windows: WindowSet, chosen: NDArray[np.integer]) -> WindowSet:
     """At most `MOST_WINDOWS` of the chosen ones, evenly spaced."""
     kept = np.linspace(0, chosen.size - 1, min(chosen.size, MOST_WINDOWS)).round().astype(int)
-    parts = {name: getattr(windows, name)[chosen[kept]] for name in ("segment", "start", "label", "record")}
+    parts = {
+        name: getattr(windows, name)[chosen[kept]]
+        for name in ("segment", "start", "label", "record")
+    }
     return replace(windows, **parts)
 
 
@@ -108,7 +123,9 @@ def statistics_of(model: nn.Module, windows: WindowSet) -> Statistics:
     )
 
 
-def adapt_network(model: nn.Module, source: Statistics, windows: WindowSet, method: str) -> nn.Module:
+def adapt_network(
+    model: nn.Module, source: Statistics, windows: WindowSet, method: str
+) -> nn.Module:
     """A copy of the network that sees these windows as the training's.
 
     Parameters
@@ -154,8 +171,13 @@ def _adapt_norms(model: nn.Module, source: Statistics, windows: WindowSet) -> No
         mean, variance = _observe(model, windows, [name])[0][name]
         assert layer.running_mean is not None
         assert layer.running_var is not None
-        own_mean, own_variance = (value.double().numpy() for value in (layer.running_mean, layer.running_var))
-        if source.mean[name].shape != own_mean.shape or source.variance[name].shape != own_mean.shape:
+        own_mean, own_variance = (
+            value.double().numpy() for value in (layer.running_mean, layer.running_var)
+        )
+        if (
+            source.mean[name].shape != own_mean.shape
+            or source.variance[name].shape != own_mean.shape
+        ):
             raise DatasetError("the healthy statistics belong to another network")
         ratio = (variance + layer.eps) / (source.variance[name] + layer.eps)
         moved = mean - (source.mean[name] - own_mean) * np.sqrt(ratio)
@@ -181,7 +203,8 @@ def _align_features(model: nn.Module, source: Statistics, windows: WindowSet) ->
     scale = source.features.std(axis=0)
     scale = np.where(scale > 0, scale, 1.0)
     inverse, root = (
-        _power(_covariance(rows / scale), power) for rows, power in ((target, -0.5), (source.features, 0.5))
+        _power(_covariance(rows / scale), power)
+        for rows, power in ((target, -0.5), (source.features, 0.5))
     )
     turn = (inverse @ root) * scale / scale[:, None]
     weight, bias = (value.detach().double().numpy() for value in (head.weight, head.bias))
@@ -220,9 +243,15 @@ def _norms(model: nn.Module) -> list[tuple[str, nn.BatchNorm1d]]:
 
 def _head(model: nn.Module) -> nn.Linear:
     """The last linear layer of what makes the class scores."""
-    linear = [layer for layer in getattr(model, HEAD, nn.Identity()).modules() if isinstance(layer, nn.Linear)]
+    linear = [
+        layer
+        for layer in getattr(model, HEAD, nn.Identity()).modules()
+        if isinstance(layer, nn.Linear)
+    ]
     if not linear:
-        raise ConfigError("the class scores of this network are not linear in features; adaptation needs that")
+        raise ConfigError(
+            "the class scores of this network are not linear in features; adaptation needs that"
+        )
     return linear[-1]
 
 
@@ -246,7 +275,11 @@ def _observe(
 
     layers = dict(model.named_modules())
     hooks = [layers[name].register_forward_pre_hook(watch(name)) for name in names]
-    hooks.append(_head(model).register_forward_pre_hook(lambda _, inputs: features.append(inputs[0].double().numpy())))
+    hooks.append(
+        _head(model).register_forward_pre_hook(
+            lambda _, inputs: features.append(inputs[0].double().numpy())
+        )
+    )
     every = np.arange(len(windows))
     try:
         with torch.inference_mode():
@@ -256,7 +289,10 @@ def _observe(
         for hook in hooks:
             hook.remove()
     mean = {name: sums[name] / counts[name] for name in names}
-    moments = {name: (mean[name], np.maximum(squares[name] / counts[name] - mean[name] ** 2, 0.0)) for name in names}
+    moments = {
+        name: (mean[name], np.maximum(squares[name] / counts[name] - mean[name] ** 2, 0.0))
+        for name in names
+    }
     return moments, np.concatenate(features)
 
 

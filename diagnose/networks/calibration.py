@@ -79,7 +79,9 @@ def calibration_error(rows: Sequence[dict[str, float | int]]) -> float:
     Source: Naeini, Cooper & Hauskrecht (2015), "Obtaining well calibrated probabilities using Bayesian binning", AAAI.
     """
     total = sum(row["n_records"] for row in rows)
-    return float(sum(row["n_records"] * abs(row["confidence"] - row["accuracy"]) for row in rows) / total)
+    return float(
+        sum(row["n_records"] * abs(row["confidence"] - row["accuracy"]) for row in rows) / total
+    )
 
 
 def error_by_chance(confidence: FloatArray) -> float:
@@ -90,7 +92,9 @@ def error_by_chance(confidence: FloatArray) -> float:
 
 
 def calibration_scores(
-    log_probabilities: Sequence[FloatArray], labels: Sequence[IntArray], temperatures: Sequence[float]
+    log_probabilities: Sequence[FloatArray],
+    labels: Sequence[IntArray],
+    temperatures: Sequence[float],
 ) -> dict[str, Any]:
     """Calibration over test records before and after scaling, one entry a seed; reliability of all seeds together.
 
@@ -100,14 +104,23 @@ def calibration_scores(
     labels : for each seed (record,)
     temperatures : one a seed
     """
-    result: dict[str, Any] = {"temperature": [float(value) for value in temperatures], "n_bins": N_BINS}
-    right = [values.argmax(axis=1) == truth for values, truth in zip(log_probabilities, labels, strict=True)]
+    result: dict[str, Any] = {
+        "temperature": [float(value) for value in temperatures],
+        "n_bins": N_BINS,
+    }
+    right = [
+        values.argmax(axis=1) == truth
+        for values, truth in zip(log_probabilities, labels, strict=True)
+    ]
     for name, scales in (("before", [1.0] * len(temperatures)), ("after", temperatures)):
-        logs = [_scaled(values, scale) for values, scale in zip(log_probabilities, scales, strict=True)]
+        logs = [
+            _scaled(values, scale) for values, scale in zip(log_probabilities, scales, strict=True)
+        ]
         confidence = [np.exp(values.max(axis=1)) for values in logs]
         result[name] = {
             "expected_calibration_error": [
-                calibration_error(reliability(sure, hits)) for sure, hits in zip(confidence, right, strict=True)
+                calibration_error(reliability(sure, hits))
+                for sure, hits in zip(confidence, right, strict=True)
             ],
             "error_by_chance": [error_by_chance(sure) for sure in confidence],
             "cross_entropy": [

@@ -43,9 +43,13 @@ class Domain:
 
     def __post_init__(self) -> None:
         if self.levels.ndim != 2 or self.levels.size == 0 or not np.isfinite(self.levels).all():
-            raise DatasetError("the tensor of its out-of-distribution flag holds no levels of windows")
+            raise DatasetError(
+                "the tensor of its out-of-distribution flag holds no levels of windows"
+            )
         if not (np.isfinite(self.threshold) and self.threshold > 0):
-            raise DatasetError(f"the threshold of its out-of-distribution flag is {self.threshold!r}")
+            raise DatasetError(
+                f"the threshold of its out-of-distribution flag is {self.threshold!r}"
+            )
 
     def tensors(self) -> dict[str, NDArray[np.float32]]:
         """What is stored beside the weights."""
@@ -69,7 +73,9 @@ def domain_from(facts: Mapping[str, Any], tensors: Mapping[str, NDArray[Any]]) -
     DatasetError    for another method, or facts and tensors that are no such thing
     """
     if facts.get("method") != METHOD:
-        raise DatasetError(f"its out-of-distribution flag is {facts.get('method')!r}, this program knows {METHOD}")
+        raise DatasetError(
+            f"its out-of-distribution flag is {facts.get('method')!r}, this program knows {METHOD}"
+        )
     try:
         return Domain(
             levels=np.asarray(tensors[TENSOR], dtype=np.float32),
@@ -77,7 +83,9 @@ def domain_from(facts: Mapping[str, Any], tensors: Mapping[str, NDArray[Any]]) -
             n_validation_windows=int(facts["n_validation_windows"]),
         )
     except (KeyError, TypeError, ValueError) as error:
-        raise DatasetError(f"its out-of-distribution flag is not whole: {' '.join(str(error).split())}") from None
+        raise DatasetError(
+            f"its out-of-distribution flag is not whole: {' '.join(str(error).split())}"
+        ) from None
 
 
 def fit_domain(train: WindowSet, validation: WindowSet) -> Domain:
@@ -91,7 +99,9 @@ def fit_domain(train: WindowSet, validation: WindowSet) -> Domain:
     section 3; threshold on held-out known data as in Sun, Ming, Zhu & Li (2022), "Out-of-distribution detection with
     deep nearest neighbors", ICML, section 3.
     """
-    kept = np.unique(np.linspace(0, len(train) - 1, min(len(train), MOST_WINDOWS)).round().astype(int))
+    kept = np.unique(
+        np.linspace(0, len(train) - 1, min(len(train), MOST_WINDOWS)).round().astype(int)
+    )
     levels = window_levels(train, kept).astype(np.float32)
     distance = neighbor_distance(window_levels(validation, np.arange(len(validation))), levels)
     return Domain(
@@ -116,10 +126,14 @@ def distances(domain: Domain, windows: WindowSet) -> FloatArray:
     return neighbor_distance(levels, domain.levels)
 
 
-def window_levels(windows: WindowSet, chosen: NDArray[np.integer], *, batch_size: int = 64) -> FloatArray:
+def window_levels(
+    windows: WindowSet, chosen: NDArray[np.integer], *, batch_size: int = 64
+) -> FloatArray:
     """(window, feature) `band_levels` of chosen windows at their planned starts, channel after channel."""
     blocks = np.array_split(chosen, -(-chosen.size // batch_size))
-    return np.concatenate([band_levels(windows.cut(block)).reshape(block.size, -1) for block in blocks])
+    return np.concatenate(
+        [band_levels(windows.cut(block)).reshape(block.size, -1) for block in blocks]
+    )
 
 
 def band_levels(windows: NDArray[np.floating]) -> FloatArray:

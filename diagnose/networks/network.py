@@ -41,7 +41,9 @@ class Network(nn.Module, ABC):
         )
         self.further = nn.ModuleDict()
         self.places = None
-        self.turns: tuple[tuple[int, int], ...] = ()  # (index in GEARS, teeth) of each gear that places run around
+        self.turns: tuple[
+            tuple[int, int], ...
+        ] = ()  # (index in GEARS, teeth) of each gear that places run around
 
     @abstractmethod
     def look(self, windows: torch.Tensor) -> tuple[torch.Tensor, torch.Tensor | None]:
@@ -65,7 +67,9 @@ class Network(nn.Module, ABC):
             "classes": self.head(features),
             **{name: head(features) for name, head in self.further.items()},
         }
-        return said if maps is None or self.places is None else {**said, "places": self.places(maps)}
+        return (
+            said if maps is None or self.places is None else {**said, "places": self.places(maps)}
+        )
 
     def add_heads(self, names: Sequence[str], n_features: int, n_classes: int) -> None:
         """Add linear heads: a severity for each class, a score for each of `GEARS`.

@@ -83,7 +83,9 @@ class OrderCnn(Network):
         """Maximum over the places of each gear's turn, one gear after the other; the maps of all turns."""
         *turns, mesh = windows.split(self.n_points, dim=-1)
         looked_at = [(turns[gear], self.n_teeth[gear]) for gear in self.gears]
-        parts = [torch.cat([turn, mesh.repeat(1, 1, n_teeth)], dim=1) for turn, n_teeth in looked_at]
+        parts = [
+            torch.cat([turn, mesh.repeat(1, 1, n_teeth)], dim=1) for turn, n_teeth in looked_at
+        ]
         for index, (convolution, norm) in enumerate(
             zip(self.convolutions, self.norms, strict=True),
         ):
@@ -91,7 +93,10 @@ class OrderCnn(Network):
             if index == 0:
                 parts = [torch.asinh(self.compression * part) for part in parts]
             parts = _together(norm, parts)
-        usual = [torch.cat([part, part.mean(dim=-1, keepdim=True).expand_as(part)], dim=1) for part in parts]
+        usual = [
+            torch.cat([part, part.mean(dim=-1, keepdim=True).expand_as(part)], dim=1)
+            for part in parts
+        ]
         parts = _together(self.compare_norm, [self.compare(part) for part in usual])
         return torch.cat([part.amax(dim=-1) for part in parts], dim=1), torch.cat(parts, dim=-1)
 

@@ -19,7 +19,9 @@ from diagnose.training.store import load_domain, load_model, load_statistics, sa
 from gensig.errors import ConfigError, DatasetError
 
 
-def adapt_model(folder: str | Path, sources: Sequence[Source], method: str, out: str | Path) -> dict[str, Any]:
+def adapt_model(
+    folder: str | Path, sources: Sequence[Source], method: str, out: str | Path
+) -> dict[str, Any]:
     """Adapt a stored network to a machine and store what comes out as another one, for ``diagnose predict``.
 
     Parameters
@@ -43,7 +45,9 @@ def adapt_model(folder: str | Path, sources: Sequence[Source], method: str, out:
         raise DatasetError(f"{folder} was adapted before; take the network that was trained")
     statistics = load_statistics(folder)
     if statistics is None:
-        raise DatasetError(f"{folder} stores no healthy statistics (no class {HEALTHY}, or too old); train it again")
+        raise DatasetError(
+            f"{folder} stores no healthy statistics (no class {HEALTHY}, or too old); train it again"
+        )
     for source in sources:
         _check_speed(source, description.speed_rpm_range)
     parts = [prepare_recording(description, source).windows for source in sources]
@@ -65,9 +69,15 @@ def adapt_model(folder: str | Path, sources: Sequence[Source], method: str, out:
     adaptation = {"method": method, "matched": "healthy", "recordings": recordings}
     save_model(Path(out), weights | known, replace(description, adaptation=adaptation))
     healthy = description.class_names.index(HEALTHY)
-    result: dict[str, Any] = {"method": method, "n_recordings": len(parts), "n_windows": len(windows)}
+    result: dict[str, Any] = {
+        "method": method,
+        "n_recordings": len(parts),
+        "n_windows": len(windows),
+    }
     for when, network, region in (("before", model, domain), ("after", adapted, moved)):
-        beyond = None if region is None else int((distances(region, windows) > region.threshold).sum())
+        beyond = (
+            None if region is None else int((distances(region, windows) > region.threshold).sum())
+        )
         said = np.exp(predict_windows(network, windows)[:, healthy]).mean()
         result[when] = {"probability_healthy": float(said), "n_windows_beyond": beyond}
     return result
@@ -78,7 +88,9 @@ def together(parts: Sequence[WindowSet]) -> WindowSet:
     n_signals = np.cumsum([0, *(len(part.signals) for part in parts)])
     n_records = np.cumsum([0, *(int(part.record.max()) + 1 for part in parts)])
     moved = [
-        replace(part, segment=part.segment + n_signals[index], record=part.record + n_records[index])
+        replace(
+            part, segment=part.segment + n_signals[index], record=part.record + n_records[index]
+        )
         for index, part in enumerate(parts)
     ]
     return replace(

@@ -72,7 +72,9 @@ def export_onnx(network: StoredNetwork, file: Path) -> str:
         found = answers_of(file, inputs, graph.output) / graph.unit
         taken = (normalised(windows, description.normalise), *graph.further.values())
         with torch.inference_mode():
-            expected = graph.answer(network.model, *map(torch.from_numpy, taken)).numpy().astype(float)
+            expected = (
+                graph.answer(network.model, *map(torch.from_numpy, taken)).numpy().astype(float)
+            )
         error = np.abs(found - expected) / np.maximum(np.abs(expected), 1.0)
         difference = float(np.max(error))
         if not difference <= TOLERANCE:
@@ -97,7 +99,10 @@ def answers_of(
     options = onnxruntime.SessionOptions()
     options.intra_op_num_threads = options.inter_op_num_threads = 1
     session = onnxruntime.InferenceSession(str(file), options, providers=["CPUExecutionProvider"])
-    blocks = [{name: values[part] for name, values in inputs.items()} for part in (slice(0, 1), slice(1, None))]
+    blocks = [
+        {name: values[part] for name, values in inputs.items()}
+        for part in (slice(0, 1), slice(1, None))
+    ]
     return np.concatenate([session.run([output], block)[0] for block in blocks]).astype(float)
 
 

@@ -123,7 +123,11 @@ def reasons_unlike(
             reasons.append(
                 f"{outside[-1]:g} r/min is outside the {low:.0f} to {high:.0f} r/min of the training{hint}",
             )
-    if source.teeth is not None and description.n_teeth is not None and source.teeth != description.n_teeth:
+    if (
+        source.teeth is not None
+        and description.n_teeth is not None
+        and source.teeth != description.n_teeth
+    ):
         given, known = ("/".join(map(str, teeth)) for teeth in (source.teeth, description.n_teeth))
         reasons.append(f"the gears have {given} teeth, those of the training {known}")
     return reasons

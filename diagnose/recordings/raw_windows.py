@@ -60,13 +60,17 @@ class EqualParts(nn.Module):
 
     def __init__(self, n_samples: int, n_parts: int, *, maximum: bool) -> None:
         super().__init__()
-        self.parts = [(i * n_samples // n_parts, -(-(i + 1) * n_samples // n_parts)) for i in range(n_parts)]
+        self.parts = [
+            (i * n_samples // n_parts, -(-(i + 1) * n_samples // n_parts)) for i in range(n_parts)
+        ]
         self.maximum = maximum
 
     def forward(self, maps: torch.Tensor) -> torch.Tensor:
         """(window, channel, part) of (window, channel, sample)."""
         cut = [maps[..., first:last] for first, last in self.parts]
-        return torch.stack([part.amax(dim=-1) if self.maximum else part.mean(dim=-1) for part in cut], dim=-1)
+        return torch.stack(
+            [part.amax(dim=-1) if self.maximum else part.mean(dim=-1) for part in cut], dim=-1
+        )
 
 
 def raw_examples(model: nn.Module, description: ModelDescription) -> NDArray[np.float32]:
@@ -110,7 +114,9 @@ def with_fixed_pooling(model: nn.Module, *inputs: torch.Tensor) -> nn.Module:
     for hook in hooks:
         hook.remove()
     for name, module in pools.items():
-        n_parts = module.output_size if isinstance(module.output_size, int) else module.output_size[0]
+        n_parts = (
+            module.output_size if isinstance(module.output_size, int) else module.output_size[0]
+        )
         parent, _, last = name.rpartition(".")
         parts = EqualParts(
             lengths[module],

@@ -67,7 +67,8 @@ class StoredClassifier(StoredNetwork):
                 "gear": None if gear is None else GEARS[int(gear.argmax())],
             },
             windows=[
-                {"probabilities": dict(zip(names, row.tolist(), strict=True))} for row in probabilities(log_probability)
+                {"probabilities": dict(zip(names, row.tolist(), strict=True))}
+                for row in probabilities(log_probability)
             ],
             conditions={
                 "adaptation": description.adaptation,

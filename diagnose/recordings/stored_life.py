@@ -81,7 +81,10 @@ class StoredLife(StoredNetwork):
                 "n_calibration_lives": facts.n_calibration_lives,
                 "method": facts.method,
             },
-            windows=[{"remaining_life_h": float(np.clip(of_window, 0.0, 1.0)) * level} for of_window in by_window],
+            windows=[
+                {"remaining_life_h": float(np.clip(of_window, 0.0, 1.0)) * level}
+                for of_window in by_window
+            ],
             conditions={
                 "told": {name: values[name] for name in facts.told},
                 "trained_range": {name: list(facts.told_range[name]) for name in facts.told},

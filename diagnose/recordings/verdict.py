@@ -11,7 +11,9 @@ from diagnose.scoring.metrics import is_above
 LEAST_MARGIN = 0.10  # between the two most probable classes; assumed
 
 
-def verdict(probabilities: Mapping[str, float], test_score: Mapping[str, Any] | None) -> dict[str, Any]:
+def verdict(
+    probabilities: Mapping[str, float], test_score: Mapping[str, Any] | None
+) -> dict[str, Any]:
     """The most probable class, the one behind it, and why neither can be said.
 
     Parameters
@@ -23,11 +25,15 @@ def verdict(probabilities: Mapping[str, float], test_score: Mapping[str, Any] | 
     -------
     part of what ``diagnose predict --json`` prints; the class is undecided where `undecided_because` is not empty
     """
-    (first, highest), (second, next_highest) = sorted(probabilities.items(), key=lambda item: -item[1])[:2]
+    (first, highest), (second, next_highest) = sorted(
+        probabilities.items(), key=lambda item: -item[1]
+    )[:2]
     because = []
     if highest - next_highest < LEAST_MARGIN:
         because.append(f"the two are less than {LEAST_MARGIN:.2f} apart")
-    if test_score is not None and not is_above(test_score["balanced_accuracy"], test_score["chance"]):
+    if test_score is not None and not is_above(
+        test_score["balanced_accuracy"], test_score["chance"]
+    ):
         because.append("the model was not shown to be better than chance")
     return {
         "class": first,
@@ -42,7 +48,10 @@ def verdict(probabilities: Mapping[str, float], test_score: Mapping[str, Any] | 
 
 def class_text(said: Mapping[str, Any]) -> str:
     """The class and the one behind it, or that there is none."""
-    first, second = f"{said['probability']:.2f}", f"{said['runner_up']} {said['runner_up_probability']:.2f}"
+    first, second = (
+        f"{said['probability']:.2f}",
+        f"{said['runner_up']} {said['runner_up_probability']:.2f}",
+    )
     if said["undecided"]:
         return f"undecided, {said['class']} {first} or {second} ({'; '.join(said['undecided_because'])})"
     return f"{said['class']}, probability {first}, next {second}"

@@ -31,14 +31,30 @@ def conditions_figure(path: Path, answers: Answers) -> None:
     for panel, column in zip(axes, columns, strict=True):
         mine = [row for row in rows if row["column"] == column]
         numbers = mine[0]["low"] is not None
-        at = [(row["low"] + row["high"]) / 2 if numbers else place for place, row in enumerate(mine)]
+        at = [
+            (row["low"] + row["high"]) / 2 if numbers else place for place, row in enumerate(mine)
+        ]
         aside = 0.0 if numbers else 0.15
         for index, method in enumerate(methods):
             places = np.asarray(at) + index * aside
-            _line_with_band(panel, places, [row["scores"][method] for row in mine], index, method, joined=numbers)
+            _line_with_band(
+                panel,
+                places,
+                [row["scores"][method] for row in mine],
+                index,
+                method,
+                joined=numbers,
+            )
         weak = [place for place, row in enumerate(mine) if (row["difference_at_most"] or 0) < 0]
         values = [mine[place]["scores"][methods[0]]["mean"] for place in weak]
-        panel.plot([at[place] for place in weak], values, "o", markersize=14, fillstyle="none", color="black")
+        panel.plot(
+            [at[place] for place in weak],
+            values,
+            "o",
+            markersize=14,
+            fillstyle="none",
+            color="black",
+        )
         if not numbers:
             panel.set_xticks(at, [row["group"] for row in mine], rotation=20, fontsize=7)
             panel.set_xlim(-0.5, len(mine) - 0.5 + aside)
@@ -68,8 +84,12 @@ def detection_figure(path: Path, answers: Answers) -> None:
             rows = found["by_severity"]
             at = np.array([(row["severity_low"] + row["severity_high"]) / 2 for row in rows])
             at = at + index * 0.01 * (at.max() - at.min())  # so that bars do not hide each other
-            _line_with_band(panel, at, [row["share_found"] for row in rows], index, method, joined=False)
-            panel.plot(found["curve"]["severity"], found["curve"]["share_found"], color=COLORS[index])
+            _line_with_band(
+                panel, at, [row["share_found"] for row in rows], index, method, joined=False
+            )
+            panel.plot(
+                found["curve"]["severity"], found["curve"]["share_found"], color=COLORS[index]
+            )
             alarms = detection[method]["false_alarms"]["mean"]
             if alarms is not None:
                 panel.axhline(alarms, color=COLORS[index], linestyle=":", linewidth=1)
@@ -78,7 +98,14 @@ def detection_figure(path: Path, answers: Answers) -> None:
         mine = detection[methods[0]]["classes"][name]
         panel.set_title(f"{name}: {records_behind(mine)}", fontsize=9)
         if too_few_for_curve(mine):
-            panel.text(0.5, 0.5, f"too few: {CURVE_NEEDS}", fontsize=8, ha="center", transform=panel.transAxes)
+            panel.text(
+                0.5,
+                0.5,
+                f"too few: {CURVE_NEEDS}",
+                fontsize=8,
+                ha="center",
+                transform=panel.transAxes,
+            )
         panel.grid(alpha=0.3)
     axes[0].set_ylabel("share of records found")
     axes[-1].legend(loc="best", fontsize=8)
@@ -133,7 +160,9 @@ def _line_with_band(
         panel.plot(at, mean, color=color, marker=marker, label=label.replace("_", " "))
         panel.fill_between(at, low, high, color=color, alpha=0.18, linewidth=0)
         return
-    panel.plot(at, mean, color=color, marker=marker, linestyle="none", label=label.replace("_", " "))
+    panel.plot(
+        at, mean, color=color, marker=marker, linestyle="none", label=label.replace("_", " ")
+    )
     panel.vlines(at, low, high, color=color, linewidth=1.2, alpha=0.7)
 
 
@@ -147,4 +176,10 @@ def _draw_limits(panel: Any, limits: Sequence[Mapping[str, Any]]) -> None:
         panel.plot([low, high], [row["share"], row["share"]], color="black", linewidth=2, alpha=0.6)
         panel.plot(row["value"], row["share"], color="black", marker="|", markersize=12)
         text = f"{row['share']:.0%} at {row['value']:.2f}"
-        panel.annotate(text, (row["value"], row["share"]), xytext=(4, 5), textcoords="offset points", fontsize=8)
+        panel.annotate(
+            text,
+            (row["value"], row["share"]),
+            xytext=(4, 5),
+            textcoords="offset points",
+            fontsize=8,
+        )

@@ -26,9 +26,13 @@ def answer_sections(folder: Path, clean: Mapping[str, Any]) -> list[Section]:
     """
     answers = {name: result["answers"] for name, result in clean.items()}
     sections = [
-        _detection_section(folder, {name: part for name, part in answers.items() if "detection" in part}),
+        _detection_section(
+            folder, {name: part for name, part in answers.items() if "detection" in part}
+        ),
         _conditions_section(folder, answers),
-        _length_section(folder, {name: part for name, part in answers.items() if "window_length" in part}),
+        _length_section(
+            folder, {name: part for name, part in answers.items() if "window_length" in part}
+        ),
         _comparisons_section(answers),
     ]
     return [section for section in sections if section.table or section.notes]
@@ -49,7 +53,9 @@ def _detection_section(folder: Path, answers: Mapping[str, Any]) -> Section:
             notes.append((protocol, f"{warning}: {interval_text(mine['false_alarms'])}."))
         if graded_classes(part):
             detection_figure(folder / f"detection_{protocol}.png", part)
-            figures.append((f"detection_{protocol}.png", f"share found against severity, {protocol}"))
+            figures.append(
+                (f"detection_{protocol}.png", f"share found against severity, {protocol}")
+            )
     if not rows:
         return Section(title="From what severity a fault is found")
     return Section(
@@ -59,7 +65,9 @@ def _detection_section(folder: Path, answers: Mapping[str, Any]) -> Section:
             "5 % false alarms, whatever class it is then given. AUROC: chance that a faulty record of the class looks "
             "more faulty than a healthy one; 0.5 is guessing."
         ],
-        table=Table(head=["protocol", "method", "class", "AUROC", "share found", "false alarms"], rows=rows),
+        table=Table(
+            head=["protocol", "method", "class", "AUROC", "share found", "false alarms"], rows=rows
+        ),
         notes=notes,
         figures=figures,
     )
@@ -70,7 +78,12 @@ def _conditions_section(folder: Path, answers: Mapping[str, Any]) -> Section:
     for protocol, part in answers.items():
         if part["conditions"]["rows"]:
             conditions_figure(folder / f"conditions_{protocol}.png", part)
-            figures.append((f"conditions_{protocol}.png", f"score over each condition, {protocol}; ring: weaker"))
+            figures.append(
+                (
+                    f"conditions_{protocol}.png",
+                    f"score over each condition, {protocol}; ring: weaker",
+                )
+            )
     return Section(
         title="Which condition fails",
         notes=[(protocol, part["conditions"]["summary"]) for protocol, part in answers.items()],
@@ -85,7 +98,9 @@ def _length_section(folder: Path, answers: Mapping[str, Any]) -> Section:
     return Section(
         title="How much signal it needs",
         notes=[(protocol, part["window_length"]["summary"]) for protocol, part in answers.items()],
-        figures=[("window_length.png", "score by the length of signal judged, networks as trained")],
+        figures=[
+            ("window_length.png", "score by the length of signal judged, networks as trained")
+        ],
         folded=True,
     )
 
@@ -97,6 +112,10 @@ def _comparisons_section(answers: Mapping[str, Any]) -> Section:
             "Difference of balanced accuracy on the same test units [95 % interval]; p-value of swapping both methods "
             "unit by unit, corrected for the number of baselines (Holm)."
         ],
-        notes=[(protocol, f"{row['summary']}.") for protocol, part in answers.items() for row in part["comparisons"]],
+        notes=[
+            (protocol, f"{row['summary']}.")
+            for protocol, part in answers.items()
+            for row in part["comparisons"]
+        ],
         folded=True,
     )

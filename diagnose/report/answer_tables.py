@@ -27,11 +27,18 @@ def write_tables(folder: Path, metrics: Mapping[str, Any]) -> list[str]:
     answers = {name: result["answers"] for name, result in results.items() if result["answers"]}
     tables: dict[str, list[dict[str, Any]]] = {
         SCORES: [row for name, result in results.items() for row in _score_rows(name, result)],
-        BY_CONDITION: [row for name, part in answers.items() for row in _condition_rows(name, part)],
+        BY_CONDITION: [
+            row for name, part in answers.items() for row in _condition_rows(name, part)
+        ],
         BY_SEVERITY: [row for name, part in answers.items() for row in _severity_rows(name, part)],
         LIMITS: [row for name, part in answers.items() for row in _limit_rows(name, part)],
         COMPARISONS: [
-            {"protocol": name, **{key: value for key, value in row.items() if key not in ("difference", "summary")}}
+            {
+                "protocol": name,
+                **{
+                    key: value for key, value in row.items() if key not in ("difference", "summary")
+                },
+            }
             | _spread("difference", row["difference"])
             for name, part in answers.items()
             for row in part["comparisons"]

@@ -25,7 +25,11 @@ def verdict(method: Mapping[str, Any], chance: float) -> str:
         return "no verdict: too few machines"
     if score["low"] > chance:
         return "ABOVE chance: look for a leak"
-    return "at chance" if score["high"] >= chance else "below chance: one interval in forty is, by luck"
+    return (
+        "at chance"
+        if score["high"] >= chance
+        else "below chance: one interval in forty is, by luck"
+    )
 
 
 def controls_section(metrics: Mapping[str, Any]) -> Section:
@@ -39,10 +43,17 @@ def controls_section(metrics: Mapping[str, Any]) -> Section:
     labels = [row[1] for row in rows]
     notes = [(name, text) for name, text in control_notes().items() if _explains(name, labels)]
     if not _explains("oracle", labels) and metrics["settings"]["oracle"] == "auto":
-        notes.append(("oracle", "none: the data set holds no healthy twins (dataset.store_healthy_twin=true)."))
+        notes.append(
+            (
+                "oracle",
+                "none: the data set holds no healthy twins (dataset.store_healthy_twin=true).",
+            )
+        )
     return Section(
         title="Controls",
-        text=["What would show that a score has another cause than the fault, and what the signal holds at best."],
+        text=[
+            "What would show that a score has another cause than the fault, and what the signal holds at best."
+        ],
         table=Table(head=["protocol", "control", "balanced accuracy", "verdict"], rows=rows),
         notes=notes,
         folded=True,
@@ -70,8 +81,14 @@ def _rows(result: Mapping[str, Any], model: str) -> list[list[str]]:
             rows.append([text.label, score_cell(probe), found])
     if "oracle" in methods:
         chosen = oracle_labels(model)
-        rows.append(["oracle", score_cell(methods["oracle"]), f"of {chosen[methods['oracle']['chosen']]}"])
-        rows += [[f"oracle, {name}", score_cell(methods[key]), ""] for key, name in chosen.items() if key in methods]
+        rows.append(
+            ["oracle", score_cell(methods["oracle"]), f"of {chosen[methods['oracle']['chosen']]}"]
+        )
+        rows += [
+            [f"oracle, {name}", score_cell(methods[key]), ""]
+            for key, name in chosen.items()
+            if key in methods
+        ]
         rows.append([f"{model} over oracle", oracle_share(result), oracle_verdict(result)])
     return rows
 
@@ -84,4 +101,8 @@ def oracle_share(result: Mapping[str, Any]) -> str:
 def oracle_verdict(result: Mapping[str, Any]) -> str:
     """Whether the oracle was a bound here."""
     share = result["over_oracle"]["balanced_accuracy"]
-    return "the oracle was not learnt: no bound here" if is_above(share, 1) else "share of what the oracle finds"
+    return (
+        "the oracle was not learnt: no bound here"
+        if is_above(share, 1)
+        else "share of what the oracle finds"
+    )

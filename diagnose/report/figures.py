@@ -13,7 +13,9 @@ COLORS = ("#0072B2", "#D55E00", "#009E73", "#CC79A7", "#56B4E9", "#E69F00", "#00
 MARKERS = ("o", "s", "^", "D", "v", "P", "X")
 
 
-def confusion_figure(path: Path, confusion: Sequence[Sequence[int]], class_names: Sequence[str], title: str) -> None:
+def confusion_figure(
+    path: Path, confusion: Sequence[Sequence[int]], class_names: Sequence[str], title: str
+) -> None:
     """Share of each true class given each label, with counts of records (summed over seeds)."""
     figure, axes = subplots(1, size=(1.2 * len(class_names) + 2.4, 1.0 * len(class_names) + 1.9))
     counts = np.asarray(confusion)
@@ -35,21 +37,29 @@ def confusion_figure(path: Path, confusion: Sequence[Sequence[int]], class_names
 def scores_figure(path: Path, metrics: Mapping[str, Any]) -> None:
     """Balanced accuracy and interval of every method, one panel a protocol, leaky ones last and in grey."""
     results = sorted(metrics["protocols"].items(), key=lambda item: item[1]["leaky"])
-    named = dict.fromkeys([metrics["model"], *(name for _, result in results for name in result["methods"])])
+    named = dict.fromkeys(
+        [metrics["model"], *(name for _, result in results for name in result["methods"])]
+    )
     methods = [name for name in named if name != "chance"]
     height = 0.34 * len(methods) + 1.1
-    figure, axes = subplots(len(results), size=(min(3.4 * len(results) + 1.6, 16), height), sharey=True)
+    figure, axes = subplots(
+        len(results), size=(min(3.4 * len(results) + 1.6, 16), height), sharey=True
+    )
     for panel, (protocol, result) in zip(axes, results, strict=True):
         panel.axvline(result["methods"]["chance"]["balanced_accuracy"], color="0.4", linestyle=":")
         for place, name in enumerate(reversed(methods)):
             if name not in result["methods"]:
                 continue
             score = result["methods"][name]["balanced_accuracy"]
-            color = "0.6" if result["leaky"] else COLORS[0] if name == metrics["model"] else COLORS[-1]
+            color = (
+                "0.6" if result["leaky"] else COLORS[0] if name == metrics["model"] else COLORS[-1]
+            )
             if score["low"] is not None:
                 panel.plot([score["low"], score["high"]], [place, place], color=color, linewidth=2)
             panel.plot(score["mean"], place, color=color, marker="o")
-        panel.set_yticks(range(len(methods)), [name.replace("_", " ") for name in reversed(methods)])
+        panel.set_yticks(
+            range(len(methods)), [name.replace("_", " ") for name in reversed(methods)]
+        )
         title = protocol + ("\nLEAKY: not a result" if result["leaky"] else "")
         panel.set(xlim=(0, 1.02), ylim=(-0.6, len(methods) - 0.4), xlabel="balanced accuracy")
         panel.set_title(title, fontsize=10)
@@ -72,14 +82,18 @@ def reliability_figure(path: Path, protocols: Mapping[str, Mapping[str, Any]]) -
                 marker=MARKERS[index],
                 label=f"{name} scaling, error {error:.2f}",
             )
-        panel.set(xlabel="probability of the predicted class", xlim=(0, 1), ylim=(0, 1.03), title=protocol)
+        panel.set(
+            xlabel="probability of the predicted class", xlim=(0, 1), ylim=(0, 1.03), title=protocol
+        )
         panel.grid(alpha=0.3)
         panel.legend(loc="upper left", fontsize=8)
     axes[0].set_ylabel("share of records that are right")
     save(figure, path)
 
 
-def subplots(n_panels: int, *, size: tuple[float, float], sharey: bool = False) -> tuple[Any, list[Any]]:
+def subplots(
+    n_panels: int, *, size: tuple[float, float], sharey: bool = False
+) -> tuple[Any, list[Any]]:
     """Figure and axes without touching the state of pyplot, so that no display is needed."""
     from matplotlib.backends.backend_agg import FigureCanvasAgg
     from matplotlib.figure import Figure

@@ -55,7 +55,9 @@ def write_life_report(
     folder: Path, metrics: Mapping[str, Any], lives: Lives, predictions: Sequence[LifePrediction]
 ) -> Path:
     """Write ``metrics.json``, ``scores.csv``, a figure a protocol and ``report.html``, and return the page."""
-    (folder / "metrics.json").write_text(json.dumps(metrics, indent=2, allow_nan=False) + "\n", encoding="utf-8")
+    (folder / "metrics.json").write_text(
+        json.dumps(metrics, indent=2, allow_nan=False) + "\n", encoding="utf-8"
+    )
     _write_scores(folder / "scores.csv", metrics)
     sections = [
         Section(
@@ -63,7 +65,10 @@ def write_life_report(
             text=[
                 "Root of the mean squared error of the remaining life that the network says of machines it never saw."
             ],
-            cards=[_card(name, result, metrics["model"]) for name, result in metrics["protocols"].items()],
+            cards=[
+                _card(name, result, metrics["model"])
+                for name, result in metrics["protocols"].items()
+            ],
         )
     ]
     for name, result in metrics["protocols"].items():
@@ -82,7 +87,10 @@ def write_life_report(
                 figures=[(picture, caption)],
             )
         )
-    left_out = [("", f"{name} is left out: {reason}.") for name, reason in metrics["protocols_left_out"].items()]
+    left_out = [
+        ("", f"{name} is left out: {reason}.")
+        for name, reason in metrics["protocols_left_out"].items()
+    ]
     sections += [
         Section(title="What the numbers mean", notes=MEANINGS),
         Section(title="Protocols left out", notes=left_out),
@@ -90,7 +98,10 @@ def write_life_report(
             title="Files beside this page",
             notes=[
                 ("metrics.json", "everything in numbers, with settings and versions."),
-                ("predictions.csv", "what each method said of each test record, with its interval."),
+                (
+                    "predictions.csv",
+                    "what each method said of each test record, with its interval.",
+                ),
                 ("scores.csv", "the scores as a table."),
                 ("models/", "each network, for diagnose evaluate, predict and export."),
             ],
@@ -141,7 +152,14 @@ def life_figure(path: Path, lives: Lives, predictions: Sequence[LifePrediction])
             true = np.minimum(lives.remaining[one.record[mine]], level)
             by_time = np.argsort(lives.age[one.record[mine]])
             color = COLORS[index % len(COLORS)]
-            panel.plot(true[by_time], one.said[mine][by_time], color=color, marker=".", linewidth=0.8, markersize=4)
+            panel.plot(
+                true[by_time],
+                one.said[mine][by_time],
+                color=color,
+                marker=".",
+                linewidth=0.8,
+                markersize=4,
+            )
         panel.set(xlim=(1.03 * level, -0.03 * level), ylim=(-0.03 * level, 1.06 * level))
         panel.set(xlabel="true remaining life, h", title=name.replace("_", " "))
         panel.grid(alpha=0.3)
@@ -223,4 +241,11 @@ def _write_scores(path: Path, metrics: Mapping[str, Any]) -> None:
             for name, method in result["methods"].items():
                 for measure in (*MEASURES, "gain_over_age_only_h"):
                     row = method[measure]
-                    writer.writerow([protocol, name, measure, *(f"{row[key]:.6g}" for key in ("mean", "low", "high"))])
+                    writer.writerow(
+                        [
+                            protocol,
+                            name,
+                            measure,
+                            *(f"{row[key]:.6g}" for key in ("mean", "low", "high")),
+                        ]
+                    )

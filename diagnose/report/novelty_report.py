@@ -21,8 +21,16 @@ def novelty_tables(novelty: Mapping[str, Any]) -> list[str]:
     lines: list[str] = []
     for name, result in novelty.items():
         table = _table(result)
-        lines += ["", f"**{name}**: {_what_it_knows(result)}", "", "| " + " | ".join(table.head) + " |"]
-        lines += ["|---" * len(table.head) + "|", *("| " + " | ".join(row) + " |" for row in table.rows)]
+        lines += [
+            "",
+            f"**{name}**: {_what_it_knows(result)}",
+            "",
+            "| " + " | ".join(table.head) + " |",
+        ]
+        lines += [
+            "|---" * len(table.head) + "|",
+            *("| " + " | ".join(row) + " |" for row in table.rows),
+        ]
     return lines
 
 
@@ -44,7 +52,9 @@ def novelty_caveats(novelty: Mapping[str, Any], few_units: int) -> list[str]:
     lines = []
     for name, result in novelty.items():
         if (n_units := result["n_units"]["test"]) < few_units:
-            lines.append(f"{name}: only {n_units} test unit(s); at least {few_units} are advisable.")
+            lines.append(
+                f"{name}: only {n_units} test unit(s); at least {few_units} are advisable."
+            )
         if (n_records := result["n_records"]["validation"]) < LEAST_VALIDATION:
             lines.append(
                 f"{name}: {n_records} validation record(s); with fewer than {LEAST_VALIDATION} no threshold promises "
@@ -66,7 +76,9 @@ def _accuracy(result: Mapping[str, Any]) -> list[str]:
     if "known" not in result:
         return []
     score, chance = result["known"]["balanced_accuracy"], result["known"]["chance"]
-    return [f"Balanced accuracy of the network on the known classes: {_cell(score)}, chance {chance:.2f}."]
+    return [
+        f"Balanced accuracy of the network on the known classes: {_cell(score)}, chance {chance:.2f}."
+    ]
 
 
 def _notes(result: Mapping[str, Any]) -> list[tuple[str, str]]:
@@ -81,11 +93,17 @@ def _notes(result: Mapping[str, Any]) -> list[tuple[str, str]]:
             "share of the known records of the test units above it; where it is larger than meant, what is found "
             "flatters.",
         ),
-        ("Band levels", "the flag of diagnose predict. It and the networks see windows as the classifier does."),
+        (
+            "Band levels",
+            "the flag of diagnose predict. It and the networks see windows as the classifier does.",
+        ),
     ]
     if "known" in result:
         for name, method in result["methods"].items():
-            areas = [f"against {known} {_cell(area)}" for known, area in method["auroc_by_known_class"].items()]
+            areas = [
+                f"against {known} {_cell(area)}"
+                for known, area in method["auroc_by_known_class"].items()
+            ]
             notes.append((f"AUROC of {SCORE_LABELS[name]}", ", ".join(areas) + "."))
         notes.append(
             (

@@ -35,10 +35,17 @@ LEAKY_MEANING = (
 
 def write_report(folder: Path, metrics: Mapping[str, Any]) -> Path:
     """Write ``metrics.json``, the figures and ``report.html`` and return the page."""
-    (folder / "metrics.json").write_text(json.dumps(metrics, indent=2, allow_nan=False) + "\n", encoding="utf-8")
+    (folder / "metrics.json").write_text(
+        json.dumps(metrics, indent=2, allow_nan=False) + "\n", encoding="utf-8"
+    )
     write_tables(folder, metrics)
     page = folder / "report.html"
-    write_page(page, title="Which faults can be told apart", lead=_lead(metrics), sections=_sections(folder, metrics))
+    write_page(
+        page,
+        title="Which faults can be told apart",
+        lead=_lead(metrics),
+        sections=_sections(folder, metrics),
+    )
     return page
 
 
@@ -56,7 +63,10 @@ def result_table(metrics: Mapping[str, Any]) -> list[str]:
 
 def without_interval(metrics: Mapping[str, Any]) -> list[str]:
     """Why scores stand there without an interval, once, and of which protocols."""
-    units = {name: one["n_units"]["test"] for name, one in {**metrics["protocols"], **metrics["novelty"]}.items()}
+    units = {
+        name: one["n_units"]["test"]
+        for name, one in {**metrics["protocols"], **metrics["novelty"]}.items()
+    }
     few = {name: n_units for name, n_units in units.items() if n_units < LEAST_UNITS}
     return [f"{', '.join(few)}: {few_machines(min(few.values()))}"] if few else []
 
@@ -67,7 +77,10 @@ def _score_table(metrics: Mapping[str, Any]) -> Table:
     shown = [key for key in columns if any(key in result["methods"] for _, result in results)]
     return Table(
         head=["protocol", *(columns[key] for key in shown)],
-        rows=[[name, *(score_cell(result["methods"].get(key)) for key in shown)] for name, result in results],
+        rows=[
+            [name, *(score_cell(result["methods"].get(key)) for key in shown)]
+            for name, result in results
+        ],
         quiet=[number for number, (_, result) in enumerate(results) if result["leaky"]],
     )
 
@@ -106,34 +119,61 @@ def _sections(folder: Path, metrics: Mapping[str, Any]) -> list[Section]:
         Section(
             title="Files beside this page",
             notes=[
-                ("metrics.json", "everything in numbers, with macro-F1, recall, calibration, settings and versions."),
+                (
+                    "metrics.json",
+                    "everything in numbers, with macro-F1, recall, calibration, settings and versions.",
+                ),
                 ("predictions.csv", "what each method said of each test record."),
-                ("scores.csv and more", "the same numbers as tables, explained in docs/howto/report.md."),
-                *([("novelty.csv", "each score of novelty of each test record.")] if metrics["novelty"] else []),
-                ("models/", "the networks, one folder each, for diagnose evaluate and diagnose predict."),
+                (
+                    "scores.csv and more",
+                    "the same numbers as tables, explained in docs/howto/report.md.",
+                ),
+                *(
+                    [("novelty.csv", "each score of novelty of each test record.")]
+                    if metrics["novelty"]
+                    else []
+                ),
+                (
+                    "models/",
+                    "the networks, one folder each, for diagnose evaluate and diagnose predict.",
+                ),
             ],
             folded=True,
         )
     )
-    return [section for section in sections if section.text or section.table or section.notes or section.figures]
+    return [
+        section
+        for section in sections
+        if section.text or section.table or section.notes or section.figures
+    ]
 
 
-def _score_sections(folder: Path, metrics: Mapping[str, Any], ordered: Sequence[tuple[str, Any]]) -> list[Section]:
+def _score_sections(
+    folder: Path, metrics: Mapping[str, Any], ordered: Sequence[tuple[str, Any]]
+) -> list[Section]:
     model = metrics["model"]
     return [
         Section(
             title="In short",
-            text=["Balanced accuracy of the network over test records: the mean share recognised of each class."],
+            text=[
+                "Balanced accuracy of the network over test records: the mean share recognised of each class."
+            ],
             cards=[
-                answer_card(name, result, model, LEAKY_MEANING if result["leaky"] else MEANING[name])
+                answer_card(
+                    name, result, model, LEAKY_MEANING if result["leaky"] else MEANING[name]
+                )
                 for name, result in ordered
             ],
         ),
         Section(
             title="Network, baselines and controls",
-            text=["Mean over the seeds [95 % interval over test units, so over machines, not windows]."],
+            text=[
+                "Mean over the seeds [95 % interval over test units, so over machines, not windows]."
+            ],
             table=_score_table(metrics),
-            figures=_figures(folder, "scores.png", "scores and intervals; dotted: chance", scores_figure, metrics),
+            figures=_figures(
+                folder, "scores.png", "scores and intervals; dotted: chance", scores_figure, metrics
+            ),
         ),
     ]
 
@@ -167,7 +207,10 @@ def _fault_section(folder: Path, clean: Mapping[str, Any], metrics: Mapping[str,
         text=[f"Share of the test records of each class that {model} recognises."],
         table=recall_table(clean, model, names),
         notes=[
-            *((name, confusions(result["methods"][model]["confusion"], names)) for name, result in clean.items()),
+            *(
+                (name, confusions(result["methods"][model]["confusion"], names))
+                for name, result in clean.items()
+            ),
             *heads_notes(clean),
         ],
     )
@@ -185,12 +228,20 @@ def _trust_section(folder: Path, clean: Mapping[str, Any]) -> Section:
             "of its last epoch stands beside."
         ],
         table=trust_table(clean),
-        figures=_figures(folder, "reliability.png", "share right against probability", reliability_figure, calibration),
+        figures=_figures(
+            folder,
+            "reliability.png",
+            "share right against probability",
+            reliability_figure,
+            calibration,
+        ),
         folded=True,
     )
 
 
-def _confusion_section(folder: Path, metrics: Mapping[str, Any], ordered: Sequence[tuple[str, Any]]) -> Section:
+def _confusion_section(
+    folder: Path, metrics: Mapping[str, Any], ordered: Sequence[tuple[str, Any]]
+) -> Section:
     figures = []
     for name, result in ordered:
         title = f"{metrics['model']}, {name}" + (" (LEAKY)" if result["leaky"] else "")
@@ -200,7 +251,9 @@ def _confusion_section(folder: Path, metrics: Mapping[str, Any], ordered: Sequen
     return Section(title="Confusion matrices", figures=figures, side_by_side=True, folded=True)
 
 
-def _figures(folder: Path, name: str, caption: str, draw: Any, content: Any) -> list[tuple[str, str]]:
+def _figures(
+    folder: Path, name: str, caption: str, draw: Any, content: Any
+) -> list[tuple[str, str]]:
     """Draw one figure into the folder, for the page to show."""
     draw(folder / name, content)
     return [(name, caption)]

@@ -34,7 +34,14 @@ def answer_card(name: str, result: Mapping[str, Any], model: str, meaning: str) 
     value, spread = f"{score['mean']:.2f}", _spread(score)
     if result["leaky"]:
         title, meaning = f"{name} (LEAKY)", _sentence(meaning)
-        return Card(title=title, value=value, spread=spread, verdict="not a result", meaning=meaning, mark="quiet")
+        return Card(
+            title=title,
+            value=value,
+            spread=spread,
+            verdict="not a result",
+            meaning=meaning,
+            mark="quiet",
+        )
     above = is_above(score, chance)
     verdict = [f"{'above chance' if above else 'not distinguishable from chance'} ({chance:.2f})"]
     if score["low"] is None:
@@ -43,7 +50,10 @@ def answer_card(name: str, result: Mapping[str, Any], model: str, meaning: str) 
         verdict.append(comparison)
     leak = False
     if "oracle" in methods:
-        share, best = result["over_oracle"]["balanced_accuracy"], methods["oracle"]["balanced_accuracy"]
+        share, best = (
+            result["over_oracle"]["balanced_accuracy"],
+            methods["oracle"]["balanced_accuracy"],
+        )
         verdict.append(f"{share['mean']:.2f} ({_spread(share)}) of the oracle ({best['mean']:.2f})")
     for key, control in controls_on_cards().items():
         if key in methods:
@@ -59,7 +69,9 @@ def answer_card(name: str, result: Mapping[str, Any], model: str, meaning: str) 
             )
     mark = "good" if above and not leak else "bad"
     text = _sentence(meaning if meaning.startswith("tested") else f"tested {meaning}")
-    return Card(title=name, value=value, spread=spread, verdict="; ".join(verdict), meaning=text, mark=mark)
+    return Card(
+        title=name, value=value, spread=spread, verdict="; ".join(verdict), meaning=text, mark=mark
+    )
 
 
 def _best_rival(methods: Mapping[str, Any], score: Mapping[str, Any]) -> str | None:
@@ -79,7 +91,9 @@ def _best_rival(methods: Mapping[str, Any], score: Mapping[str, Any]) -> str | N
 
 
 def _spread(score: Mapping[str, Any]) -> str:
-    return "too few machines" if score["low"] is None else f"{score['low']:.2f} to {score['high']:.2f}"
+    return (
+        "too few machines" if score["low"] is None else f"{score['low']:.2f} to {score['high']:.2f}"
+    )
 
 
 def _sentence(text: str) -> str:
@@ -106,7 +120,12 @@ def confusions(confusion: Sequence[Sequence[int]], class_names: Sequence[str]) -
                 found.append((count / total, class_names[true], class_names[predicted]))
     if not found:
         return f"no class is taken for another in {CONFUSED:.0%} of its records or more."
-    return "; ".join(f"{a} taken for {b} ({share:.0%})" for share, a, b in sorted(found, reverse=True)[:3]) + "."
+    return (
+        "; ".join(
+            f"{a} taken for {b} ({share:.0%})" for share, a, b in sorted(found, reverse=True)[:3]
+        )
+        + "."
+    )
 
 
 def trust_table(clean: Mapping[str, Any]) -> Table:
@@ -115,7 +134,10 @@ def trust_table(clean: Mapping[str, Any]) -> Table:
     for name, result in clean.items():
         calibration, last = result["calibration"], result["last_epoch"]
         before, after = (
-            {key: np.mean(calibration[when][key]) for key in ("expected_calibration_error", "cross_entropy")}
+            {
+                key: np.mean(calibration[when][key])
+                for key in ("expected_calibration_error", "cross_entropy")
+            }
             for when in ("before", "after")
         )
         rows.append(
@@ -168,9 +190,13 @@ def caveats(metrics: Mapping[str, Any]) -> list[str]:
             "The network sees windows without their level, the indicators with it unless stated; "
             "normalise=none gives the level to the network too."
         )
-    lines += [f"{name} is left out: {reason}." for name, reason in metrics["protocols_left_out"].items()]
+    lines += [
+        f"{name} is left out: {reason}." for name, reason in metrics["protocols_left_out"].items()
+    ]
     if metrics["n_records_unusable"]:
-        lines.append(f"{metrics['n_records_unusable']} record(s) failed in simulation and are left out.")
+        lines.append(
+            f"{metrics['n_records_unusable']} record(s) failed in simulation and are left out."
+        )
     return lines
 
 

@@ -38,23 +38,35 @@ def condition_columns(dataset: Dataset, record: NDArray[np.integer]) -> dict[str
     drawn = [
         name
         for name in dataset.column_names
-        if name.startswith("params/") and not name.startswith("params/fault.") and not name.endswith("_seed")
+        if name.startswith("params/")
+        and not name.startswith("params/fault.")
+        and not name.endswith("_seed")
     ]
     columns: dict[str, NDArray[Any]] = {}
     for name in [known for known in BASE_COLUMNS if known in dataset.column_names] + drawn:
         values = np.asarray(dataset.column(name))[record]
         is_name = values.dtype.kind in "US"
-        if values.ndim != 1 or not (is_name or (values.dtype.kind in "fiu" and np.isfinite(values).all())):
+        if values.ndim != 1 or not (
+            is_name or (values.dtype.kind in "fiu" and np.isfinite(values).all())
+        ):
             continue
         different = np.unique(values).size
-        if different < 2 or (is_name and different > MOST_NAMES) or any(_repeats(values, k) for k in columns.values()):
+        if (
+            different < 2
+            or (is_name and different > MOST_NAMES)
+            or any(_repeats(values, k) for k in columns.values())
+        ):
             continue
         columns[name] = values
     return columns
 
 
 def by_condition(
-    columns: Mapping[str, NDArray[Any]], methods: Sequence[Judged], *, n_bootstrap: int, rng: np.random.Generator
+    columns: Mapping[str, NDArray[Any]],
+    methods: Sequence[Judged],
+    *,
+    n_bootstrap: int,
+    rng: np.random.Generator,
 ) -> dict[str, Any]:
     """Scores of groups of test records, and the groups that the first method finds harder than the rest.
 
@@ -104,9 +116,17 @@ def by_condition(
     for index in tested:
         row = rows[index]
         overall = score(network, row["measure"])
-        spread = _spread(differences[index], overall, row["n_records"], network.label.size, row["n_units"])
-        row["difference_at_most"] = row["difference_from_rest"] + _factor(len(tested), row["n_units"]) * spread
-    weak = [row for row in rows if row["difference_at_most"] is not None and row["difference_at_most"] < 0]
+        spread = _spread(
+            differences[index], overall, row["n_records"], network.label.size, row["n_units"]
+        )
+        row["difference_at_most"] = (
+            row["difference_from_rest"] + _factor(len(tested), row["n_units"]) * spread
+        )
+    weak = [
+        row
+        for row in rows
+        if row["difference_at_most"] is not None and row["difference_at_most"] < 0
+    ]
     weak.sort(key=lambda row: row["difference_at_most"])
     return {
         "rows": rows,
@@ -156,7 +176,9 @@ def _measure(label: NDArray[np.integer], groups: Sequence[Group]) -> str:
     return "balanced_accuracy" if fewest >= LEAST_A_CLASS else "share_right"
 
 
-def _spread(differences: NDArray[np.floating], overall: float, n_inside: int, n_records: int, n_units: int) -> float:
+def _spread(
+    differences: NDArray[np.floating], overall: float, n_inside: int, n_records: int, n_units: int
+) -> float:
     """Standard error of a difference between a group and the rest."""
     of_records = np.sqrt(overall * (1 - overall) * (1 / n_inside + 1 / (n_records - n_inside)))
     return float(max(np.nanstd(differences) * np.sqrt(n_units / (n_units - 1)), of_records))
@@ -176,7 +198,11 @@ def _sentence(method: str, weak: Sequence[Mapping[str, Any]], n_tested: int) -> 
         return f"No condition stands out: none of {n_tested} groups scores below the rest beyond chance."
     row = weak[0]
     measure = row["measure"].replace("_", " ")
-    others = "; also weak: " + ", ".join(f"{o['column']} {o['group']}" for o in weak[1:]) if weak[1:] else ""
+    others = (
+        "; also weak: " + ", ".join(f"{o['column']} {o['group']}" for o in weak[1:])
+        if weak[1:]
+        else ""
+    )
     return (
         f"{method} is weakest at {row['column']} {row['group']}: {measure} {interval_text(row['scores'][method])}, "
         f"{-row['difference_from_rest']:.2f} below the rest (at least {-row['difference_at_most']:.2f}, with 95 % "

@@ -37,11 +37,17 @@ def fit_curves(size: FloatArray, found: FloatArray, weight: FloatArray) -> Float
     for _ in range(N_STEPS):
         share = expit(coefficients[:, :1] + coefficients[:, 1:] * scaled)
         excess = weight * (found - share)
-        gradient = np.stack([excess.sum(axis=1), excess @ scaled], axis=1) - coefficients / PRIOR_SCALE**2
+        gradient = (
+            np.stack([excess.sum(axis=1), excess @ scaled], axis=1) - coefficients / PRIOR_SCALE**2
+        )
         spread = weight * share * (1 - share)
         cross = spread @ scaled
         curvature = np.stack(
-            [np.stack([spread.sum(axis=1), cross], axis=1), np.stack([cross, spread @ scaled**2], axis=1)], axis=1
+            [
+                np.stack([spread.sum(axis=1), cross], axis=1),
+                np.stack([cross, spread @ scaled**2], axis=1),
+            ],
+            axis=1,
         )
         curvature += np.eye(2) / PRIOR_SCALE**2
         coefficients += np.clip(np.linalg.solve(curvature, gradient[..., None])[..., 0], -2.0, 2.0)
@@ -70,7 +76,9 @@ def limits(coefficients: FloatArray, size: FloatArray, share: float) -> FloatArr
     rising = np.maximum(coefficients[:, 1], 1e-12)
     log_size = np.log(size)
     crossing = np.exp(
-        np.clip((np.log(share / (1 - share)) - coefficients[:, 0]) / rising, -50, 50) * log_size.std() + log_size.mean()
+        np.clip((np.log(share / (1 - share)) - coefficients[:, 0]) / rising, -50, 50)
+        * log_size.std()
+        + log_size.mean()
     )
     inside = np.clip(crossing, size.min(), size.max())
     return np.where(ends[:, 1] < share, np.inf, np.where(ends[:, 0] >= share, size.min(), inside))

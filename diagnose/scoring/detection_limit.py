@@ -84,7 +84,12 @@ def size_columns(dataset: Dataset, record: IntArray, severity: FloatArray) -> di
         if not name.startswith("params/fault."):
             continue
         values = np.asarray(dataset.column(name))[record]
-        if values.ndim != 1 or values.dtype.kind != "f" or not np.isfinite(values).all() or (values <= 0).any():
+        if (
+            values.ndim != 1
+            or values.dtype.kind != "f"
+            or not np.isfinite(values).all()
+            or (values <= 0).any()
+        ):
             continue
         enough = min(np.unique(values).size, np.unique(severity).size) >= LEAST_SIZES
         if enough and spearmanr(values, severity).statistic >= SIZE_FOLLOWS_SEVERITY:
@@ -128,9 +133,14 @@ def detection(
         inside = weight[:, member]
         total = inside.sum(axis=1)
         values = np.divide(
-            (inside * found[:, member]).sum(axis=1), total, out=np.full(total.shape, np.nan), where=total > 0
+            (inside * found[:, member]).sum(axis=1),
+            total,
+            out=np.full(total.shape, np.nan),
+            where=total > 0,
         )
-        return share_with_interval(float(values[0]), values[1:], np.unique(judged.unit[member]).size)
+        return share_with_interval(
+            float(values[0]), values[1:], np.unique(judged.unit[member]).size
+        )
 
     false_alarms = share(judged.label == healthy)
     classes = {}
@@ -150,7 +160,9 @@ def detection(
             "limits": [
                 row
                 for quantity, size in by_size.items()
-                for row in _limit_rows(quantity, size, found[:, member], weight[:, member], int(n_units))
+                for row in _limit_rows(
+                    quantity, size, found[:, member], weight[:, member], int(n_units)
+                )
             ],
             "curve": _curve(by_size.get("severity"), found[:1, member], weight[:1, member]),
         }
@@ -160,7 +172,8 @@ def detection(
         "false_alarms_wanted": FALSE_ALARMS,
         "threshold_from": source,
         "false_alarms": false_alarms,
-        "too_many_false_alarms": false_alarms["low"] is not None and false_alarms["low"] > FALSE_ALARMS,
+        "too_many_false_alarms": false_alarms["low"] is not None
+        and false_alarms["low"] > FALSE_ALARMS,
         "classes": classes,
     }
 
@@ -180,7 +193,10 @@ def _thresholds(
     rng: np.random.Generator,
 ) -> tuple[FloatArray, str]:
     """(1 + resample, seed) thresholds, and the part that they were set on."""
-    new = validation is not None and (validation.label == healthy).sum() + 1 >= 1 / FALSE_ALARMS - 1e-9
+    new = (
+        validation is not None
+        and (validation.label == healthy).sum() + 1 >= 1 / FALSE_ALARMS - 1e-9
+    )
     if new and validation is not None:
         part = validation.of(validation.label == healthy)
         weight = _drawn(part, len(drawn) - 1, rng)[:, part.unit]
@@ -223,11 +239,15 @@ def _area(
         won = np.zeros_like(pairs)
         for unit in np.unique(judged.unit[healthy]):
             ordered = np.sort(values[healthy & (judged.unit == unit)])
-            smaller, not_larger = (np.searchsorted(ordered, values[faulty], side) for side in ("left", "right"))
+            smaller, not_larger = (
+                np.searchsorted(ordered, values[faulty], side) for side in ("left", "right")
+            )
             below = (smaller + not_larger) / 2
             won[unit] = np.bincount(judged.unit[faulty], weights=below, minlength=judged.n_units)
         n_won = np.einsum("bu,bv,uv->b", drawn, drawn, won, optimize=True)
-        areas[:, seed] = np.divide(n_won, n_pairs, out=np.full(len(drawn), np.nan), where=n_pairs > 0)
+        areas[:, seed] = np.divide(
+            n_won, n_pairs, out=np.full(len(drawn), np.nan), where=n_pairs > 0
+        )
     return np.take_along_axis(areas, seeds, axis=1).mean(axis=1)
 
 
@@ -240,7 +260,9 @@ def _by_severity(
     rows = []
     place = np.flatnonzero(member)
     right = (judged.predicted == judged.label).mean(axis=0)
-    for group in groups_of(severity, most=int(np.clip(severity.size // RECORDS_A_GROUP, 2, MOST_GROUPS))):
+    for group in groups_of(
+        severity, most=int(np.clip(severity.size // RECORDS_A_GROUP, 2, MOST_GROUPS))
+    ):
         inside = np.zeros_like(member)
         inside[place[group.member]] = True
         rows.append(
@@ -290,7 +312,9 @@ def _limit_rows(
     return rows
 
 
-def _curve(severity: FloatArray | None, found: FloatArray, weight: FloatArray) -> dict[str, list[float]]:
+def _curve(
+    severity: FloatArray | None, found: FloatArray, weight: FloatArray
+) -> dict[str, list[float]]:
     """The fitted curve over severity, for figures; empty where there is none."""
     if severity is None or not _has_curve(severity):
         return {"severity": [], "share_found": []}
@@ -301,8 +325,12 @@ def _curve(severity: FloatArray | None, found: FloatArray, weight: FloatArray) -
 
 def _sentence(name: str, found: Mapping[str, Any], false_alarms: Interval) -> str:
     rows = [row for row in found["limits"] if row["quantity"] == "severity"]
-    alarms = f"at {false_alarms['mean']:.0%} false alarms" if false_alarms["mean"] is not None else ""
-    text = f"{name}: {interval_text(found['share_found'])} of {records_behind(found)} found {alarms}"
+    alarms = (
+        f"at {false_alarms['mean']:.0%} false alarms" if false_alarms["mean"] is not None else ""
+    )
+    text = (
+        f"{name}: {interval_text(found['share_found'])} of {records_behind(found)} found {alarms}"
+    )
     if too_few_for_curve(found):
         text += f"; from what severity on is not told: {CURVE_NEEDS}"
     for row in rows:
@@ -310,10 +338,14 @@ def _sentence(name: str, found: Mapping[str, Any], false_alarms: Interval) -> st
         others = [
             other
             for other in found["limits"]
-            if other["share"] == row["share"] and other["quantity"] != "severity" and other["status"] == "reached"
+            if other["share"] == row["share"]
+            and other["quantity"] != "severity"
+            and other["status"] == "reached"
         ]
         if row["status"] == "reached" and others:
-            text += " (" + ", ".join(f"{other['quantity']} {_ends(other)}" for other in others) + ")"
+            text += (
+                " (" + ", ".join(f"{other['quantity']} {_ends(other)}" for other in others) + ")"
+            )
     return text + "."
 
 

@@ -87,7 +87,9 @@ def units_drawn(n_units: int, n_bootstrap: int, rng: np.random.Generator) -> NDA
     return rng.multinomial(n_units, np.full(n_units, 1 / n_units), size=n_bootstrap)
 
 
-def resampled_score(judged: Judged, measure: str, drawn: NDArray[np.int64], rng: np.random.Generator) -> FloatArray:
+def resampled_score(
+    judged: Judged, measure: str, drawn: NDArray[np.int64], rng: np.random.Generator
+) -> FloatArray:
     """(resample,) score of `MEASURES`, mean over seeds that are drawn anew too; NaN where no record was drawn.
 
     Parameters

@@ -11,7 +11,9 @@ from numpy.typing import NDArray
 
 FloatArray = NDArray[np.floating]
 EARLY, LATE = 13.0, 10.0  # units of error in which the score grows e-fold, of PHM 2008
-UNITS = 125.0  # units of the score in the early level: the cycles at which C-MAPSS studies usually cut
+UNITS = (
+    125.0  # units of the score in the early level: the cycles at which C-MAPSS studies usually cut
+)
 BAND = 0.2  # of the early level, about the true remaining life, for the horizon; assumed
 MEASURES = ("rmse_h", "mae_h", "phm_score", "phm_score_last", "coverage", "width_h", "horizon_h")
 
@@ -45,7 +47,9 @@ class Snapshots:
         return interval(self.said, self.half_width, self.early_life)[1]
 
 
-def interval(said: FloatArray, half_width: float, early_life: float) -> tuple[FloatArray, FloatArray]:
+def interval(
+    said: FloatArray, half_width: float, early_life: float
+) -> tuple[FloatArray, FloatArray]:
     """Lower and upper ends in h about what is said, (...) each; the early level stands for itself and all above it."""
     return np.maximum(said - half_width, 0.0), np.minimum(said + half_width, early_life)
 
@@ -119,7 +123,9 @@ def by_life(snapshots: Snapshots) -> dict[str, NDArray[Any]]:
     last, horizon = np.empty(counts.size), np.empty(counts.size)
     for life in range(counts.size):
         mine = np.flatnonzero(snapshots.life == life)
-        before = mine[snapshots.true[mine] > 0]  # at the failure itself there is nothing left to predict
+        before = mine[
+            snapshots.true[mine] > 0
+        ]  # at the failure itself there is nothing left to predict
         at = before[np.argmin(snapshots.true[before])] if before.size else mine[0]
         last[life] = rows["phm_score"][at]
         band = BAND * snapshots.early_life
@@ -127,7 +133,9 @@ def by_life(snapshots: Snapshots) -> dict[str, NDArray[Any]]:
     return found | {"phm_score_last": last, "horizon_h": horizon}
 
 
-def life_scores(values: Mapping[str, FloatArray], *, n_bootstrap: int, rng: np.random.Generator) -> dict[str, Any]:
+def life_scores(
+    values: Mapping[str, FloatArray], *, n_bootstrap: int, rng: np.random.Generator
+) -> dict[str, Any]:
     """Scores with 95 % intervals over lives.
 
     Parameters
@@ -147,20 +155,26 @@ def life_scores(values: Mapping[str, FloatArray], *, n_bootstrap: int, rng: np.r
     return found
 
 
-def gain(values: FloatArray, against: FloatArray, *, n_bootstrap: int, rng: np.random.Generator) -> dict[str, float]:
+def gain(
+    values: FloatArray, against: FloatArray, *, n_bootstrap: int, rng: np.random.Generator
+) -> dict[str, float]:
     """RMSE of ``against`` less that of ``values``, (seed, life) squared errors each, in h: above 0 is better.
 
     Both on the same resamples of the lives; `low` and `high` are the 95 % interval.
     """
     lives, seeds = drawn(values.shape[0], values.shape[1], n_bootstrap, rng)
     other_seeds = rng.integers(against.shape[0], size=(n_bootstrap, against.shape[0]))
-    difference = _over_drawn("rmse_h", against, lives, other_seeds) - _over_drawn("rmse_h", values, lives, seeds)
+    difference = _over_drawn("rmse_h", against, lives, other_seeds) - _over_drawn(
+        "rmse_h", values, lives, seeds
+    )
     low, high = np.quantile(difference, [0.025, 0.975])
     mean = np.sqrt(against.mean(axis=1)).mean() - np.sqrt(values.mean(axis=1)).mean()
     return {"mean": float(mean), "low": float(low), "high": float(high)}
 
 
-def drawn(n_seeds: int, n_lives: int, n_bootstrap: int, rng: np.random.Generator) -> tuple[Any, Any]:
+def drawn(
+    n_seeds: int, n_lives: int, n_bootstrap: int, rng: np.random.Generator
+) -> tuple[Any, Any]:
     """How often each life is drawn, (draw, life), and which seeds, (draw, seed).
 
     Source: percentile interval of Efron & Tibshirani (1993), "An introduction to the bootstrap", section 13.3.

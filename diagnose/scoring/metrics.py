@@ -48,7 +48,9 @@ def over_records(log_probability: FloatArray, record: IntArray) -> tuple[IntArra
     return records, total / np.bincount(position)[:, None]
 
 
-def confusion_by_unit(label: IntArray, predicted: IntArray, unit: NDArray, n_classes: int) -> NDArray[np.int64]:
+def confusion_by_unit(
+    label: IntArray, predicted: IntArray, unit: NDArray, n_classes: int
+) -> NDArray[np.int64]:
     """Counts (unit, true class, predicted class) from three (record,) arrays, units in sorted order."""
     names, position = np.unique(unit, return_inverse=True)
     counts = np.zeros((names.size, n_classes, n_classes), dtype=np.int64)
@@ -81,7 +83,12 @@ SCORES = {"balanced_accuracy": balanced_accuracy, "macro_f1": macro_f1}
 
 
 def score_with_interval(
-    name: str, confusion: NDArray[np.int64], *, n_bootstrap: int, rng: np.random.Generator, shuffled: bool = False
+    name: str,
+    confusion: NDArray[np.int64],
+    *,
+    n_bootstrap: int,
+    rng: np.random.Generator,
+    shuffled: bool = False,
 ) -> Score:
     """Score with a 95 % interval by bootstrap over units.
 
@@ -104,10 +111,17 @@ def score_with_interval(
     if shuffled:
         resampled = resampled + _renaming_luck(name, confusion.sum(axis=1), n_bootstrap, rng)
     low, high = percentile_interval(np.clip(_over_drawn_seeds(resampled, rng), 0, 1), n_units)
-    return Score(mean=float(np.mean(per_seed)), low=low, high=high, per_seed=tuple(float(v) for v in per_seed))
+    return Score(
+        mean=float(np.mean(per_seed)),
+        low=low,
+        high=high,
+        per_seed=tuple(float(v) for v in per_seed),
+    )
 
 
-def percentile_interval(resampled: FloatArray, n_units: int) -> tuple[float, float] | tuple[None, None]:
+def percentile_interval(
+    resampled: FloatArray, n_units: int
+) -> tuple[float, float] | tuple[None, None]:
     """95 % interval of (resample,) values, NaN left out; None for fewer than `LEAST_UNITS`."""
     if n_units < LEAST_UNITS:
         return None, None

@@ -17,7 +17,15 @@ if TYPE_CHECKING:
     from diagnose.networks.domain import Domain
 
 # Columns of the data set beside each prediction, as far as it has them.
-CONDITION_COLUMNS = ("unit_id", "specimen_id", "gearbox_id", "severity", "speed_set_rpm", "torque_nm", "snr_db")
+CONDITION_COLUMNS = (
+    "unit_id",
+    "specimen_id",
+    "gearbox_id",
+    "severity",
+    "speed_set_rpm",
+    "torque_nm",
+    "snr_db",
+)
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)

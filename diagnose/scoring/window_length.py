@@ -59,7 +59,9 @@ def by_window_length(
         ]
         part = replace(judged, log_probability=np.stack(by_record))
         # the same seeds in every row: what differs is the length alone
-        resampled.append(resampled_score(part, "balanced_accuracy", drawn, np.random.default_rng(0)))
+        resampled.append(
+            resampled_score(part, "balanced_accuracy", drawn, np.random.default_rng(0))
+        )
         scores.append(score(part, "balanced_accuracy"))
         rows.append(
             {
@@ -69,7 +71,12 @@ def by_window_length(
             }
         )
     gain = with_interval(scores[-1] - scores[0], resampled[-1] - resampled[0], judged.n_units)
-    return {"method": judged.method, "rows": rows, "gain": gain, "summary": _sentence(judged.method, rows, gain)}
+    return {
+        "method": judged.method,
+        "rows": rows,
+        "gain": gain,
+        "summary": _sentence(judged.method, rows, gain),
+    }
 
 
 def _place_in_record(record: IntArray) -> IntArray:
@@ -91,5 +98,11 @@ def _sentence(method: str, rows: Sequence[dict[str, Any]], gain: dict[str, float
     )
     if gain["low"] is None or gain["high"] is None:
         return text + "."
-    verdict = "more signal helps" if gain["low"] > 0 else "more signal hurts" if gain["high"] < 0 else "not told apart"
+    verdict = (
+        "more signal helps"
+        if gain["low"] > 0
+        else "more signal hurts"
+        if gain["high"] < 0
+        else "not told apart"
+    )
     return f"{text}: {verdict} ({gain['mean']:+.2f} [{gain['low']:+.2f}, {gain['high']:+.2f}])."

@@ -24,7 +24,9 @@ from diagnose.settings import TrainSettings
 ANSWERS_SEED = 20240608
 
 
-def protocol_answers(task: Task, settings: TrainSettings, predictions: Sequence[Prediction]) -> dict[str, Any]:
+def protocol_answers(
+    task: Task, settings: TrainSettings, predictions: Sequence[Prediction]
+) -> dict[str, Any]:
     """The part ``answers`` of one clean protocol in ``metrics.json``; docs/howto/report.md explains every key.
 
     Parameters
@@ -52,9 +54,14 @@ def protocol_answers(task: Task, settings: TrainSettings, predictions: Sequence[
         "n_records": int(record.size),
         "n_units": network.n_units,
         "conditions": by_condition(
-            condition_columns(task.dataset, record), shown, n_bootstrap=settings.n_bootstrap, rng=_rng()
+            condition_columns(task.dataset, record),
+            shown,
+            n_bootstrap=settings.n_bootstrap,
+            rng=_rng(),
         ),
-        "comparisons": compare(network, list(judged.values()), n_bootstrap=settings.n_bootstrap, rng=_rng()),
+        "comparisons": compare(
+            network, list(judged.values()), n_bootstrap=settings.n_bootstrap, rng=_rng()
+        ),
     }
     if HEALTHY in task.class_names and (network.label == task.class_names.index(HEALTHY)).any():
         sizes = _sizes(task, record)
@@ -69,7 +76,11 @@ def protocol_answers(task: Task, settings: TrainSettings, predictions: Sequence[
             )
             for method in shown
         }
-    windows = [(p.windows.record, p.windows.log_probability) for p in runs[network_name] if p.windows is not None]
+    windows = [
+        (p.windows.record, p.windows.log_probability)
+        for p in runs[network_name]
+        if p.windows is not None
+    ]
     if windows:
         rate = task.dataset.sampling_rate
         result["window_length"] = by_window_length(
@@ -88,7 +99,9 @@ def _rng() -> np.random.Generator:
     return np.random.default_rng(ANSWERS_SEED)
 
 
-def _judged(task: Task, method: str, runs: Sequence[Prediction], record: NDArray[np.integer]) -> Judged:
+def _judged(
+    task: Task, method: str, runs: Sequence[Prediction], record: NDArray[np.integer]
+) -> Judged:
     scores = np.stack([run.log_probability[np.searchsorted(run.record, record)] for run in runs])
     return _of_records(task, method, record, scores)
 
@@ -97,13 +110,21 @@ def _validation(task: Task, method: str, runs: Sequence[Prediction]) -> Judged |
     parts = [run.validation for run in runs if run.validation is not None]
     if len(parts) < len(runs):
         return None
-    return _of_records(task, method, parts[0].record, np.stack([part.log_probability for part in parts]))
+    return _of_records(
+        task, method, parts[0].record, np.stack([part.log_probability for part in parts])
+    )
 
 
-def _of_records(task: Task, method: str, record: NDArray[np.integer], scores: NDArray[np.floating]) -> Judged:
+def _of_records(
+    task: Task, method: str, record: NDArray[np.integer], scores: NDArray[np.floating]
+) -> Judged:
     names, unit = np.unique(np.asarray(task.dataset.column("unit_id"))[record], return_inverse=True)
     return Judged(
-        method=method, label=task.labels()[record], unit=unit, n_units=int(names.size), log_probability=scores
+        method=method,
+        label=task.labels()[record],
+        unit=unit,
+        n_units=int(names.size),
+        log_probability=scores,
     )
 
 
@@ -119,5 +140,7 @@ def _sizes(task: Task, record: NDArray[np.integer]) -> dict[str, dict[str, NDArr
     for index, name in enumerate(task.class_names):
         mine = severity[label == index]
         if name != HEALTHY and mine.size and np.isfinite(mine).all() and (mine > 0).all():
-            sizes[name] = {"severity": mine} | size_columns(task.dataset, record[label == index], mine)
+            sizes[name] = {"severity": mine} | size_columns(
+                task.dataset, record[label == index], mine
+            )
     return sizes

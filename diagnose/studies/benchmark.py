@@ -62,9 +62,12 @@ class Benchmark:
         if n_failed := int(np.sum(~np.asarray(dataset.usable, dtype=bool))):
             return [*lines, f"{n_failed} of its records are missing or failed"]
         number_of = {str(name): index for index, name in enumerate(dataset.column("record_id"))}
-        known = {number_of[name]: values for name, values in self.signal_rms.items() if name in number_of}
+        known = {
+            number_of[name]: values for name, values in self.signal_rms.items() if name in number_of
+        }
         if not all(
-            np.allclose(signal_rms(dataset, record), values, rtol=RTOL, atol=0) for record, values in known.items()
+            np.allclose(signal_rms(dataset, record), values, rtol=RTOL, atol=0)
+            for record, values in known.items()
         ):
             lines.append(f"its signals are not those that gensig {self.generator_version} made")
         return lines
@@ -119,7 +122,11 @@ def score_file(dataset: Dataset, path: Path, *, protocol: str | None = None) -> 
         found = score_predictions(task, runs, N_BOOTSTRAP)
         present = np.unique(task.labels()[runs[0][0]])
         chance[name] = 1 / present.size
-        scores.setdefault(name, {})[method] = {**found, "n_records": int(runs[0][0].size), "n_seeds": len(runs)}
+        scores.setdefault(name, {})[method] = {
+            **found,
+            "n_records": int(runs[0][0].size),
+            "n_seeds": len(runs),
+        }
     frozen = benchmark_of(dataset)
     benchmark = None
     if frozen is not None:
@@ -135,16 +142,26 @@ def _runs(task: Task, path: Path, protocol: str | None) -> dict[tuple[str, str],
     class_of = {name: index for index, name in enumerate(task.class_names)}
     said: dict[tuple[str, str, str], dict[int, int]] = {}
     for line, row in enumerate(_rows(path), start=2):
-        key = (row.get("protocol") or protocol or "by_unit", row.get("method") or path.stem, row.get("seed") or "0")
+        key = (
+            row.get("protocol") or protocol or "by_unit",
+            row.get("method") or path.stem,
+            row.get("seed") or "0",
+        )
         if row["record_id"] not in number_of:
-            raise DatasetError(f"{path} line {line}: the data set has no record {row['record_id']!r}")
+            raise DatasetError(
+                f"{path} line {line}: the data set has no record {row['record_id']!r}"
+            )
         if row["predicted"] not in class_of:
             known = ", ".join(class_of)
-            raise ConfigError(f"{path} line {line}: there is no class {row['predicted']!r}; there is {known}")
+            raise ConfigError(
+                f"{path} line {line}: there is no class {row['predicted']!r}; there is {known}"
+            )
         mine = said.setdefault(key, {})
         record = number_of[row["record_id"]]
         if record in mine:
-            raise DatasetError(f"{path} line {line}: record {row['record_id']} twice for {', '.join(key)}")
+            raise DatasetError(
+                f"{path} line {line}: record {row['record_id']} twice for {', '.join(key)}"
+            )
         mine[record] = class_of[row["predicted"]]
     runs: dict[tuple[str, str], list[Run]] = {}
     for (name, method, seed), mine in said.items():
@@ -157,7 +174,9 @@ def _runs(task: Task, path: Path, protocol: str | None) -> dict[tuple[str, str],
                 f"{path}: {method}, seed {seed} must name each of the {expected.size} test records of {name} once; "
                 f"{len(missing)} are missing, {len(others)} are not of the test part"
             )
-        runs.setdefault((name, method), []).append((expected, np.array([mine[record] for record in expected.tolist()])))
+        runs.setdefault((name, method), []).append(
+            (expected, np.array([mine[record] for record in expected.tolist()]))
+        )
     if not runs:
         raise ConfigError(f"{path} holds predictions of leaky protocols only: those are no results")
     return runs
@@ -166,13 +185,17 @@ def _runs(task: Task, path: Path, protocol: str | None) -> dict[tuple[str, str],
 def _rows(path: Path) -> list[dict[str, str]]:
     """Rows of the file; refuses one that is no CSV with the columns asked for."""
     if path.is_file() and path.stat().st_size > LARGEST_FILE:
-        raise DatasetError(f"{path} has {path.stat().st_size} bytes, and at most {LARGEST_FILE} are read")
+        raise DatasetError(
+            f"{path} has {path.stat().st_size} bytes, and at most {LARGEST_FILE} are read"
+        )
     try:
         with path.open(newline="", encoding="utf-8-sig") as file:
             reader = csv.DictReader(file, strict=True)
             missing = [name for name in REQUIRED if name not in (reader.fieldnames or ())]
             if missing:
-                raise DatasetError(f"{path} has no column {missing[0]}; it needs {' and '.join(REQUIRED)}")
+                raise DatasetError(
+                    f"{path} has no column {missing[0]}; it needs {' and '.join(REQUIRED)}"
+                )
             rows = list(reader)
     except (UnicodeDecodeError, csv.Error) as error:
         raise DatasetError(f"{path} is no CSV file in UTF-8: {error}") from None
@@ -193,5 +216,7 @@ def score_table(result: Mapping[str, Any]) -> list[str]:
             *((f"{name} (shipped)", score) for name, score in shipped.get(protocol, {}).items()),
         ]
         for name, score in rows:
-            lines.append(f"| {protocol} | {name} | {interval_text(score, '.3f')} | {result['chance'][protocol]:.3f} |")
+            lines.append(
+                f"| {protocol} | {name} | {interval_text(score, '.3f')} | {result['chance'][protocol]:.3f} |"
+            )
     return lines

@@ -44,7 +44,9 @@ def control_jobs(task: Task, settings: TrainSettings, clean: Sequence[str]) -> l
     few = range(first, first + settings.n_seeds_control)
     for protocol in clean:
         if settings.normalise == BOTH:
-            jobs += [Job(protocols=(protocol,), seed=seed, control=LEVEL_KEPT) for seed in settings.seeds]
+            jobs += [
+                Job(protocols=(protocol,), seed=seed, control=LEVEL_KEPT) for seed in settings.seeds
+            ]
         if protocol in known:
             jobs += [Job(protocols=(protocol,), seed=seed, control=ORACLE) for seed in few]
         if protocol in shams:

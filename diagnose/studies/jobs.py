@@ -91,7 +91,9 @@ def run_jobs(
             _forget_inputs()
         return [prediction for result in results for prediction in result]
     context = multiprocessing.get_context("spawn")
-    executor = ProcessPoolExecutor(min(n_workers, len(jobs)), context, _start_worker, (task, settings, run))
+    executor = ProcessPoolExecutor(
+        min(n_workers, len(jobs)), context, _start_worker, (task, settings, run)
+    )
     try:
         futures = [executor.submit(_run_in_worker, job) for job in jobs]
         for future in as_completed(futures):
@@ -125,7 +127,10 @@ def run_job(task: Task, settings: TrainSettings, job: Job) -> list[Outcome]:
     if job.control == SHAM:
         task = _sham(task, settings)
     if job.seed is not None:
-        return [_run_training(task, settings, name, job.seed, job.shuffled, job.control) for name in job.protocols]
+        return [
+            _run_training(task, settings, name, job.seed, job.shuffled, job.control)
+            for name in job.protocols
+        ]
     return [*_run_baselines(task, settings, job)]
 
 
@@ -152,7 +157,9 @@ def _run_training(
         )
     by_window = predict_windows(training.model, test)
     record, log_probability = over_records(by_window, test.record)
-    held_out, held_out_scores = over_records(predict_windows(training.model, validation), validation.record)
+    held_out, held_out_scores = over_records(
+        predict_windows(training.model, validation), validation.record
+    )
     is_model = not shuffled and not control
     domain = _domain(protocol, train, validation) if is_model else None
     network = str(settings.model.get("name", "network"))

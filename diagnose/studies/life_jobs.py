@@ -184,7 +184,9 @@ def _networks(
     seed: int,
 ) -> list[LifePrediction]:
     load, lives = input_of(settings.model).load, sets.lives
-    windows = {name: load(task, part, training=name == "train") for name, part in sets.parts.items()}
+    windows = {
+        name: load(task, part, training=name == "train") for name, part in sets.parts.items()
+    }
     columns, values = operating_names(task), operating_values(task, np.arange(sets.share.size))
     network = str(settings.model.get("name", "network"))
     conditions = {network: (columns, values)}

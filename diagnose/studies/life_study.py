@@ -115,7 +115,9 @@ def run_life_study(
     started = time.perf_counter()
 
     def report(found: list[LifePrediction]) -> None:
-        on_done(f"{found[-1].protocol}, {', '.join(one.method for one in found)}, seed {found[-1].seed}")
+        on_done(
+            f"{found[-1].protocol}, {', '.join(one.method for one in found)}, seed {found[-1].seed}"
+        )
 
     n_workers = settings.n_threads or n_cores()
     predictions: list[LifePrediction] = run_jobs(
@@ -145,7 +147,9 @@ def run_life_study(
         "channel_names": list(task.channel_names),
         "model": str(settings.model.get("name", "network")),
         "settings": {**asdict(settings), "model": dict(settings.model)},
-        "protocols": {name: _result(task, settings, lives, name, predictions) for name in plan.protocols},
+        "protocols": {
+            name: _result(task, settings, lives, name, predictions) for name in plan.protocols
+        },
         "protocols_left_out": plan.left_out,
         "duration_s": round(time.perf_counter() - started, 1),
         "environment": environment(),
@@ -174,7 +178,10 @@ def _result(
     predictions: Sequence[LifePrediction],
 ) -> dict[str, Any]:
     mine = [one for one in predictions if one.protocol == protocol]
-    runs = {name: [one for one in mine if one.method == name] for name in dict.fromkeys(one.method for one in mine)}
+    runs = {
+        name: [one for one in mine if one.method == name]
+        for name in dict.fromkeys(one.method for one in mine)
+    }
     tables: dict[str, dict[str, FloatArray]] = {}
     for name, of_seeds in runs.items():
         rows = [by_life(scored_snapshots(lives, one)) for one in of_seeds]
@@ -205,11 +212,17 @@ def _result(
         "phm_unit_h": level / UNITS,
         "coverage_wanted": settings.remaining_life.coverage,
         "intervals_hold": intervals_hold(n_calibration, settings.remaining_life.coverage),
-        "n_lives": {subset: count_lives(lives, record, failed=True) for subset, record in parts.items()},
-        "n_lives_censored": {subset: count_lives(lives, record, failed=False) for subset, record in parts.items()},
+        "n_lives": {
+            subset: count_lives(lives, record, failed=True) for subset, record in parts.items()
+        },
+        "n_lives_censored": {
+            subset: count_lives(lives, record, failed=False) for subset, record in parts.items()
+        },
         "n_records": {subset: int(record.size) for subset, record in parts.items()},
         "n_records_unknown": {
-            subset: int((~lives.known(level)[record]).sum()) for subset, record in parts.items() if subset != "test"
+            subset: int((~lives.known(level)[record]).sum())
+            for subset, record in parts.items()
+            if subset != "test"
         },
         "methods": methods,
     }
@@ -255,6 +268,9 @@ def write_life_predictions(
                 writer.writerow(
                     [one.protocol, one.method, one.seed, ids[record], lives.name[record]]
                     + [f"{lives.age[record]:.6g}", f"{lives.remaining[record]:.6g}", failed]
-                    + [f"{value:.6g}" for value in (one.early_life, one.said[row], low[row], high[row])]
+                    + [
+                        f"{value:.6g}"
+                        for value in (one.early_life, one.said[row], low[row], high[row])
+                    ]
                     + [failed]
                 )

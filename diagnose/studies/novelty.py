@@ -63,7 +63,9 @@ class NoveltyRun:
     predicted: IntArray | None = None
 
 
-def fitted_runs(task: Task, settings: TrainSettings, protocol: str, sets: Mapping[str, WindowSet]) -> list[NoveltyRun]:
+def fitted_runs(
+    task: Task, settings: TrainSettings, protocol: str, sets: Mapping[str, WindowSet]
+) -> list[NoveltyRun]:
     """Scores that need no training by steps: distance of band levels, and of healthy records those of indicators.
 
     Parameters
@@ -73,12 +75,17 @@ def fitted_runs(task: Task, settings: TrainSettings, protocol: str, sets: Mappin
     sets : windows of each subset
     """
     domain = fit_domain(sets["train"], sets["validation"])
-    scores = {name: over_records(distances(domain, sets[name])[:, None], sets[name].record) for name in SCORED}
+    scores = {
+        name: over_records(distances(domain, sets[name])[:, None], sets[name].record)
+        for name in SCORED
+    }
     found = [_run(protocol, "nearest_band_levels", "distance of domain.py", scores)]
     if protocol != "healthy_only":
         return found
     tables = {
-        subset: feature_table(task, subset_segments(task, protocol, subset), features=settings.features)
+        subset: feature_table(
+            task, subset_segments(task, protocol, subset), features=settings.features
+        )
         for subset in SUBSETS
     }
     for suffix, with_level in ((WITH_LEVEL, True), (WITHOUT_LEVEL, False)):
@@ -113,19 +120,26 @@ def _indicator_runs(
             protocol,
             f"{name}_{suffix}",
             text,
-            {subset: over_records(score[:, None], tables[subset].record) for subset, score in scores.items()},
+            {
+                subset: over_records(score[:, None], tables[subset].record)
+                for subset, score in scores.items()
+            },
         )
         for name, scores in (("nearest", near), ("forest", rare))
     ]
 
 
-def trained_runs(settings: TrainSettings, protocol: str, seed: int, sets: Mapping[str, WindowSet]) -> list[NoveltyRun]:
+def trained_runs(
+    settings: TrainSettings, protocol: str, seed: int, sets: Mapping[str, WindowSet]
+) -> list[NoveltyRun]:
     """Scores of a network trained on the known classes: an autoencoder of healthy windows, else a classifier."""
     if protocol != "healthy_only":
         return _classifier_runs(settings, protocol, seed, sets)
     model = fit_autoencoder(sets["train"], sets["validation"], settings=settings, seed=seed)
     scores = {
-        subset: over_records(reconstruction_error(model, sets[subset])[:, None], sets[subset].record)
+        subset: over_records(
+            reconstruction_error(model, sets[subset])[:, None], sets[subset].record
+        )
         for subset in SCORED
     }
     return [_run(protocol, "autoencoder", f"best epoch {model.best_epoch}", scores, seed=seed)]
@@ -145,7 +159,10 @@ def _classifier_runs(
     section 3 (distance of features of unit length).
     """
     classes = np.unique(sets["train"].label)
-    known = {name: replace(sets[name], label=np.searchsorted(classes, sets[name].label)) for name in SUBSETS[:2]}
+    known = {
+        name: replace(sets[name], label=np.searchsorted(classes, sets[name].label))
+        for name in SUBSETS[:2]
+    }
     training = train_network(
         known["train"],
         known["validation"],
@@ -153,28 +170,41 @@ def _classifier_runs(
         settings=settings,
         seed=seed,
     )
-    rows = np.unique(np.linspace(0, len(sets["train"]) - 1, min(len(sets["train"]), MOST_WINDOWS)).round().astype(int))
+    rows = np.unique(
+        np.linspace(0, len(sets["train"]) - 1, min(len(sets["train"]), MOST_WINDOWS))
+        .round()
+        .astype(int)
+    )
     trained_features, _ = network_outputs(training.model, sets["train"], rows)
     found: dict[str, dict[str, tuple[IntArray, FloatArray]]] = {}
     for subset in SCORED:
         windows = sets[subset]
-        record, log_probability = over_records(predict_windows(training.model, windows), windows.record)
+        record, log_probability = over_records(
+            predict_windows(training.model, windows), windows.record
+        )
         largest = probabilities(log_probability, training.temperature).max(axis=1, keepdims=True)
         features, logits = network_outputs(training.model, windows, np.arange(len(windows)))
         energy = -np.logaddexp.reduce(logits, axis=1)
         distance = neighbor_distance(_unit_length(features), _unit_length(trained_features))
         found.setdefault("largest_probability", {})[subset] = (record, 1 - largest)
         found.setdefault("energy", {})[subset] = over_records(energy[:, None], windows.record)
-        found.setdefault("nearest_features", {})[subset] = over_records(distance[:, None], windows.record)
+        found.setdefault("nearest_features", {})[subset] = over_records(
+            distance[:, None], windows.record
+        )
     predicted = classes[log_probability.argmax(axis=1)]
     return [
-        replace(_run(protocol, name, training.detail, found[name], seed=seed), predicted=predicted) for name in found
+        replace(_run(protocol, name, training.detail, found[name], seed=seed), predicted=predicted)
+        for name in found
     ]
 
 
-def network_outputs(model: nn.Module, windows: WindowSet, chosen: IntArray) -> tuple[FloatArray, FloatArray]:
+def network_outputs(
+    model: nn.Module, windows: WindowSet, chosen: IntArray
+) -> tuple[FloatArray, FloatArray]:
     """Features (window, feature) that the last layer of the class scores reads, and its output (window, class)."""
-    heads = [part for name, part in model.named_modules() if name == "head" or name.startswith("head.")]
+    heads = [
+        part for name, part in model.named_modules() if name == "head" or name.startswith("head.")
+    ]
     layer = [part for part in heads if isinstance(part, nn.Linear)][-1]
     seen: list[tuple[torch.Tensor, torch.Tensor]] = []
     hook = layer.register_forward_hook(lambda _, inputs, output: seen.append((inputs[0], output)))
@@ -194,7 +224,12 @@ def _unit_length(features: FloatArray) -> FloatArray:
 
 
 def _run(
-    protocol: str, method: str, detail: str, scores: Mapping[str, tuple[IntArray, FloatArray]], *, seed: int = 0
+    protocol: str,
+    method: str,
+    detail: str,
+    scores: Mapping[str, tuple[IntArray, FloatArray]],
+    *,
+    seed: int = 0,
 ) -> NoveltyRun:
     record, score = scores["test"]
     return NoveltyRun(

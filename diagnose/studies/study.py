@@ -28,7 +28,13 @@ from diagnose.data.windows import (
     task_of,
 )
 from diagnose.networks.calibration import calibration_scores
-from diagnose.networks.registry import build_model, check_window, completed, has_window_length, input_of
+from diagnose.networks.registry import (
+    build_model,
+    check_window,
+    completed,
+    has_window_length,
+    input_of,
+)
 from diagnose.scoring.metrics import (
     SCORES,
     confusion_by_unit,
@@ -86,7 +92,9 @@ def plan_study(task: Task, settings: TrainSettings) -> tuple[tuple[str, ...], li
             present = np.unique(labels[segments.record])
             if protocol not in OPEN_PROTOCOLS and subset != "validation" and present.size < 2:
                 name = task.class_names[int(present[0])]
-                raise ConfigError(f"protocol {protocol}: one class only in its {subset} part ({name})")
+                raise ConfigError(
+                    f"protocol {protocol}: one class only in its {subset} part ({name})"
+                )
         if protocol in OPEN_PROTOCOLS:
             check_open_protocol(task, protocol)
     if "healthy_only" in protocols:
@@ -101,8 +109,13 @@ def plan_study(task: Task, settings: TrainSettings) -> tuple[tuple[str, ...], li
         jobs += [Job(protocols=(protocol,), seed=seed) for seed in settings.seeds]
         if settings.shuffle_control and protocol in closed:
             first = min(settings.seeds)
-            jobs += [Job(protocols=(protocol,), seed=first + k, shuffled=True) for k in range(settings.n_seeds_control)]
-    return protocols, jobs + control_jobs(task, settings, [name for name in closed if not is_leaky(name)])
+            jobs += [
+                Job(protocols=(protocol,), seed=first + k, shuffled=True)
+                for k in range(settings.n_seeds_control)
+            ]
+    return protocols, jobs + control_jobs(
+        task, settings, [name for name in closed if not is_leaky(name)]
+    )
 
 
 def check_network(task: Task, settings: TrainSettings, parts: Sequence[Segments]) -> None:
@@ -153,7 +166,9 @@ def window_note(dataset: Dataset, settings: TrainSettings) -> str | None:
 
 def settings_for(dataset: Any, settings: TrainSettings) -> TrainSettings:
     """The settings with what an open data set decides: the window, and what turns need."""
-    window = settings.window_samples or chosen_window(at_rate(dataset, settings.sampling_rate_hz))[0]
+    window = (
+        settings.window_samples or chosen_window(at_rate(dataset, settings.sampling_rate_hz))[0]
+    )
     return replace(
         settings,
         model=completed(settings.model, dataset.attributes, settings.heads),
@@ -199,20 +214,31 @@ def run_study(
             parts = [part for part in (prediction.domain, prediction.healthy) if part is not None]
             known = {name: tensor for part in parts for name, tensor in part.tensors().items()}
             described = model_description(task, settings, prediction)
-            described = replace(described, test_score=test_score(task, prediction, settings.n_bootstrap))
+            described = replace(
+                described, test_score=test_score(task, prediction, settings.n_bootstrap)
+            )
             save_model(target, prediction.weights | known, described)
     own = without_sham(predictions)
     write_predictions(folder / "predictions.csv", task, own)
     if novelty:
         write_novelty(folder / "novelty.csv", task, novelty)
-    results = {name: _protocol_result(task, settings, name, own) for name in protocols if name not in OPEN_PROTOCOLS}
+    results = {
+        name: _protocol_result(task, settings, name, own)
+        for name in protocols
+        if name not in OPEN_PROTOCOLS
+    }
     shams = sham_methods(
-        task, settings, predictions, functools.partial(score_predictions, n_bootstrap=settings.n_bootstrap)
+        task,
+        settings,
+        predictions,
+        functools.partial(score_predictions, n_bootstrap=settings.n_bootstrap),
     )
     for protocol, methods in shams.items():
         results[protocol]["methods"] |= methods
     novelty_results = {
-        name: novelty_protocol_result(task, name, novelty, n_bootstrap=settings.n_bootstrap, seed=BOOTSTRAP_SEED)
+        name: novelty_protocol_result(
+            task, name, novelty, n_bootstrap=settings.n_bootstrap, seed=BOOTSTRAP_SEED
+        )
         for name in protocols
         if name in OPEN_PROTOCOLS
     }
@@ -257,33 +283,48 @@ def score_predictions(
     rng = np.random.default_rng(BOOTSTRAP_SEED)
     total = confusion.sum(axis=(0, 1))
     scores = {
-        name: asdict(score_with_interval(name, confusion, n_bootstrap=n_bootstrap, rng=rng, shuffled=shuffled))
+        name: asdict(
+            score_with_interval(
+                name, confusion, n_bootstrap=n_bootstrap, rng=rng, shuffled=shuffled
+            )
+        )
         for name in SCORES
     }
     shares = {
-        name: float(share) for name, share in zip(task.class_names, recall(total), strict=True) if np.isfinite(share)
+        name: float(share)
+        for name, share in zip(task.class_names, recall(total), strict=True)
+        if np.isfinite(share)
     }
     return {**scores, "confusion": total.tolist(), "recall": shares}
 
 
 def test_score(task: Task, prediction: Prediction, n_bootstrap: int) -> dict[str, Any]:
     """What is stored with a network of what it scored: balanced accuracy with its interval, chance, and on how much."""
-    scores = score_predictions(task, [(prediction.record, prediction.predicted)], n_bootstrap)["balanced_accuracy"]
+    scores = score_predictions(task, [(prediction.record, prediction.predicted)], n_bootstrap)[
+        "balanced_accuracy"
+    ]
     return {
         "balanced_accuracy": {key: scores[key] for key in ("mean", "low", "high")},
         "chance": 1.0 / int(np.unique(task.labels()[prediction.record]).size),
         "n_records": int(prediction.record.size),
-        "n_units": int(np.unique(np.asarray(task.dataset.column("unit_id"))[prediction.record]).size),
+        "n_units": int(
+            np.unique(np.asarray(task.dataset.column("unit_id"))[prediction.record]).size
+        ),
         "leaky": is_leaky(prediction.protocol),
     }
 
 
-def _confusion(task: Task, runs: Sequence[tuple[NDArray[np.integer], NDArray[np.integer]]]) -> NDArray[np.int64]:
+def _confusion(
+    task: Task, runs: Sequence[tuple[NDArray[np.integer], NDArray[np.integer]]]
+) -> NDArray[np.int64]:
     """Counts (seed, unit, true class, predicted class)."""
     labels, unit = task.labels(), np.asarray(task.dataset.column("unit_id"))
     n_classes = len(task.class_names)
     return np.stack(
-        [confusion_by_unit(labels[record], predicted, unit[record], n_classes) for record, predicted in runs]
+        [
+            confusion_by_unit(labels[record], predicted, unit[record], n_classes)
+            for record, predicted in runs
+        ]
     )
 
 
@@ -298,7 +339,11 @@ def _protocol_result(
         pairs = [(run.record, run.predicted) for run in runs]
         shuffled = method == LABEL_SHUFFLE
         scores = score_predictions(task, pairs, settings.n_bootstrap, shuffled=shuffled)
-        methods[method] = {**scores, "seeds": [run.seed for run in runs], "detail": [run.detail for run in runs]}
+        methods[method] = {
+            **scores,
+            "seeds": [run.seed for run in runs],
+            "detail": [run.detail for run in runs],
+        }
     network = [run for run in mine if run.method == str(settings.model.get("name", "network"))]
     test = np.unique(network[0].record)
     counts = np.bincount(labels[test], minlength=len(task.class_names))
@@ -306,7 +351,9 @@ def _protocol_result(
         "balanced_accuracy": 1.0 / int((counts > 0).sum()),
         "majority_accuracy": float(counts.max() / counts.sum()),
     }
-    parts = {subset: np.unique(subset_segments(task, protocol, subset).record) for subset in SUBSETS}
+    parts = {
+        subset: np.unique(subset_segments(task, protocol, subset).record) for subset in SUBSETS
+    }
     oracle = chosen_oracle(task, mine)
     over_oracle: dict[str, Any] = {}
     if oracle is not None:
@@ -317,10 +364,14 @@ def _protocol_result(
         ]
         for name in SCORES:
             rng = np.random.default_rng(BOOTSTRAP_SEED)
-            over_oracle[name] = ratio_with_interval(name, *found, n_bootstrap=settings.n_bootstrap, rng=rng)
+            over_oracle[name] = ratio_with_interval(
+                name, *found, n_bootstrap=settings.n_bootstrap, rng=rng
+            )
     return {
         "leaky": is_leaky(protocol),
-        "channels": {subset: list(task.part(protocol, subset).channel_names) for subset in ("train", "test")},
+        "channels": {
+            subset: list(task.part(protocol, subset).channel_names) for subset in ("train", "test")
+        },
         "n_records": {subset: int(record.size) for subset, record in parts.items()},
         "n_units": {subset: int(np.unique(unit[record]).size) for subset, record in parts.items()},
         "methods": methods,
@@ -334,11 +385,16 @@ def _protocol_result(
     }
 
 
-def _last_epoch(task: Task, settings: TrainSettings, network: Sequence[Prediction]) -> dict[str, Any]:
+def _last_epoch(
+    task: Task, settings: TrainSettings, network: Sequence[Prediction]
+) -> dict[str, Any]:
     """Epochs run and the scores of the weights of the last one: what choosing the best epoch brought."""
     pairs = [(run.record, run.last_predicted) for run in network if run.last_predicted is not None]
     scores = score_predictions(task, pairs, settings.n_bootstrap)
-    return {"epoch": [len(run.validation_loss) for run in network], **{name: scores[name] for name in SCORES}}
+    return {
+        "epoch": [len(run.validation_loss) for run in network],
+        **{name: scores[name] for name in SCORES},
+    }
 
 
 def _calibration(task: Task, network: Sequence[Prediction]) -> dict[str, Any]:

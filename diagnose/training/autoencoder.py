@@ -93,10 +93,14 @@ def check_window_for_autoencoder(window_samples: int) -> None:
     """
     least = int(np.prod(STRIDES))
     if window_samples < least:
-        raise ConfigError(f"window_samples={window_samples} is too short for the autoencoder; give at least {least}")
+        raise ConfigError(
+            f"window_samples={window_samples} is too short for the autoencoder; give at least {least}"
+        )
 
 
-def fit_autoencoder(train: WindowSet, validation: WindowSet, *, settings: TrainSettings, seed: int) -> Autoencoder:
+def fit_autoencoder(
+    train: WindowSet, validation: WindowSet, *, settings: TrainSettings, seed: int
+) -> Autoencoder:
     """Train on windows of known kind; the weights kept are those of the least error on other units of that kind.
 
     Parameters
@@ -120,7 +124,9 @@ def fit_autoencoder(train: WindowSet, validation: WindowSet, *, settings: TrainS
         best, best_weights, best_epoch = np.inf, model.state_dict(), 0
         for epoch in range(1, settings.epochs + 1):
             model.train()
-            for batch in np.array_split(rng.permutation(len(train))[:n_drawn], max(n_drawn // settings.batch_size, 1)):
+            for batch in np.array_split(
+                rng.permutation(len(train))[:n_drawn], max(n_drawn // settings.batch_size, 1)
+            ):
                 optimizer.zero_grad()
                 model(torch.from_numpy(train.cut(batch, rng)).to(device)).mean().backward()
                 optimizer.step()
@@ -135,7 +141,9 @@ def fit_autoencoder(train: WindowSet, validation: WindowSet, *, settings: TrainS
     return Autoencoder(model=model.cpu().eval(), best_epoch=best_epoch)
 
 
-def reconstruction_error(autoencoder: Autoencoder, windows: WindowSet, *, batch_size: int = 64) -> FloatArray:
+def reconstruction_error(
+    autoencoder: Autoencoder, windows: WindowSet, *, batch_size: int = 64
+) -> FloatArray:
     """(window,) largest mean squared error over a stretch of `STRETCH` samples, at the planned starts.
 
     A fault of one tooth shows for a moment once a turn: the mean over the window drowns it in the noise, which no
@@ -152,7 +160,9 @@ def reconstruction_error(autoencoder: Autoencoder, windows: WindowSet, *, batch_
     return torch.cat(found).numpy().astype(float)
 
 
-def _errors(model: WindowAutoencoder, windows: torch.Tensor, *, batch_size: int = 16) -> torch.Tensor:
+def _errors(
+    model: WindowAutoencoder, windows: torch.Tensor, *, batch_size: int = 16
+) -> torch.Tensor:
     """(window, sample) on the processor, in batches that stay in its cache."""
     model.eval()
     device = model.scale.device

@@ -63,7 +63,10 @@ class Classes(LearningTarget[Network]):
         device = signals.device
         label = torch.from_numpy(windows.label[batch]).to(device)
         weight = torch.from_numpy(_class_weights(windows.label, self.n_classes)).to(device)
-        targets = {name: torch.from_numpy(values[batch]).to(device) for name, values in windows.targets.items()}
+        targets = {
+            name: torch.from_numpy(values[batch]).to(device)
+            for name, values in windows.targets.items()
+        }
         with _mixed_precision(device):
             answers = model.answers(signals)
             loss = cross_entropy(answers["classes"], label, weight=weight)

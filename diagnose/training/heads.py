@@ -30,7 +30,9 @@ IntArray = NDArray[np.integer]
 BOOTSTRAP_SEED = 20240608
 
 
-def predict_heads(model: Network, windows: WindowSet, *, batch_size: int = 64) -> dict[str, FloatArray]:
+def predict_heads(
+    model: Network, windows: WindowSet, *, batch_size: int = 64
+) -> dict[str, FloatArray]:
     """What the further heads say of records, in the order of `diagnose.scoring.metrics.over_records`.
 
     Returns
@@ -47,13 +49,20 @@ def predict_heads(model: Network, windows: WindowSet, *, batch_size: int = 64) -
         for block in np.array_split(every, -(-every.size // batch_size)):
             answers = model.answers(torch.from_numpy(windows.cut(block)))
             for name, values in said.items():
-                values.append(answers[name].sigmoid() if name == "severity" else log_softmax(answers[name], dim=1))
+                values.append(
+                    answers[name].sigmoid()
+                    if name == "severity"
+                    else log_softmax(answers[name], dim=1)
+                )
     return {
-        name: over_records(torch.cat(values).numpy().astype(float), windows.record)[1] for name, values in said.items()
+        name: over_records(torch.cat(values).numpy().astype(float), windows.record)[1]
+        for name, values in said.items()
     }
 
 
-def head_scores(task: Task, trained_on: IntArray, runs: Sequence[Prediction], *, n_bootstrap: int) -> dict[str, Any]:
+def head_scores(
+    task: Task, trained_on: IntArray, runs: Sequence[Prediction], *, n_bootstrap: int
+) -> dict[str, Any]:
     """Scores of the further heads on test records, for ``metrics.json``.
 
     Parameters
@@ -76,7 +85,9 @@ def head_scores(task: Task, trained_on: IntArray, runs: Sequence[Prediction], *,
     found: dict[str, Any] = {}
     if "severity" in truth and all("severity" in run.heads for run in runs):
         labels = task.labels()
-        said = np.stack([run.heads["severity"][np.arange(record.size), labels[record]] for run in runs])
+        said = np.stack(
+            [run.heads["severity"][np.arange(record.size), labels[record]] for run in runs]
+        )
         found["severity_mae"] = {
             name: _severity_error(
                 said[:, chosen],
@@ -91,11 +102,20 @@ def head_scores(task: Task, trained_on: IntArray, runs: Sequence[Prediction], *,
         }
     if "gear" in truth and all("gear" in run.heads for run in runs):
         confusion = np.stack(
-            [confusion_by_unit(truth["gear"], run.heads["gear"].argmax(axis=1), unit, len(GEARS)) for run in runs]
+            [
+                confusion_by_unit(truth["gear"], run.heads["gear"].argmax(axis=1), unit, len(GEARS))
+                for run in runs
+            ]
         )
-        score = score_with_interval("balanced_accuracy", confusion, n_bootstrap=n_bootstrap, rng=rng)
+        score = score_with_interval(
+            "balanced_accuracy", confusion, n_bootstrap=n_bootstrap, rng=rng
+        )
         chance = 1.0 / np.unique(truth["gear"]).size
-        found["faulted_gear"] = {"balanced_accuracy": asdict(score), "chance": chance, "gears": list(GEARS)}
+        found["faulted_gear"] = {
+            "balanced_accuracy": asdict(score),
+            "chance": chance,
+            "gears": list(GEARS),
+        }
     return found
 
 
@@ -131,7 +151,11 @@ def heads_notes(clean: Mapping[str, Any]) -> list[tuple[str, str]]:
     for name, result in clean.items():
         said = [
             f"severity of {kind} off by {interval_text(row, '.3f')}"
-            + ("" if row["constant"] is None else f", by {row['constant']:.3f} if its usual one is said of all")
+            + (
+                ""
+                if row["constant"] is None
+                else f", by {row['constant']:.3f} if its usual one is said of all"
+            )
             for kind, row in result["heads"].get("severity_mae", {}).items()
         ]
         if "faulted_gear" in result["heads"]:

@@ -48,7 +48,10 @@ class LifeFacts:
     told_range: dict[str, tuple[float, float]]
 
     def __post_init__(self) -> None:
-        if not 0 < self.early_life_h < float("inf") or not 0 <= self.half_width_h <= self.early_life_h:
+        if (
+            not 0 < self.early_life_h < float("inf")
+            or not 0 <= self.half_width_h <= self.early_life_h
+        ):
             raise ValueError(
                 f"early_life_h {self.early_life_h!r} and half_width_h {self.half_width_h!r} are no hours",
             )
@@ -89,8 +92,13 @@ def load_life_model(folder: str | Path) -> tuple[LifeNetwork, ModelDescription, 
 
 def _facts(folder: Path, content: Mapping[str, Any]) -> LifeFacts:
     try:
-        ranges = {str(name): (float(low), float(high)) for name, (low, high) in content["told_range"].items()}
-        numbers = {name: float(content[name]) for name in ("early_life_h", "half_width_h", "coverage")}
+        ranges = {
+            str(name): (float(low), float(high))
+            for name, (low, high) in content["told_range"].items()
+        }
+        numbers = {
+            name: float(content[name]) for name in ("early_life_h", "half_width_h", "coverage")
+        }
         return LifeFacts(
             **{
                 **content,

@@ -132,7 +132,9 @@ def shares_of_windows(
     every = np.arange(len(windows))
     blocks = np.array_split(every, -(-every.size // AT_A_TIME))
     of_window = conditions[windows.record]
-    shares = [_shares(model, torch.from_numpy(windows.cut(block)), of_window[block]) for block in blocks]
+    shares = [
+        _shares(model, torch.from_numpy(windows.cut(block)), of_window[block]) for block in blocks
+    ]
     return np.concatenate(shares)
 
 

@@ -33,17 +33,23 @@ def sham_task(task: Task, folder: str) -> Task:
 
     dataset = at_rate_of(open_dataset(folder), task.dataset)
     if not _is_sham(dataset):
-        raise ConfigError(f"sham={folder} has faults; make one of the same command with plan.sham=true")
+        raise ConfigError(
+            f"sham={folder} has faults; make one of the same command with plan.sham=true"
+        )
     pairs: tuple[tuple[str, Sequence[str], Sequence[str]], ...] = (
         ("classes", dataset.class_names, task.dataset.class_names),
         ("channels", dataset.channel_names, task.dataset.channel_names),
     )
     for what, found, wanted in pairs:
         if list(found) != list(wanted):
-            raise ConfigError(f"sham={folder}: its {what} are {', '.join(found)}, those of data= {', '.join(wanted)}")
+            raise ConfigError(
+                f"sham={folder}: its {what} are {', '.join(found)}, those of data= {', '.join(wanted)}"
+            )
     rate = task.dataset.sampling_rate
     if abs(dataset.sampling_rate - rate) > 1e-9 * rate:
-        raise ConfigError(f"sham={folder} is sampled at {dataset.sampling_rate:g} Hz, data= at {rate:g} Hz")
+        raise ConfigError(
+            f"sham={folder} is sampled at {dataset.sampling_rate:g} Hz, data= at {rate:g} Hz"
+        )
     return task_of(
         dataset,
         window_samples=task.window_samples,
@@ -71,5 +77,7 @@ def sham_protocols(sham: Task, protocols: Sequence[str]) -> tuple[str, ...]:
     """
     found = tuple(name for name in protocols if name in sham.dataset.protocols)
     if protocols and not found:
-        raise ConfigError(f"sham={sham.dataset.folder} has none of the protocols {', '.join(protocols)}")
+        raise ConfigError(
+            f"sham={sham.dataset.folder} has none of the protocols {', '.join(protocols)}"
+        )
     return found

@@ -53,12 +53,18 @@ class ModelDescription:
     n_bootstrap: int
     speed_rpm_range: tuple[float, float] | None = None
     out_of_distribution: dict[str, Any] | None = None
-    n_teeth: tuple[int, int] | None = None  # of the driving and the driven gear; None where not told or not the same
+    n_teeth: tuple[int, int] | None = (
+        None  # of the driving and the driven gear; None where not told or not the same
+    )
     temperature: float = 1.0  # see `diagnose.networks.calibration`; models of before have none
     test_channel_names: tuple[str, ...] | None = None  # of protocol cross_sensor
     adaptation: dict[str, Any] | None = None  # see `diagnose.recordings.machine`; None as trained
-    test_score: dict[str, Any] | None = None  # see `diagnose.studies.study.test_score`; models of before have none
-    remaining_life: dict[str, Any] | None = None  # see `diagnose.training.life_store`; None for a classifier
+    test_score: dict[str, Any] | None = (
+        None  # see `diagnose.studies.study.test_score`; models of before have none
+    )
+    remaining_life: dict[str, Any] | None = (
+        None  # see `diagnose.training.life_store`; None for a classifier
+    )
 
     @property
     def network(self) -> Section:
@@ -102,7 +108,9 @@ class Trained(Protocol):
 def model_description(task: Task, settings: TrainSettings, prediction: Trained) -> ModelDescription:
     """Description of the network behind a prediction."""
     trained_on = subset_segments(task, prediction.protocol, "train").record
-    channels, tested = (task.part(prediction.protocol, subset).channel_names for subset in ("train", "test"))
+    channels, tested = (
+        task.part(prediction.protocol, subset).channel_names for subset in ("train", "test")
+    )
     speed = np.asarray(task.dataset.column("speed_rpm"), dtype=float)[trained_on]
     return ModelDescription(
         model_schema_version=MODEL_SCHEMA_VERSION,
@@ -135,13 +143,19 @@ def _n_teeth(dataset: Dataset) -> tuple[int, int] | None:
     return int(dataset.attributes[names[0]]), int(dataset.attributes[names[1]])
 
 
-def save_model(folder: Path, weights: Mapping[str, np.ndarray], description: ModelDescription) -> None:
+def save_model(
+    folder: Path, weights: Mapping[str, np.ndarray], description: ModelDescription
+) -> None:
     """Write both files into a new folder."""
     from safetensors.numpy import save_file
 
     folder.mkdir(parents=True, exist_ok=True)
-    save_file({key: np.ascontiguousarray(value) for key, value in weights.items()}, folder / WEIGHTS)
-    (folder / DESCRIPTION).write_text(json.dumps(asdict(description), indent=2) + "\n", encoding="utf-8")
+    save_file(
+        {key: np.ascontiguousarray(value) for key, value in weights.items()}, folder / WEIGHTS
+    )
+    (folder / DESCRIPTION).write_text(
+        json.dumps(asdict(description), indent=2) + "\n", encoding="utf-8"
+    )
 
 
 def load_model(folder: str | Path) -> tuple[Network, ModelDescription]:
@@ -161,7 +175,9 @@ def load_model(folder: str | Path) -> tuple[Network, ModelDescription]:
             f"{folder} says remaining lives and is no classifier: for diagnose predict, evaluate, export"
         )
     model = build_model(
-        description.network, n_channels=len(description.channel_names), n_classes=len(description.class_names)
+        description.network,
+        n_channels=len(description.channel_names),
+        n_classes=len(description.class_names),
     )
     load_weights(model, folder)
     return model.eval(), description
@@ -179,11 +195,15 @@ def load_weights(model: nn.Module, folder: Path) -> None:
     from diagnose.networks.adaptation import PREFIX
     from diagnose.networks.domain import TENSOR
 
-    stored = {k: v for k, v in tensors_of(folder).items() if k != TENSOR and not k.startswith(PREFIX)}
+    stored = {
+        k: v for k, v in tensors_of(folder).items() if k != TENSOR and not k.startswith(PREFIX)
+    }
     try:
         model.load_state_dict({name: torch.from_numpy(value) for name, value in stored.items()})
     except (RuntimeError, TypeError) as error:
-        raise DatasetError(f"{folder / WEIGHTS} does not fit {DESCRIPTION}: {_one_line(error)}") from None
+        raise DatasetError(
+            f"{folder / WEIGHTS} does not fit {DESCRIPTION}: {_one_line(error)}"
+        ) from None
 
 
 def load_domain(folder: str | Path, description: ModelDescription) -> Domain | None:
@@ -228,7 +248,9 @@ def tensors_of(folder: Path) -> dict[str, np.ndarray]:
     except FileNotFoundError:
         raise DatasetError(f"{folder} holds no {WEIGHTS}") from None
     except (SafetensorError, OSError, KeyError) as error:
-        raise DatasetError(f"{folder / WEIGHTS} is not a safetensors file: {_one_line(error)}") from None
+        raise DatasetError(
+            f"{folder / WEIGHTS} is not a safetensors file: {_one_line(error)}"
+        ) from None
 
 
 def schema_version(dataset: Dataset) -> int | None:
@@ -264,7 +286,9 @@ def read_description(folder: str | Path) -> ModelDescription:
         for name in ("class_names", "channel_names"):
             content[name] = tuple(str(value) for value in content[name])
         if content.get("test_channel_names") is not None:
-            content["test_channel_names"] = tuple(str(value) for value in content["test_channel_names"])
+            content["test_channel_names"] = tuple(
+                str(value) for value in content["test_channel_names"]
+            )
         content["sampling_rate_hz"] = float(content["sampling_rate_hz"])
         for name in ("window_samples", "stride_samples"):
             if not isinstance(content[name], int) or content[name] < 1:
@@ -280,8 +304,14 @@ def read_description(folder: str | Path) -> ModelDescription:
                 content[name] = dict(content[name])
         return ModelDescription(**content)
     except FileNotFoundError:
-        inside = sorted(child.name for child in (folder / "models").glob("*") if (child / DESCRIPTION).is_file())
-        hint = f"; choose one of its models, for instance {folder / 'models' / inside[0]}" if inside else ""
+        inside = sorted(
+            child.name for child in (folder / "models").glob("*") if (child / DESCRIPTION).is_file()
+        )
+        hint = (
+            f"; choose one of its models, for instance {folder / 'models' / inside[0]}"
+            if inside
+            else ""
+        )
         raise DatasetError(f"{folder} holds no {DESCRIPTION}{hint}") from None
     except (OSError, ValueError, KeyError, TypeError) as error:
         raise DatasetError(f"{path} does not describe a model: {_one_line(error)}") from None

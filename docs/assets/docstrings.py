@@ -26,7 +26,10 @@ class HouseDocstrings(griffe.Extension):
 def as_markdown(text: str) -> str:
     """Return the docstring with its sections as bold words and lists."""
     summary, *parts = SECTION.split(text)
-    sections = [f"**{name}**\n\n{_entries(body)}" for name, body in zip(parts[::2], parts[1::2], strict=True)]
+    sections = [
+        f"**{name}**\n\n{_entries(body)}"
+        for name, body in zip(parts[::2], parts[1::2], strict=True)
+    ]
     return "\n\n".join([summary.strip(), *sections])
 
 

@@ -18,7 +18,9 @@ from mkdocs.structure.files import File, Files
 from pymdownx.slugs import slugify
 
 ROOT = Path(__file__).resolve().parents[2]
-BESIDE = {name.lower(): name for name in ("CHANGELOG.md", "CONTRIBUTING.md", "THIRD-PARTY.md")}  # beside README.md
+BESIDE = {
+    name.lower(): name for name in ("CHANGELOG.md", "CONTRIBUTING.md", "THIRD-PARTY.md")
+}  # beside README.md
 SOURCE = "source"  # folder of the site for linked files that are no pages
 LINK = re.compile(r"(?<!!)\[([^\]]*)\]\(([^)\s#]+)(#[^)\s]*)?\)")
 TAG = re.compile(r"\\tag\{([^}]*)\}")
@@ -29,7 +31,10 @@ def on_config(config: Any) -> Any:
     config.mdx_configs["pymdownx.superfences"] = {
         "custom_fences": [{"name": "math", "class": "equation", "format": equation}]
     }
-    config.mdx_configs["toc"] = {**config.mdx_configs.get("toc", {}), "slugify": slugify(case="lower")}
+    config.mdx_configs["toc"] = {
+        **config.mdx_configs.get("toc", {}),
+        "slugify": slugify(case="lower"),
+    }
     if pages := [page for page, name in BESIDE.items() if (ROOT / name).is_file()]:
         config.nav = [*config.nav, {"Project": pages}]
     return config
@@ -42,7 +47,9 @@ def on_files(files: Files, config: Any) -> Files:
             files.append(File.generated(config, page, content=(ROOT / name).read_text("utf-8")))
     linked = set()
     for page in files.documentation_pages():
-        linked |= {_path(page.src_uri, target) for _, target, _ in LINK.findall(page.content_string)}
+        linked |= {
+            _path(page.src_uri, target) for _, target, _ in LINK.findall(page.content_string)
+        }
     for path in sorted(filter(None, linked)):
         if (place := _place(path)) and place.startswith(f"{SOURCE}/"):
             files.append(File.generated(config, place, content=(ROOT / path).read_text("utf-8")))
@@ -71,7 +78,11 @@ def equation(source: str, *_: Any, **__: Any) -> str:
     if tag is None:
         raise PluginError(f"an equation has no \\tag: {source}")
     mathml = convert(TAG.sub("", source).strip(), display="block")
-    unread = [part.text for part in ElementTree.fromstring(mathml).iter() if (part.text or "")[:1] in ("\\", "&")]
+    unread = [
+        part.text
+        for part in ElementTree.fromstring(mathml).iter()
+        if (part.text or "")[:1] in ("\\", "&")
+    ]
     if unread:
         raise PluginError(f"equation {tag[1]} has {unread}, which latex2mathml cannot read")
     return f'<div class="equation" id="eq-{tag[1].lower()}">{mathml}<span>({tag[1]})</span></div>'

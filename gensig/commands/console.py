@@ -55,7 +55,9 @@ class ShardProgress:
     def __init__(self, *, quiet: bool, n_records: int, n_shards: int, n_at_work: int) -> None:
         self.quiet = quiet
         self.n_records = n_records
-        self.at_work = f"{min(n_at_work, n_shards)} of {n_shards} shards at work, counted when whole"
+        self.at_work = (
+            f"{min(n_at_work, n_shards)} of {n_shards} shards at work, counted when whole"
+        )
         self._last: Progress | None = None
         self._begin = self._last_time = time.monotonic()
         self._bar: Any = None
@@ -120,14 +122,20 @@ class ShardProgress:
             first = "; the first run compiles for a minute or two" if waited > LONG_SECONDS else ""
             return f"{waited:.0f} s; {self.at_work}{first}"
         rate = last.n_made / seconds
-        left = max(0.0, (last.n_records - last.n_done) / rate - (time.monotonic() - self._last_time))
+        left = max(
+            0.0, (last.n_records - last.n_done) / rate - (time.monotonic() - self._last_time)
+        )
         failed = f", {last.n_failed} failed" if last.n_failed else ""
         return f"{rate:.1f} records/s, {last.n_bytes / 1e6:.1f} MB, {_duration(left)} left{failed}"
 
     def _print_line(self) -> None:
         n_done = self._last.n_done if self._last is not None else 0
         then = "; checksums, figures and card follow" if n_done == self.n_records else ""
-        print(f"{n_done} of {self.n_records} records, {self.facts()}{then}", file=sys.stderr, flush=True)
+        print(
+            f"{n_done} of {self.n_records} records, {self.facts()}{then}",
+            file=sys.stderr,
+            flush=True,
+        )
 
 
 def _duration(seconds: float) -> str:

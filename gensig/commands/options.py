@@ -43,14 +43,20 @@ def list_options(arguments: Namespace) -> int:
 def _all_groups(folder: str | None) -> tuple[Any, list[str]]:
     found, parts = groups(folder), sections()
     content = {
-        "groups": [{**asdict(group), "options": [one.name for one in options(group.name, folder)]} for group in found],
+        "groups": [
+            {**asdict(group), "options": [one.name for one in options(group.name, folder)]}
+            for group in found
+        ],
         "sections": list(parts),
     }
     rows = [(group.name, group.default or "-", group.about) for group in found]
     lines = ["groups: choose with GROUP=OPTION; `gensig options GROUP` lists the options", ""]
     lines += _table(("group", "default", "what it is"), rows)
     lines += ["", "keys without a choice: set with KEY=VALUE; `gensig options NAME` lists them", ""]
-    lines += _table(("name", "read by", "keys"), [(name, READ_BY[parts[name]], _key_names(name)) for name in parts])
+    lines += _table(
+        ("name", "read by", "keys"),
+        [(name, READ_BY[parts[name]], _key_names(name)) for name in parts],
+    )
     return content, lines
 
 
@@ -62,9 +68,15 @@ def _one_group(group: str, folder: str | None) -> tuple[Any, list[str]]:
     found = options(group, folder)
     content = {"group": group, "options": [{"name": one.name, "about": one.about} for one in found]}
     default = next(one.default for one in groups(folder) if one.name == group)
-    rows = [(f"{group}={one.name}" + (" *" if one.name == default else ""), one.about) for one in found]
+    rows = [
+        (f"{group}={one.name}" + (" *" if one.name == default else ""), one.about) for one in found
+    ]
     star = ["", "* taken where none is typed"] if default else []
-    return content, [*_table(("option", "what it is"), rows), *star, f"`gensig options {group}=NAME` lists its keys"]
+    return content, [
+        *_table(("option", "what it is"), rows),
+        *star,
+        f"`gensig options {group}=NAME` lists its keys",
+    ]
 
 
 def _one_option(group: str, option: str, folder: str | None) -> tuple[Any, list[str]]:
@@ -90,11 +102,16 @@ def _check_group(group: str, folder: str | None) -> None:
         having = [name for name in names if group in [one.name for one in options(name, folder)]]
         if having:
             raise ConfigError(f"'{group}' is an option; type gensig options {having[0]}={group}")
-        raise ConfigError(f"no group '{group}'; {nearest.hint(group, known)}; `gensig options` says what each is")
+        raise ConfigError(
+            f"no group '{group}'; {nearest.hint(group, known)}; `gensig options` says what each is"
+        )
 
 
 def _key_names(section: str) -> str:
-    names = [key.name if section in PRIMARY else key.name.partition(".")[2] for key in section_keys(section)]
+    names = [
+        key.name if section in PRIMARY else key.name.partition(".")[2]
+        for key in section_keys(section)
+    ]
     return ", ".join(names[:4]) + (", ..." if len(names) > 4 else "")
 
 

@@ -40,15 +40,21 @@ def check_outputs(arguments: Namespace) -> None:
 def check_new(flag: str, name: str | None, *, force: bool) -> None:
     """Refuse to replace data or options, which may be all there is of them; figures and JSON are made again."""
     if name is not None and Path(name).exists() and not force:
-        raise ConfigError(f"{flag} {name} is there already; choose another name, or add --force to replace it")
+        raise ConfigError(
+            f"{flag} {name} is there already; choose another name, or add --force to replace it"
+        )
 
 
 def option_file(name: str, group: str, *, force: bool) -> Path:
     """The file of a new option of a configuration group; its stem becomes the option's name."""
     target = Path(name)
     if target.suffix != ".yaml" or not target.stem.isidentifier():
-        raise ConfigError(f"--out {name}: give a file NAME.yaml in a folder {group}, NAME without spaces")
-    if target.parent.name != group or target.parent.exists():  # a new folder of that name is made with the option
+        raise ConfigError(
+            f"--out {name}: give a file NAME.yaml in a folder {group}, NAME without spaces"
+        )
+    if (
+        target.parent.name != group or target.parent.exists()
+    ):  # a new folder of that name is made with the option
         check_file("--out", name)
     check_new("--out", name, force=force)
     return target
@@ -63,7 +69,9 @@ def write_option(target: Path, text: str) -> None:
     print(f"{target}: take it with {folder.name}={target.stem} --config-dir {target.parent.parent}")
 
 
-def write_outputs(arguments: Namespace, content: Mapping[str, Any], draw: Callable[[Path], None]) -> None:
+def write_outputs(
+    arguments: Namespace, content: Mapping[str, Any], draw: Callable[[Path], None]
+) -> None:
     """Write ``content`` to ``--json`` and let ``draw`` make the figure of ``--plot``, each only where asked for."""
     if arguments.json is not None:
         with replaced_file(arguments.json) as path:

@@ -20,7 +20,9 @@ def read_configuration(arguments: Namespace) -> Configuration:
     return config
 
 
-def say_unread(arguments: Namespace, reads: Mapping[str, Sequence[str]] | None, instead: Mapping[str, str]) -> None:
+def say_unread(
+    arguments: Namespace, reads: Mapping[str, Sequence[str]] | None, instead: Mapping[str, str]
+) -> None:
     """Print a note on stderr for every typed key that the verb does not read.
 
     Parameters
@@ -32,7 +34,10 @@ def say_unread(arguments: Namespace, reads: Mapping[str, Sequence[str]] | None, 
     sections = None if reads is None or kind is None else reads.get(kind, reads[""])
     for key in override_keys(getattr(arguments, "overrides", ()) or ()):
         section = key.partition(".")[0]
-        flag = next((flag for name, flag in instead.items() if key == name or key.startswith(f"{name}.")), None)
+        flag = next(
+            (flag for name, flag in instead.items() if key == name or key.startswith(f"{name}.")),
+            None,
+        )
         unread = sections is not None and section not in sections and section != CHOOSES_OTHERS
         if flag is not None or unread:
             hint = f"; use {flag}" if flag else ""

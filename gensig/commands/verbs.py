@@ -178,8 +178,14 @@ VERBS: dict[str, Verb] = {
         "gensig forced-response system=engine_gear_train excitation=engine_v20 --run 650 1750 10 --plot response.png",
         "gensig.commands.lines.forced_response:forced_response",
         arguments.forced_response,
-        instead={"operating.speed_rpm": "--speed", "operating.torque_nm": "--torque", "out": "--json or --plot"},
-        reads={OTHERS: (*TABLES, "excitation", "seed", "mesh", "strength", "quality", "modification")},
+        instead={
+            "operating.speed_rpm": "--speed",
+            "operating.torque_nm": "--torque",
+            "out": "--json or --plot",
+        },
+        reads={
+            OTHERS: (*TABLES, "excitation", "seed", "mesh", "strength", "quality", "modification")
+        },
     ),
     "tune-damper": Verb(
         "torsional dampers that make the worst tooth force of an engine's mesh least; root stress before and after",
@@ -188,7 +194,9 @@ VERBS: dict[str, Verb] = {
         "gensig.commands.lines.tune_damper:tune_damper",
         arguments.tune_damper,
         instead={"operating.speed_rpm": "--run", "operating.torque_nm": "--torque"},
-        reads={OTHERS: (*TABLES, "excitation", "seed", "mesh", "strength", "quality", "modification")},
+        reads={
+            OTHERS: (*TABLES, "excitation", "seed", "mesh", "strength", "quality", "modification")
+        },
     ),
     "twin": Verb(
         "a configuration like a measured healthy machine",

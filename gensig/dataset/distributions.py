@@ -62,7 +62,9 @@ class Distribution(ABC):
     def require_levels(self) -> int:
         """The number of levels; ConfigError where there is none."""
         if self.n_levels is None:
-            raise ConfigError(f"{self.key}: a grid needs its levels, for instance levels: 4, or distribution: {CHOICE}")
+            raise ConfigError(
+                f"{self.key}: a grid needs its levels, for instance levels: 4, or distribution: {CHOICE}"
+            )
         return self.n_levels
 
 
@@ -145,7 +147,9 @@ class Integers(Range):
 
     def level_values(self) -> list[Any]:
         """See ``Distribution``."""
-        return [round(float(value)) for value in np.linspace(self.low, self.high, self.require_levels())]
+        return [
+            round(float(value)) for value in np.linspace(self.low, self.high, self.require_levels())
+        ]
 
 
 @final
@@ -202,7 +206,9 @@ def read_distribution(key: str, spec: Any) -> Distribution:
     _check_distribution(key, spec)
     kind = spec["distribution"]
     numbers = {name: tuple(spec[name]) if kind == CHOICE else spec[name] for name in KEYS[kind]}
-    return DISTRIBUTIONS[kind](key=key, levels=spec.get(LEVELS), names_levels=LEVELS in spec, **numbers)
+    return DISTRIBUTIONS[kind](
+        key=key, levels=spec.get(LEVELS), names_levels=LEVELS in spec, **numbers
+    )
 
 
 def _check_distribution(key: str, spec: Any) -> None:
@@ -216,7 +222,9 @@ def _check_distribution(key: str, spec: Any) -> None:
     extra = sorted(set(spec) - {"distribution", LEVELS, *needed})
     missing = [name for name in needed if name not in spec]
     if extra or missing:
-        raise ConfigError(f"{key}: {spec['distribution']} needs exactly {', '.join(needed)} (and levels, for a grid)")
+        raise ConfigError(
+            f"{key}: {spec['distribution']} needs exactly {', '.join(needed)} (and levels, for a grid)"
+        )
     if spec["distribution"] == CHOICE:
         if not isinstance(spec["values"], list) or not spec["values"]:
             raise ConfigError(f"{key}: values must be a list with at least one entry")
@@ -234,7 +242,9 @@ def _check_range(key: str, spec: Mapping[str, Any], needed: tuple[str, ...]) -> 
     kind, low, high = spec["distribution"], spec["low"], spec["high"]
     if not low < high or (kind == "log_uniform" and low <= 0.0):
         also = " and above 0" if kind == "log_uniform" else ""
-        raise ConfigError(f"{key}: low = {low:g} and high = {high:g} are no range for {kind}; low must be below{also}")
+        raise ConfigError(
+            f"{key}: low = {low:g} and high = {high:g} are no range for {kind}; low must be below{also}"
+        )
     if kind == "integers" and not all(float(spec[name]).is_integer() for name in needed):
         raise ConfigError(f"{key}: low = {low:g} and high = {high:g} must be whole numbers")
     if kind == "normal" and spec["std"] <= 0.0:
@@ -246,13 +256,17 @@ def _check_levels(key: str, spec: Mapping[str, Any]) -> None:
     if levels is None:
         return
     if kind == CHOICE:
-        raise ConfigError(f"{key}: the levels of a choice are its values; leave levels out, or null to draw them")
+        raise ConfigError(
+            f"{key}: the levels of a choice are its values; leave levels out, or null to draw them"
+        )
     if isinstance(levels, bool) or not isinstance(levels, int) or levels < 2:
         raise ConfigError(
             f"{key}: levels = {levels!r} must be a whole number of at least 2, or null to draw the values"
         )
     if kind == "integers" and levels > spec["high"] - spec["low"] + 1:
-        raise ConfigError(f"{key}: levels = {levels}, but there are {spec['high'] - spec['low'] + 1:g} whole numbers")
+        raise ConfigError(
+            f"{key}: levels = {levels}, but there are {spec['high'] - spec['low'] + 1:g} whole numbers"
+        )
 
 
 def _is_number(value: Any) -> bool:
@@ -272,6 +286,8 @@ def design_points(design: str, n_points: int, n_dimensions: int, rng: np.random.
     from scipy.stats import qmc
 
     if design == "sobol":
-        points = qmc.Sobol(n_dimensions, rng=rng).random_base2(max(1, math.ceil(math.log2(n_points))))[:n_points]
+        points = qmc.Sobol(n_dimensions, rng=rng).random_base2(
+            max(1, math.ceil(math.log2(n_points)))
+        )[:n_points]
         return rng.permutation(points)
     return qmc.LatinHypercube(n_dimensions, rng=rng).random(n_points)

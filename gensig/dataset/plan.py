@@ -76,7 +76,9 @@ class Plan:
     def rows(self, shard: int) -> np.ndarray:
         """Indices of the records of one shard, in the order of their rows."""
         if not 0 <= shard < self.n_shards:
-            raise DatasetError(f"shard {shard} does not exist; the plan has shards 0 to {self.n_shards - 1}")
+            raise DatasetError(
+                f"shard {shard} does not exist; the plan has shards 0 to {self.n_shards - 1}"
+            )
         return np.flatnonzero(self.columns["shard"] == shard)
 
     def record(self, index: int) -> dict[str, str | int | float]:
@@ -91,7 +93,9 @@ def _rebuild(columns: dict[str, np.ndarray]) -> Plan:
 def _normalized(name: str, values: np.ndarray) -> np.ndarray:
     """A read-only copy as text, int64 or float64; DatasetError for anything else."""
     array = np.asarray(values)
-    kind = {"U": "str", "T": "str", "i": "int", "u": "int", "b": "int", "f": "float"}.get(array.dtype.kind)
+    kind = {"U": "str", "T": "str", "i": "int", "u": "int", "b": "int", "f": "float"}.get(
+        array.dtype.kind
+    )
     if array.dtype.kind == "O" and all(isinstance(value, str) for value in array.flat):
         kind, array = "str", array.astype(str)
     wanted = kind_of(name) or kind
@@ -104,8 +108,12 @@ def _normalized(name: str, values: np.ndarray) -> np.ndarray:
         array = np.asarray(array, dtype=str)
         bad = next((value for value in array.tolist() if _CONTROL.search(value)), None)
         if bad is not None:
-            raise DatasetError(f"plan column {name} holds the text {bad!r}; control characters are not allowed")
-    array = array.astype(_DTYPES.get(wanted or "", array.dtype))  # a copy: the caller's array stays writable
+            raise DatasetError(
+                f"plan column {name} holds the text {bad!r}; control characters are not allowed"
+            )
+    array = array.astype(
+        _DTYPES.get(wanted or "", array.dtype)
+    )  # a copy: the caller's array stays writable
     if wanted == "float":
         array[np.isnan(array)] = np.nan  # one NaN only: others would not come back from text
     array.flags.writeable = False
@@ -115,9 +123,13 @@ def _normalized(name: str, values: np.ndarray) -> np.ndarray:
 def _check_ids(ids: np.ndarray) -> None:
     values = ids.tolist()
     limit = COLUMNS["record_id"].n_bytes
-    bad = next((value for value in values if not _RECORD_ID.fullmatch(value) or len(value) > limit), None)
+    bad = next(
+        (value for value in values if not _RECORD_ID.fullmatch(value) or len(value) > limit), None
+    )
     if bad is not None:
-        raise DatasetError(f"record_id {bad!r} is not allowed; use letters, digits, '_', '.', '-', at most {limit}")
+        raise DatasetError(
+            f"record_id {bad!r} is not allowed; use letters, digits, '_', '.', '-', at most {limit}"
+        )
     if len(set(values)) != len(values):
         unique, counts = np.unique(ids, return_counts=True)
         raise DatasetError(
@@ -147,7 +159,9 @@ def record_ids(n_records: int) -> np.ndarray:
 def shard_places(n_records: int, records_per_shard: int) -> tuple[np.ndarray, np.ndarray]:
     """Shard and row of each record, (record,) each, filling one shard after the other."""
     if records_per_shard < 1 or n_records < 1:
-        raise DatasetError(f"{n_records} records in shards of {records_per_shard}: both must be at least 1")
+        raise DatasetError(
+            f"{n_records} records in shards of {records_per_shard}: both must be at least 1"
+        )
     index = np.arange(n_records)
     return index // records_per_shard, index % records_per_shard
 
@@ -158,7 +172,9 @@ def plan_text(plan: Plan) -> str:
     for name, values in plan.columns.items():
         if _CONTROL.search(name) or not name:
             raise DatasetError(f"plan column name {name!r} is not allowed; use printable text")
-        texts = [repr(value) if values.dtype.kind == "f" else str(value) for value in values.tolist()]
+        texts = [
+            repr(value) if values.dtype.kind == "f" else str(value) for value in values.tolist()
+        ]
         if values.dtype.kind == "U" and kind_of(name) is None and _infer(texts) != "str":
             raise DatasetError(
                 f"plan column {name} is text, but all its values look like numbers, such as {texts[0]!r}; "
@@ -194,7 +210,11 @@ def read_plan(path: Path) -> Plan:
         )
     columns = list(zip(*rows, strict=True)) or [() for _ in header]
     try:
-        return Plan(columns={name: _parsed(name, cells) for name, cells in zip(header, columns, strict=True)})
+        return Plan(
+            columns={
+                name: _parsed(name, cells) for name, cells in zip(header, columns, strict=True)
+            }
+        )
     except DatasetError as error:
         raise DatasetError(f"{path}: {error}") from error
 
@@ -229,15 +249,21 @@ class PlanRows:
                 lines = file.read(end - begin).decode("utf-8").removesuffix("\n").split("\n")
             yield from csv.reader(lines, strict=True)
         except (OSError, ValueError, csv.Error) as error:
-            raise DatasetError(f"{self.path} is damaged ({error}); restore it from a copy") from error
+            raise DatasetError(
+                f"{self.path} is damaged ({error}); restore it from a copy"
+            ) from error
 
     def records(self, first: int, n_records: int) -> list[dict[str, str | int | float]]:
         """All values of some records, as `Plan.record` gives them."""
         if n_records < 1 or first + n_records > len(self._begins) - 2:
-            raise DatasetError(f"{self.path} has no records {first} to {first + n_records - 1}; restore it from a copy")
+            raise DatasetError(
+                f"{self.path} has no records {first} to {first + n_records - 1}; restore it from a copy"
+            )
         rows = list(self._cells(1 + first, n_records))
         if len(rows) != n_records or any(len(cells) != len(self.names) for cells in rows):
-            raise DatasetError(f"{self.path} is cut or damaged near record {first}; restore it from a copy")
+            raise DatasetError(
+                f"{self.path} is cut or damaged near record {first}; restore it from a copy"
+            )
         columns = zip(self.names, zip(*rows, strict=True), strict=True)
         values = {name: _parsed(name, cells).tolist() for name, cells in columns}
         return [dict(zip(values, row, strict=True)) for row in zip(*values.values(), strict=True)]

@@ -77,7 +77,9 @@ class Dataset:
         self.manifest = manifest
         self.n_records = manifest.n_records
         self._starts = np.cumsum([0, *(entry.rows for entry in manifest.shards)])
-        first_done = next((i for i, entry in enumerate(manifest.shards) if entry.state == "done"), None)
+        first_done = next(
+            (i for i, entry in enumerate(manifest.shards) if entry.state == "done"), None
+        )
         if first_done is None:
             raise DatasetError(f"{folder} has no finished shard yet; run `gensig resume {folder}`")
         self._columns: dict[str, np.ndarray] = {}
@@ -94,9 +96,13 @@ class Dataset:
         self.compression = compression_of(first["acceleration"])
         self._shape: tuple[int, int] = first["acceleration"].shape[1:]
         found = datasets(first, folder)
-        self.signal_names: list[str] = [name for name in SIGNALS if SIGNALS[name].is_bulk and name in found]
+        self.signal_names: list[str] = [
+            name for name in SIGNALS if SIGNALS[name].is_bulk and name in found
+        ]
         self._types = {
-            name: (data.dtype, data.shape[1:]) for name, data in found.items() if name not in self.signal_names
+            name: (data.dtype, data.shape[1:])
+            for name, data in found.items()
+            if name not in self.signal_names
         }
 
     @property
@@ -134,7 +140,9 @@ class Dataset:
     @property
     def protocols(self) -> list[str]:
         """Names that `split` takes."""
-        return sorted(Path(name).stem for name in self.manifest.files if name.startswith(f"{SPLITS}/"))
+        return sorted(
+            Path(name).stem for name in self.manifest.files if name.startswith(f"{SPLITS}/")
+        )
 
     def column(self, name: str) -> np.ndarray:
         """One value (or short vector) a record, (record, ...), read-only; text as numpy strings.
@@ -144,7 +152,9 @@ class Dataset:
         if name not in self._types:
             raise unknown_name("column", name, self.column_names, self.folder)
         if name not in self._columns:
-            values = np.concatenate([self.shard_column(shard, name) for shard in range(len(self.manifest.shards))])
+            values = np.concatenate(
+                [self.shard_column(shard, name) for shard in range(len(self.manifest.shards))]
+            )
             values.flags.writeable = False
             self._columns[name] = values
         return self._columns[name]
@@ -194,10 +204,16 @@ class Dataset:
         except HDF5_ERRORS as error:
             raise self._unreadable(shard, error) from error
         if block.shape != (len(self.channel_names), stop - start):
-            raise self._unreadable(shard, ValueError(f"{name} has another shape than in the other shards"))
-        return block if channels is None else block[[self._channel(channel) for channel in channels]]
+            raise self._unreadable(
+                shard, ValueError(f"{name} has another shape than in the other shards")
+            )
+        return (
+            block if channels is None else block[[self._channel(channel) for channel in channels]]
+        )
 
-    def trace(self, record_index: int, name: str, start: int = 0, stop: int | None = None) -> np.ndarray:
+    def trace(
+        self, record_index: int, name: str, start: int = 0, stop: int | None = None
+    ) -> np.ndarray:
         """Another signal of one record, where the data set holds it: shaft sensors and the mesh state.
 
         'tacho', 'encoder_angle', 'shaft_angle', 'mesh_force', 'contact_lost' and 'fault_engaged' are (sample,),
@@ -213,18 +229,24 @@ class Dataset:
         except HDF5_ERRORS as error:
             raise self._unreadable(shard, error) from error
         if values.shape[-1:] != (stop - start,) or values.ndim != len(SIGNALS[name].axes):
-            raise self._unreadable(shard, ValueError(f"{name} has another shape than in the other shards"))
+            raise self._unreadable(
+                shard, ValueError(f"{name} has another shape than in the other shards")
+            )
         return values
 
     def _place(self, record_index: int, start: int, stop: int) -> tuple[int, int]:
         """Shard and row of a record; refuses records and samples that do not exist."""
         if not 0 <= record_index < self.n_records:
-            raise DatasetError(f"record {record_index} does not exist; {self.folder} has 0 to {self.n_records - 1}")
+            raise DatasetError(
+                f"record {record_index} does not exist; {self.folder} has 0 to {self.n_records - 1}"
+            )
         if not 0 <= start < stop <= self.n_samples:
             raise DatasetError(f"samples {start} to {stop}; a record has 0 to {self.n_samples}")
         shard = int(np.searchsorted(self._starts, record_index, side="right")) - 1
         if self.manifest.shards[shard].state != "done":
-            raise DatasetError(f"record {record_index} is in {self.manifest.shards[shard].name}, which is not made yet")
+            raise DatasetError(
+                f"record {record_index} is in {self.manifest.shards[shard].name}, which is not made yet"
+            )
         return shard, record_index - int(self._starts[shard])
 
     def where(self, **conditions: Any) -> Selection:
@@ -257,14 +279,20 @@ class Dataset:
         """subset -> list of (record_index, start_fraction, stop_fraction); failed records are in it, see `usable`."""
         if protocol not in self.protocols:
             if protocol in PROTOCOLS:
-                raise DatasetError(f"split {protocol!r} does not exist in {self.folder}; {self.left_out[protocol]}")
+                raise DatasetError(
+                    f"split {protocol!r} does not exist in {self.folder}; {self.left_out[protocol]}"
+                )
             raise unknown_name("split", protocol, self.protocols, self.folder)
         path = self.folder / SPLITS / f"{protocol}.csv"
         table = read_split(path)
-        index = {record_id: i for i, record_id in enumerate(self.plan.columns["record_id"].tolist())}
+        index = {
+            record_id: i for i, record_id in enumerate(self.plan.columns["record_id"].tolist())
+        }
         rows: SplitRows = {subset: [] for subset in SUBSETS}
         columns = (table.record_id, table.start_fraction, table.stop_fraction, table.subset)
-        for record_id, start, stop, subset in zip(*(column.tolist() for column in columns), strict=True):
+        for record_id, start, stop, subset in zip(
+            *(column.tolist() for column in columns), strict=True
+        ):
             if record_id not in index:
                 raise DatasetError(
                     f"{path} names record {record_id[:40]!r}, which the plan has not; restore it from a copy"
@@ -283,7 +311,10 @@ class Dataset:
         return self
 
     def __exit__(
-        self, kind: type[BaseException] | None, error: BaseException | None, trace: TracebackType | None
+        self,
+        kind: type[BaseException] | None,
+        error: BaseException | None,
+        trace: TracebackType | None,
     ) -> None:
         self.close()
 
@@ -301,7 +332,9 @@ class Dataset:
         return {**self.__dict__, "_files": OrderedDict(), "_checked": {}}
 
     def __repr__(self) -> str:
-        return f"Dataset({str(self.folder)!r}, {self.n_records} records, classes {self.class_names})"
+        return (
+            f"Dataset({str(self.folder)!r}, {self.n_records} records, classes {self.class_names})"
+        )
 
     def _file(self, shard: int) -> h5py.File:
         """The open shard; at most `MAX_OPEN_SHARDS` stay open, and none is shared with a forked process."""
@@ -313,7 +346,9 @@ class Dataset:
         file = self._open(shard_path(self.folder, shard), shard)
         if file["record_id"].shape[0] != self.manifest.shards[shard].rows:
             file.close()
-            raise self._unreadable(shard, ValueError("another number of rows than the manifest says"))
+            raise self._unreadable(
+                shard, ValueError("another number of rows than the manifest says")
+            )
         self._files[shard] = file
         if len(self._files) > MAX_OPEN_SHARDS:
             self._files.popitem(last=False)[1].close()
@@ -335,7 +370,9 @@ class Dataset:
         except HDF5_ERRORS as error:
             raise self._unreadable(shard, error) from error
         if values.shape[1:] != shape:
-            raise self._unreadable(shard, ValueError(f"{name} has another shape than in the other shards"))
+            raise self._unreadable(
+                shard, ValueError(f"{name} has another shape than in the other shards")
+            )
         return values
 
     def _channel(self, channel: int | str) -> int:
@@ -343,7 +380,9 @@ class Dataset:
             return self.channel_names.index(channel)
         if not isinstance(channel, str) and 0 <= channel < len(self.channel_names):
             return int(channel)
-        raise DatasetError(f"channel {channel!r} does not exist; there are {', '.join(self.channel_names)}")
+        raise DatasetError(
+            f"channel {channel!r} does not exist; there are {', '.join(self.channel_names)}"
+        )
 
     def _unreadable(self, shard: int, error: Exception) -> DatasetError:
         reason = first_line(error)

@@ -36,7 +36,9 @@ class Column:
 
     def __post_init__(self) -> None:
         if self.role not in ROLES:
-            raise DatasetError(f"column {self.name}: role '{self.role}' is unknown; allowed are {', '.join(ROLES)}")
+            raise DatasetError(
+                f"column {self.name}: role '{self.role}' is unknown; allowed are {', '.join(ROLES)}"
+            )
 
     @property
     def is_text(self) -> bool:
@@ -51,7 +53,9 @@ class Column:
     @property
     def storage_dtype(self) -> np.dtype:
         """Type of the HDF5 data set; text is marked as ASCII, because Octave reads none that is marked as UTF-8."""
-        return np.dtype(f"S{self.n_bytes}") if self.is_text else np.dtype(self.dtype).newbyteorder("<")
+        return (
+            np.dtype(f"S{self.n_bytes}") if self.is_text else np.dtype(self.dtype).newbyteorder("<")
+        )
 
     @property
     def is_bulk(self) -> bool:
@@ -60,23 +64,55 @@ class Column:
 
 
 def _table(*rows: tuple[str, str, str, str, str]) -> dict[str, Column]:
-    return {n: Column(name=n, dtype=d, unit=u, role=r, description=text) for n, d, u, r, text in rows}
+    return {
+        n: Column(name=n, dtype=d, unit=u, role=r, description=text) for n, d, u, r, text in rows
+    }
 
 
 COLUMNS: dict[str, Column] = _table(
     ("record_id", "str32", "", "id", "name of the record, unique in the data set"),
     ("label", "int16", "1", "label", "class number, index into the attribute class_names"),
     ("label_name", "str64", "", "label", "class name"),
-    ("faults_json", "str4096", "", "fault", "JSON list, one object a fault: kind, gear, tooth, sizes in millimetres"),
-    ("severity", "float64", "1", "fault", "0 healthy to 1: relative size of the fault, the largest when compound"),
+    (
+        "faults_json",
+        "str4096",
+        "",
+        "fault",
+        "JSON list, one object a fault: kind, gear, tooth, sizes in millimetres",
+    ),
+    (
+        "severity",
+        "float64",
+        "1",
+        "fault",
+        "0 healthy to 1: relative size of the fault, the largest when compound",
+    ),
     ("fault_gear", "str16", "", "fault", "gear that carries the (first) fault; empty when healthy"),
-    ("fault_tooth", "int32", "1", "fault", "lowest tooth with the (first) fault, counted from 0; -1: all or none"),
+    (
+        "fault_tooth",
+        "int32",
+        "1",
+        "fault",
+        "lowest tooth with the (first) fault, counted from 0; -1: all or none",
+    ),
     ("start_tooth_pinion", "int32", "1", "condition", "pinion tooth in mesh at the first sample"),
     ("start_tooth_wheel", "int32", "1", "condition", "wheel tooth in mesh at the first sample"),
-    ("start_phase", "float64", "1", "condition", "mesh phase at the first sample, as a fraction of a base pitch"),
+    (
+        "start_phase",
+        "float64",
+        "1",
+        "condition",
+        "mesh phase at the first sample, as a fraction of a base pitch",
+    ),
     ("speed_rpm", "float64", "r/min", "result", "actual mean speed of the driving shaft"),
     ("speed_set_rpm", "float64", "r/min", "condition", "speed set-point of the driving shaft"),
-    ("torque_nm", "float64", "N m", "condition", "torque set-point of the driving shaft, or of what `torque_of` says"),
+    (
+        "torque_nm",
+        "float64",
+        "N m",
+        "condition",
+        "torque set-point of the driving shaft, or of what `torque_of` says",
+    ),
     (
         "mesh_frequency_hz",
         "float64",
@@ -88,11 +124,41 @@ COLUMNS: dict[str, Column] = _table(
     ("gearbox_id", "str64", "", "unit", "housing, transfer path and bearings"),
     ("specimen_id", "str64", "", "unit", "set of gears with its manufacturing errors"),
     ("unit_id", "str64", "", "unit", "one specimen in one gearbox"),
-    ("condition_id", "str64", "", "condition", "one unit at one set-point; its records share one noise level"),
-    ("repeat", "int32", "1", "condition", "number among the records of the same condition_id and class, from 0"),
-    ("status", "str16", "", "result", "'ok' or 'failed'; a failed record keeps its parameters, its signals may be NaN"),
-    ("status_reason", "str256", "", "result", "why the record failed, cut to 256 bytes; empty when ok"),
-    ("integration_error", "float64", "1", "result", "relative error of the time integration; NaN where not measured"),
+    (
+        "condition_id",
+        "str64",
+        "",
+        "condition",
+        "one unit at one set-point; its records share one noise level",
+    ),
+    (
+        "repeat",
+        "int32",
+        "1",
+        "condition",
+        "number among the records of the same condition_id and class, from 0",
+    ),
+    (
+        "status",
+        "str16",
+        "",
+        "result",
+        "'ok' or 'failed'; a failed record keeps its parameters, its signals may be NaN",
+    ),
+    (
+        "status_reason",
+        "str256",
+        "",
+        "result",
+        "why the record failed, cut to 256 bytes; empty when ok",
+    ),
+    (
+        "integration_error",
+        "float64",
+        "1",
+        "result",
+        "relative error of the time integration; NaN where not measured",
+    ),
     (
         "integration_check",
         "str16",
@@ -131,9 +197,27 @@ COLUMNS: dict[str, Column] = _table(
         "noise",
         "share of the samples that were lost and filled in all channels; 0 where none can be, NaN in a failed record",
     ),
-    ("life_id", "str64", "", "unit", "the life that the record is a snapshot of, one a unit (run to failure only)"),
-    ("life_time_h", "float64", "h", "age", "clock time since the machine was new, standstills included (likewise)"),
-    ("life_cycles", "float64", "1", "age", "turns of the driving shaft since the machine was new (likewise)"),
+    (
+        "life_id",
+        "str64",
+        "",
+        "unit",
+        "the life that the record is a snapshot of, one a unit (run to failure only)",
+    ),
+    (
+        "life_time_h",
+        "float64",
+        "h",
+        "age",
+        "clock time since the machine was new, standstills included (likewise)",
+    ),
+    (
+        "life_cycles",
+        "float64",
+        "1",
+        "age",
+        "turns of the driving shaft since the machine was new (likewise)",
+    ),
     (
         "remaining_life_h",
         "float64",
@@ -141,12 +225,31 @@ COLUMNS: dict[str, Column] = _table(
         "label",
         "clock time until the end of the life, a lower bound where life_failed is 0 (likewise)",
     ),
-    ("life_failed", "int8", "1", "label", "1: the life ends in failure; 0: it is censored at the horizon (likewise)"),
-    ("life_growing", "int8", "1", "fault", "1 where the damage grows at this record's load, 0 where not (likewise)"),
+    (
+        "life_failed",
+        "int8",
+        "1",
+        "label",
+        "1: the life ends in failure; 0: it is censored at the horizon (likewise)",
+    ),
+    (
+        "life_growing",
+        "int8",
+        "1",
+        "fault",
+        "1 where the damage grows at this record's load, 0 where not (likewise)",
+    ),
 )
 
 # Columns that only the snapshots of lives have.
-LIFE_COLUMNS = ("life_id", "life_time_h", "life_cycles", "remaining_life_h", "life_failed", "life_growing")
+LIFE_COLUMNS = (
+    "life_id",
+    "life_time_h",
+    "life_cycles",
+    "remaining_life_h",
+    "life_failed",
+    "life_growing",
+)
 
 SIGNALS: dict[str, Column] = {
     column.name: column
@@ -243,13 +346,17 @@ def kind_of(name: str) -> str | None:
 
 def stored_reason(reason: str | float) -> str:
     """`status_reason` as far as a shard holds it."""
-    return str(reason).encode("ascii", "backslashreplace")[: COLUMNS["status_reason"].n_bytes].decode()
+    return (
+        str(reason).encode("ascii", "backslashreplace")[: COLUMNS["status_reason"].n_bytes].decode()
+    )
 
 
 def unit_in_file(column: Column, attributes: Mapping[str, Any]) -> str:
     """Unit of a column in a data set with these root attributes: rotations among the channels are in rad/s^2."""
     units = (
-        set(attributes.get("channel_units") or [ACCELERATION]) if {"channel", "source"} & set(column.axes) else set()
+        set(attributes.get("channel_units") or [ACCELERATION])
+        if {"channel", "source"} & set(column.axes)
+        else set()
     )
     if ACCELERATION not in column.unit or units <= {ACCELERATION}:
         return column.unit
@@ -265,7 +372,9 @@ def column_table() -> str:
         if column.name in SCALES:
             kind = " or ".join(SAMPLE_TYPES)
         name = f"`{column.name}`" + (" *" if column.name in REQUIRED else "")
-        lines.append(f"| {name} | ({shape}) | {kind} | {column.unit} | {column.role} | {column.description} |")
+        lines.append(
+            f"| {name} | ({shape}) | {kind} | {column.unit} | {column.role} | {column.description} |"
+        )
     lines.append(
         f"| `{PARAMS}/<name>` | (record) | float64 | in the name | | a drawn or swept value; NaN where it does "
         "not apply |"

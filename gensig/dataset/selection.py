@@ -54,7 +54,11 @@ class RecordSource(Protocol):
         """One value (or short vector) a record, (record, ...)."""
 
     def signals(
-        self, index: int, start: int = 0, stop: int | None = None, channels: Sequence[int | str] | None = None
+        self,
+        index: int,
+        start: int = 0,
+        stop: int | None = None,
+        channels: Sequence[int | str] | None = None,
     ) -> np.ndarray:
         """Acceleration of one record, (channel, sample) float32 in m/s^2."""
 
@@ -104,11 +108,15 @@ class Selection:
         """One value (or short vector) a chosen record, (record, ...)."""
         return self.dataset.column(name)[self.index]
 
-    def signals(self, place: int, start: int = 0, stop: int | None = None, **options: Any) -> np.ndarray:
+    def signals(
+        self, place: int, start: int = 0, stop: int | None = None, **options: Any
+    ) -> np.ndarray:
         """Acceleration of the record at a place of this selection, (channel, sample) float32 in m/s^2."""
         return self.dataset.signals(self._record(place), start, stop, **options)
 
-    def array(self, start: int = 0, stop: int | None = None, channels: Sequence[int | str] | None = None) -> np.ndarray:
+    def array(
+        self, start: int = 0, stop: int | None = None, channels: Sequence[int | str] | None = None
+    ) -> np.ndarray:
         """Acceleration of all chosen records at once, (record, channel, sample) float32 in m/s^2.
 
         This is the one call that loads them all; to go through more than fits into memory, iterate.
@@ -123,7 +131,9 @@ class Selection:
     def table(self, names: Sequence[str] | None = None) -> np.ndarray:
         """Columns as one structured array, (record,); all those with one value a record where `names` is None."""
         if names is None:
-            names = [name for name in self.dataset.column_names if self.dataset.column(name).ndim == 1]
+            names = [
+                name for name in self.dataset.column_names if self.dataset.column(name).ndim == 1
+            ]
         return structured({name: self.column(name) for name in names})
 
     def __len__(self) -> int:
@@ -132,7 +142,9 @@ class Selection:
     def __getitem__(self, place: int) -> StoredRecord:
         index = self._record(place)
         values = {name: self.dataset.column(name)[index] for name in self.dataset.column_names}
-        plain = {name: value.item() if np.ndim(value) == 0 else value for name, value in values.items()}
+        plain = {
+            name: value.item() if np.ndim(value) == 0 else value for name, value in values.items()
+        }
         return StoredRecord(dataset=self.dataset, index=index, values=plain)
 
     def __iter__(self) -> Iterator[StoredRecord]:
@@ -159,7 +171,9 @@ def structured(columns: Mapping[str, np.ndarray]) -> np.ndarray:
 def unknown_name(kind: str, name: str, known: Sequence[str], place: object) -> DatasetError:
     """The one line for a name that does not exist, with the nearest names first."""
     close = difflib.get_close_matches(name, known, n=3)
-    hint = f"did you mean {' or '.join(map(repr, close))}?" if close else f"it has {', '.join(known)}"
+    hint = (
+        f"did you mean {' or '.join(map(repr, close))}?" if close else f"it has {', '.join(known)}"
+    )
     return DatasetError(f"{kind} {name!r} does not exist in {place}; {hint}")
 
 
@@ -167,13 +181,19 @@ def _meets(dataset: RecordSource, name: str, wanted: Any) -> np.ndarray:
     """(record,) bool: which records meet one condition."""
     values = _values(dataset, name)
     if values.ndim != 1:
-        raise DatasetError(f"column {name!r} holds {values.shape[1:]} values a record; a condition needs one a record")
+        raise DatasetError(
+            f"column {name!r} holds {values.shape[1:]} values a record; a condition needs one a record"
+        )
     if isinstance(wanted, tuple):
         return _in_range(name, values, wanted)
-    choices = [*wanted] if isinstance(wanted, list | set | frozenset | range | np.ndarray) else [wanted]
+    choices = (
+        [*wanted] if isinstance(wanted, list | set | frozenset | range | np.ndarray) else [wanted]
+    )
     is_text = values.dtype.kind == "U"
     for choice in choices:
-        if isinstance(choice, str | np.str_) is not is_text or not isinstance(choice, str | int | float | np.generic):
+        if isinstance(choice, str | np.str_) is not is_text or not isinstance(
+            choice, str | int | float | np.generic
+        ):
             raise DatasetError(
                 f"where {name}={choice!r}: the column holds {'text' if is_text else 'numbers'}; give a value of that "
                 "kind, a list of them" + ("" if is_text else ", or a range as a tuple (low, high)")
@@ -203,23 +223,34 @@ def _values(dataset: RecordSource, name: str) -> np.ndarray:
 def _in_range(name: str, values: np.ndarray, wanted: tuple) -> np.ndarray:
     """Closed range; None leaves a side open. Missing values (NaN) are in no range."""
     numbers = [limit for limit in wanted if limit is not None]
-    right = len(wanted) == 2 and all(isinstance(limit, int | float | np.number) for limit in numbers)
+    right = len(wanted) == 2 and all(
+        isinstance(limit, int | float | np.number) for limit in numbers
+    )
     if values.dtype.kind == "U" or not right or any(np.isnan(limit) for limit in numbers):
         raise DatasetError(
             f"where {name}={wanted!r}: a tuple is a closed range (low, high) of numbers, None where a side is open; "
             "give a list for several values"
         )
-    low, high = (-np.inf if wanted[0] is None else wanted[0]), (np.inf if wanted[1] is None else wanted[1])
+    low, high = (
+        (-np.inf if wanted[0] is None else wanted[0]),
+        (np.inf if wanted[1] is None else wanted[1]),
+    )
     if low > high:
-        raise DatasetError(f"where {name}={wanted!r}: the range is empty; give the lower limit first")
+        raise DatasetError(
+            f"where {name}={wanted!r}: the range is empty; give the lower limit first"
+        )
     return (values >= low) & (values <= high)
 
 
-def _check_choices(dataset: RecordSource, name: str, values: np.ndarray, choices: Sequence[Any]) -> None:
+def _check_choices(
+    dataset: RecordSource, name: str, values: np.ndarray, choices: Sequence[Any]
+) -> None:
     """Refuse text that no record has: it is a slip of the pen. Classes and states may be absent, and so may ''."""
     column = ALIASES.get(name, name)
     possible = {*values.tolist(), ""}
     possible |= {"label_name": {*dataset.class_names}, "status": {*_STATES}}.get(column, set())
     for choice in choices:
         if str(choice) not in possible:
-            raise unknown_name(f"{name} =", str(choice), sorted(possible - {""})[:200], dataset.folder)
+            raise unknown_name(
+                f"{name} =", str(choice), sorted(possible - {""})[:200], dataset.folder
+            )

@@ -31,19 +31,28 @@ def whole_cycles(crank_angle: Array) -> list[slice]:
     since = crank_angle - crank_angle[0]
     n_cycles = int(since[-1] / CYCLE)
     if n_cycles < 1:
-        raise ConfigError(f"the crank turns by {since[-1]:.3g} rad, less than a cycle of two turns; simulate longer")
+        raise ConfigError(
+            f"the crank turns by {since[-1]:.3g} rad, less than a cycle of two turns; simulate longer"
+        )
     edges = np.searchsorted(since, CYCLE * np.arange(n_cycles + 1))
     return [slice(int(a), int(b)) for a, b in pairwise(edges)]
 
 
 def fluctuations(signals: Array, crank_angle: Array) -> Array:
     """Half the peak to peak of each signal in each whole cycle, (signal, cycle), of signals (signal, sample)."""
-    return 0.5 * np.array([np.ptp(signals[:, cycle], axis=1) for cycle in whole_cycles(crank_angle)]).T
+    return (
+        0.5 * np.array([np.ptp(signals[:, cycle], axis=1) for cycle in whole_cycles(crank_angle)]).T
+    )
 
 
 def typical_extremes(signals: Array, crank_angle: Array) -> tuple[Array, Array]:
     """Medians over the cycles of the least and of the greatest value in a cycle, (signal,) each."""
-    found = np.array([(signals[:, at].min(axis=1), signals[:, at].max(axis=1)) for at in whole_cycles(crank_angle)])
+    found = np.array(
+        [
+            (signals[:, at].min(axis=1), signals[:, at].max(axis=1))
+            for at in whole_cycles(crank_angle)
+        ]
+    )
     least, greatest = np.median(found, axis=0)
     return np.asarray(least), np.asarray(greatest)
 

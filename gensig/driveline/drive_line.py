@@ -67,14 +67,19 @@ class DriveLine:
         """Tooth meshing frequency of every mesh over the speed of the first node, (mesh,)."""
         speed = np.abs(self.line.speed_ratio)
         gears = self.line.gears
-        return tuple(float(speed[gears[mesh.driving].node] * gears[mesh.driving].n_teeth) for mesh in self.line.meshes)
+        return tuple(
+            float(speed[gears[mesh.driving].node] * gears[mesh.driving].n_teeth)
+            for mesh in self.line.meshes
+        )
 
     @property
     def campbell_orders(self) -> tuple[float, ...]:
         """Orders of the Campbell diagram: as given, or the turn, its double, every mesh and its double."""
         if self.campbell.orders is not None:
             return self.campbell.orders
-        return tuple(sorted({factor * order for order in (1.0, *self.mesh_orders) for factor in (1.0, 2.0)}))
+        return tuple(
+            sorted({factor * order for order in (1.0, *self.mesh_orders) for factor in (1.0, 2.0)})
+        )
 
 
 def read_drive_line(config: Configuration) -> DriveLine:
@@ -92,7 +97,9 @@ def read_drive_line(config: Configuration) -> DriveLine:
         )
     material = read_material(config)
     shafting = read_shafting("system.shafting_csv", options.shafting_csv)
-    gear_rows = [] if options.gears_csv is None else read_gears("system.gears_csv", options.gears_csv)
+    gear_rows = (
+        [] if options.gears_csv is None else read_gears("system.gears_csv", options.gears_csv)
+    )
     node_rows = rows_of_nodes(shafting)
     numbers = tuple(node_rows)
     if options.viscous_damper_node not in (None, *numbers):
@@ -100,8 +107,14 @@ def read_drive_line(config: Configuration) -> DriveLine:
             f"system.viscous_damper_node = {options.viscous_damper_node}: {options.shafting_csv} has no such node"
         )
     shapes = [gear_of(row) for row in gear_rows]
-    gears = [line_gear(row, shape, numbers, options, material) for row, shape in zip(gear_rows, shapes, strict=True)]
-    nodes = tuple(node_of(row, place, gears, shapes, options, material) for place, row in enumerate(node_rows.values()))
+    gears = [
+        line_gear(row, shape, numbers, options, material)
+        for row, shape in zip(gear_rows, shapes, strict=True)
+    ]
+    nodes = tuple(
+        node_of(row, place, gears, shapes, options, material)
+        for place, row in enumerate(node_rows.values())
+    )
     shafts, meshes, pairs = [], [], []
     for row in shafting:
         ends = ends_of(row, numbers)
@@ -154,7 +167,9 @@ def drive_line_of_pair(system: GearPairMachine, name: str) -> DriveLine:
         for place, (side, gear, body, _) in enumerate(sides)
     ]
     shafts = []
-    for place, (rotor_name, (_, _, body, rotor)) in enumerate(zip(("motor", "load"), sides, strict=True)):
+    for place, (rotor_name, (_, _, body, rotor)) in enumerate(
+        zip(("motor", "load"), sides, strict=True)
+    ):
         if rotor is not None:
             shafts.append(_coupling(rotor, place, len(nodes), body.inertia))
             nodes.append(Node(name=rotor_name, inertia=rotor.inertia))
@@ -169,7 +184,9 @@ def drive_line_of_pair(system: GearPairMachine, name: str) -> DriveLine:
     n_teeth = pair.pinion.n_teeth
     return DriveLine(
         name=name,
-        line=ShaftLine(nodes=tuple(nodes), shafts=tuple(shafts), gears=tuple(gears), meshes=(mesh,)),
+        line=ShaftLine(
+            nodes=tuple(nodes), shafts=tuple(shafts), gears=tuple(gears), meshes=(mesh,)
+        ),
         numbers=tuple(range(1, len(nodes) + 1)),
         pairs=(pair,),
         lateral=True,

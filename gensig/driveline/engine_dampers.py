@@ -88,13 +88,17 @@ def mesh_between(line: EngineLine, nodes: Sequence[int]) -> int:
     for place, name in enumerate(line.mesh_names):
         if name in wanted:
             return place
-    raise ConfigError(f"nodes {nodes[0]} and {nodes[1]} do not mesh; these do: {', '.join(line.mesh_names)}")
+    raise ConfigError(
+        f"nodes {nodes[0]} and {nodes[1]} do not mesh; these do: {', '.join(line.mesh_names)}"
+    )
 
 
 def tooth_load(line: EngineLine, mesh: int, response: SteadyResponse) -> ToothLoad:
     """Force of a mesh in a steady vibration; the mesh is a spring that never parts."""
     mean, amplitudes = response.element_forces(line.linear()[1])
-    return ToothLoad(speed=response.speed, force=mean[mesh] + over_cycle(amplitudes[mesh], CYCLE_POINTS))
+    return ToothLoad(
+        speed=response.speed, force=mean[mesh] + over_cycle(amplitudes[mesh], CYCLE_POINTS)
+    )
 
 
 def seen_by_dampers(
@@ -109,7 +113,9 @@ def seen_by_dampers(
     numbers = line.drive.numbers
     for node in nodes:
         if node not in numbers:
-            raise ConfigError(f"the shaft line has no node {node}; it has {min(numbers)} to {max(numbers)}")
+            raise ConfigError(
+                f"the shaft line has no node {node}; it has {min(numbers)} to {max(numbers)}"
+            )
     if len(set(nodes)) != len(nodes):
         raise ConfigError(f"dampers on nodes {', '.join(map(str, nodes))}: name each node once")
     linear, meshes = line.linear()
@@ -145,7 +151,9 @@ def read_mesh_strength(config: Configuration, line: EngineLine, mesh: int) -> Ro
     )
 
 
-def dynamic_root_stress(strength: RootStrength, line: EngineLine, mesh: int, load: ToothLoad) -> DynamicRootStress:
+def dynamic_root_stress(
+    strength: RootStrength, line: EngineLine, mesh: int, load: ToothLoad
+) -> DynamicRootStress:
     """Root stress through the mesh under a force that changes from tooth to tooth.
 
     Raises
@@ -160,7 +168,9 @@ def dynamic_root_stress(strength: RootStrength, line: EngineLine, mesh: int, loa
     radius = strength.pair.pinion.base_radius
     loaded = replace(strength, flanks=replace(strength.flanks, torque=load.greatest * radius))
     history = loaded.history()
-    crank = crank_of_passes(strength, line, mesh, history.roll, range(passes_of_a_cycle(line, mesh)))
+    crank = crank_of_passes(
+        strength, line, mesh, history.roll, range(passes_of_a_cycle(line, mesh))
+    )
     angle = CYCLE / len(load.force) * np.arange(len(load.force))
     share = np.maximum(np.interp(crank, angle, load.force, period=CYCLE), 0.0) / load.greatest
     return DynamicRootStress(
@@ -178,12 +188,16 @@ def passes_of_a_cycle(line: EngineLine, mesh: int) -> int:
     return math.ceil(CYCLE * ratio * driving.n_teeth / (2.0 * math.pi) - 1e-9)
 
 
-def crank_of_passes(strength: RootStrength, line: EngineLine, mesh: int, roll: Array, passes: Iterable[int]) -> Array:
+def crank_of_passes(
+    strength: RootStrength, line: EngineLine, mesh: int, roll: Array, passes: Iterable[int]
+) -> Array:
     """Crank angles at which pairs, counted from crank angle 0 on, are at ``roll`` (point,) m, (pass, point) rad."""
     pinion = strength.pair.pinion
     ratio = line.ratios[line.drive.numbers[_driving(line, mesh).node]]
     start = float(start_rolls(line.drive)[mesh])
-    way = roll + strength.pair.base_pitch * np.array(passes)[:, None] - start  # of the pinion since crank angle 0
+    way = (
+        roll + strength.pair.base_pitch * np.array(passes)[:, None] - start
+    )  # of the pinion since crank angle 0
     return np.asarray(way / (pinion.base_radius * ratio))
 
 

@@ -50,16 +50,21 @@ class EngineLine:
     @property
     def ratios(self) -> dict[int, float]:
         """Speed of every node over the crank's, by its number, positive."""
-        crank = abs(self.drive.line.speed_ratio[self._place(self.engine.driving_nodes[0], "throw_nodes")])
+        crank = abs(
+            self.drive.line.speed_ratio[self._place(self.engine.driving_nodes[0], "throw_nodes")]
+        )
         ratios = np.abs(self.drive.line.speed_ratio) / crank
-        return {number: float(ratio) for number, ratio in zip(self.drive.numbers, ratios, strict=True)}
+        return {
+            number: float(ratio) for number, ratio in zip(self.drive.numbers, ratios, strict=True)
+        }
 
     @property
     def mesh_names(self) -> tuple[str, ...]:
         """Numbers of the two nodes of each mesh with a slash, (mesh,)."""
         gears, numbers = self.drive.line.gears, self.drive.numbers
         return tuple(
-            f"{numbers[gears[mesh.driving].node]}/{numbers[gears[mesh.driven].node]}" for mesh in self.drive.line.meshes
+            f"{numbers[gears[mesh.driving].node]}/{numbers[gears[mesh.driven].node]}"
+            for mesh in self.drive.line.meshes
         )
 
     def linear(self) -> tuple[LinearLine, Elements]:
@@ -68,7 +73,10 @@ class EngineLine:
 
     def matrices(self, *, merge_rigid: bool = False) -> LineMatrices:
         """Those of the line, with what the torques of motor and loads give way to speed."""
-        matrices, slopes = self.drive.matrices(merge_rigid=merge_rigid), self.engine.dampers(self.ratios)
+        matrices, slopes = (
+            self.drive.matrices(merge_rigid=merge_rigid),
+            self.engine.dampers(self.ratios),
+        )
         if not slopes:
             return matrices
         damping = matrices.damping.copy()
@@ -98,12 +106,16 @@ class EngineLine:
         """Steady vibration at a speed of the crank (rad/s) and a brake torque (N m)."""
         return steady_response(self.linear()[0], self.on_line(self.torques(speed, torque)), speed)
 
-    def seen_by(self, wheel: ToothedWheel, response: SteadyResponse, rng: np.random.Generator) -> Array:
+    def seen_by(
+        self, wheel: ToothedWheel, response: SteadyResponse, rng: np.random.Generator
+    ) -> Array:
         """Speed that a toothed wheel of this machine shows, over `SEEN_CYCLES` cycles, (sample,) rad/s."""
         place = self._place(wheel.node, "toothed_wheels")
         one = over_cycle(response.angle[place], SAMPLES_PER_CYCLE)
         crank = CYCLE / SAMPLES_PER_CYCLE * np.arange(SEEN_CYCLES * SAMPLES_PER_CYCLE)
-        angle = np.asarray(self.ratios[wheel.node] * crank + np.tile(one, SEEN_CYCLES), dtype=np.float64)
+        angle = np.asarray(
+            self.ratios[wheel.node] * crank + np.tile(one, SEEN_CYCLES), dtype=np.float64
+        )
         rate = SAMPLES_PER_CYCLE * response.speed / CYCLE
         return instantaneous_speed(wheel, draw_wheel(rng, wheel), angle, rate)
 

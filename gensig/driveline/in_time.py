@@ -22,7 +22,9 @@ RATE = 10240.0  # Hz, of what is given out: flat to 4 kHz
 STEPS = 10  # to a sample: 9.8 us
 SETTLING = 0.5  # s
 MOST_ENERGY_RESIDUAL = 1e-3
-GOVERNOR = Governor(frequency=1.0, damping_ratio=0.7)  # assumed; it holds the mean speed and feels no vibration
+GOVERNOR = Governor(
+    frequency=1.0, damping_ratio=0.7
+)  # assumed; it holds the mean speed and feels no vibration
 
 
 @dataclass(frozen=True, slots=True, kw_only=True, eq=False)
@@ -49,10 +51,16 @@ class TimeResponse:
     energy_residual: float
 
 
-def own_meshes(machine: EngineLine, config: Configuration, speed: float, torque: float) -> dict[int, OwnMesh]:
+def own_meshes(
+    machine: EngineLine, config: Configuration, speed: float, torque: float
+) -> dict[int, OwnMesh]:
     """Tables of sound teeth of the meshes that have any, by their place, each under its mean force."""
     mesh = config["mesh"]
-    law = ToothLaw(material=read_material(config), options=read_mesh_options(mesh), slices=read_slice_options(mesh))
+    law = ToothLaw(
+        material=read_material(config),
+        options=read_mesh_options(mesh),
+        slices=read_slice_options(mesh),
+    )
     return sound_meshes(machine, law, mesh_forces(machine, speed, torque))
 
 
@@ -74,11 +82,18 @@ def time_response(
     line = running_line(machine, steady_course(speed, torque), governor=GOVERNOR, own=own)
     speeds, angles = ([(kind, line.dof(node)) for node in nodes] for kind in ("speed", "angle"))
     forces = [("mesh_force", place) for place in range(len(machine.mesh_names))]
-    solver = LineSolver(sampling_rate=RATE, oversampling=STEPS, max_energy_residual=MOST_ENERGY_RESIDUAL)
-    motion = line.run(
-        solver, duration=duration, channels=list(dict.fromkeys([*speeds, *angles, *forces])), settling=SETTLING
+    solver = LineSolver(
+        sampling_rate=RATE, oversampling=STEPS, max_energy_residual=MOST_ENERGY_RESIDUAL
     )
-    found, angle, force = (np.array([motion.signals[one] for one in channels]) for channels in (speeds, angles, forces))
+    motion = line.run(
+        solver,
+        duration=duration,
+        channels=list(dict.fromkeys([*speeds, *angles, *forces])),
+        settling=SETTLING,
+    )
+    found, angle, force = (
+        np.array([motion.signals[one] for one in channels]) for channels in (speeds, angles, forces)
+    )
     # teeth that never meet on their back flanks cannot pull: below 0 is what the low-pass rings
     force = np.where(motion.back_contact[:, None] > 0.0, force, np.maximum(force, 0.0))
     return TimeResponse(
@@ -102,4 +117,6 @@ def _mean_cycle(signals: Array, angle: Array, n_points: int = 1440) -> Array:
     period = 4.0 * np.pi
     n_cycles = max(1, int((angle[-1] - angle[0]) // period))
     at = angle[0] + period * (np.arange(n_cycles * n_points) / n_points)
-    return np.array([np.interp(at, angle, one).reshape(n_cycles, n_points).mean(axis=0) for one in signals])
+    return np.array(
+        [np.interp(at, angle, one).reshape(n_cycles, n_points).mean(axis=0) for one in signals]
+    )

@@ -35,7 +35,10 @@ def greatest_loads(pair: GearPair, angle: Array, force: Array) -> Array:
     close cracks and are left out.
     """
     roll = pair.pinion.base_radius * angle
-    entered = np.arange(math.ceil(roll[0] / pair.base_pitch), math.floor(roll[-1] / pair.base_pitch)) * pair.base_pitch
+    entered = (
+        np.arange(math.ceil(roll[0] / pair.base_pitch), math.floor(roll[-1] / pair.base_pitch))
+        * pair.base_pitch
+    )
     found = []
     for entry in entered[entered + pair.path_of_contact <= roll[-1]]:
         place = roll - entry

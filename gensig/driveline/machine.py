@@ -17,7 +17,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from gensig.driveline import loads
-from gensig.driveline.engine_line import EngineLine, read_engine_line
+from gensig.driveline.engine_line import EngineLine
 from gensig.driveline.excitation.engine_torques import Engine
 from gensig.driveline.line_gears import line_bodies, line_gears, line_meshes
 from gensig.driveline.mesh_phase import start_phase
@@ -44,28 +44,24 @@ from gensig.driveline.teeth import (
 )
 from gensig.driveline.time.newmark import LineMotion, LineSolver
 from gensig.dynamics.backends.registry import DEFAULT_BACKEND
-from gensig.dynamics.integrator import Solver, check_memory
+from gensig.dynamics.integrator import check_memory
 from gensig.dynamics.pair import Body
 from gensig.errors import ConfigError, SimulationError
 from gensig.faults.base import Fault
 from gensig.geometry.contact import SIDES, GearPair
 from gensig.geometry.gear import Gear
 from gensig.mesh.modification import PLAIN, sound_teeth
-from gensig.mesh.options import SliceOptions, read_mesh_options, read_slice_options
+from gensig.mesh.options import SliceOptions
 from gensig.mesh.pair_table import PairTable
 from gensig.mesh.sliced.sliced_table import SlicedTable
-from gensig.operation.options import read_operating
-from gensig.options.configuration import Configuration
 from gensig.sensing.encoder import Disc
-from gensig.sensing.manufacturing import Quality, perfect_specimen
-from gensig.sensing.options import read_sensing
+from gensig.sensing.manufacturing import perfect_specimen
 from gensig.sensing.toothed_wheel import ToothedWheel, draw_wheel, instantaneous_speed
 from gensig.systems.base import Machine, MachineMesh, specimen_table
-from gensig.systems.registry import read_heat, read_material, read_modification
 from gensig.systems.run import CleanRecord, Run, Start
 from gensig.systems.stiffness_curves import StiffnessCurves, stiffness_curves
 from gensig.systems.supports import in_gearbox
-from gensig.units import SPEED, read
+from gensig.units import SPEED
 
 Array = NDArray[np.float64]
 
@@ -216,7 +212,11 @@ class LineMachine(Machine):
         self.require_drive()
         sensing = self.sensing
         if unknown := [name for name in sensing.channels if name not in self.channels]:
-            more = "" if self.engine.drive.lateral else "; with system.lateral=true also pinion_x and the like"
+            more = (
+                ""
+                if self.engine.drive.lateral
+                else "; with system.lateral=true also pinion_x and the like"
+            )
             raise ConfigError(
                 f"sensing.channels: no channel {', '.join(unknown)}; allowed: {', '.join(self.channels)}{more}"
             )
@@ -226,16 +226,22 @@ class LineMachine(Machine):
                 "sensing=shaft_line"
             )
         if self.mesh.law != "one_sided":
-            raise ConfigError(f"mesh.law = {self.mesh.law}: the meshes of a drive line are one-sided")
+            raise ConfigError(
+                f"mesh.law = {self.mesh.law}: the meshes of a drive line are one-sided"
+            )
         if self.solver.precision != "float64":
-            raise ConfigError(f"solver.precision = {self.solver.precision}: a drive line is integrated in float64")
+            raise ConfigError(
+                f"solver.precision = {self.solver.precision}: a drive line is integrated in float64"
+            )
         if self.solver.backend != DEFAULT_BACKEND:
             raise ConfigError(
                 f"solver.backend = {self.solver.backend}: a drive line has an integrator of its own; leave it out"
             )
         self._warn_of_supports()
         self.quality.check_covered(self.pair.pinion, self.pair.wheel)
-        check_memory(self.operating.duration, sensing.sampling_rate, len(sensing.channels), self.solver)
+        check_memory(
+            self.operating.duration, sensing.sampling_rate, len(sensing.channels), self.solver
+        )
         self.mesh_table()
 
     def _warn_of_supports(self) -> None:
@@ -309,7 +315,9 @@ class LineMachine(Machine):
             settling=SETTLING,
         )
         angle = machine.ratio * motion.nominal_angle + motion.signals["angle", shaft]
-        return loads.greatest_loads(machine.pair, angle, motion.signals["mesh_force", machine.place])
+        return loads.greatest_loads(
+            machine.pair, angle, motion.signals["mesh_force", machine.place]
+        )
 
     @classmethod
     def simulate_runs(cls, runs: Sequence[Run[Self]]) -> list[CleanRecord | SimulationError]:
@@ -337,7 +345,9 @@ class LineMachine(Machine):
         angle = self.ratio * motion.nominal_angle + motion.signals["angle", shaft]
         gain = np.ones(len(kinds)) if run.gearbox is None else run.gearbox.gain
         rows = [
-            self._seen(run, line, motion, name, kind) if kind[0] == "angle" else own * motion.signals[kind]
+            self._seen(run, line, motion, name, kind)
+            if kind[0] == "angle"
+            else own * motion.signals[kind]
             for (name, kind), own in zip(kinds.items(), gain, strict=True)
         ]
         return CleanRecord(
@@ -356,7 +366,9 @@ class LineMachine(Machine):
         engine = self.engine
         if run.gearbox is not None and engine.drive.lateral:
             bodies = (self.pinion, slice(0, 2)), (self.wheel, slice(2, 4))
-            held = [in_gearbox(body, run.gearbox, axes, self.quality).support for body, axes in bodies]
+            held = [
+                in_gearbox(body, run.gearbox, axes, self.quality).support for body, axes in bodies
+            ]
             engine = with_supports(engine, self.place, held)
         turned, forces = self.crank_angle(start), self.mesh_forces
         teeth = start.tooth_pinion, start.tooth_wheel
@@ -396,8 +408,15 @@ class LineMachine(Machine):
         """
         pitches = start.tooth_pinion + start.phase - start_phase(self.engine.drive, self.place)
         if not isinstance(self.engine.engine, Engine):
-            return 2.0 * math.pi * (pitches / self.pair.pinion.n_teeth + start.tooth_wheel) / self.ratio
-        turns = pitches / self.pair.pinion.n_teeth + start.tooth_wheel % max(1, round(2.0 * self.ratio))
+            return (
+                2.0
+                * math.pi
+                * (pitches / self.pair.pinion.n_teeth + start.tooth_wheel)
+                / self.ratio
+            )
+        turns = pitches / self.pair.pinion.n_teeth + start.tooth_wheel % max(
+            1, round(2.0 * self.ratio)
+        )
         return 2.0 * math.pi * turns / self.ratio % (4.0 * math.pi)
 
     def _course(self) -> EngineCourse:
@@ -407,7 +426,9 @@ class LineMachine(Machine):
         time = np.arange(-2.0 * SETTLING, operating.duration + AFTER, KNOT)
         nominal = operating.nominal(time)
         load = self.engine.load_at(operating.torque, nominal.speed / operating.speed)
-        return EngineCourse(time=time, speed=nominal.speed / self.ratio, torque=load * nominal.torque_factor)
+        return EngineCourse(
+            time=time, speed=nominal.speed / self.ratio, torque=load * nominal.torque_factor
+        )
 
     def _channel(self, line: RunningLine, name: str) -> tuple[str, int]:
         """Signal of the integration for a channel: a kind and a degree of freedom."""
@@ -418,66 +439,35 @@ class LineMachine(Machine):
         mesh = drive.line.meshes[self.place]
         gear = dict(zip(SIDES, (mesh.driving, mesh.driven), strict=True))[side]
         if what in AXES:
-            return "acceleration", line.matrices.names.index(f"{drive.line.gears[gear].name} {what}")
+            return "acceleration", line.matrices.names.index(
+                f"{drive.line.gears[gear].name} {what}"
+            )
         return "acceleration", line.dof(drive.numbers[drive.line.gears[gear].node])
 
     def _wheel(self, name: str) -> tuple[int, ToothedWheel]:
         wanted = name.removesuffix(SPEED)
-        return next((k, wheel) for k, (own, wheel) in enumerate(self.engine.wheels.items()) if own == wanted)
+        return next(
+            (k, wheel) for k, (own, wheel) in enumerate(self.engine.wheels.items()) if own == wanted
+        )
 
     def _seen(
-        self, run: Run[LineMachine], line: RunningLine, motion: LineMotion, name: str, kind: tuple[str, int]
+        self,
+        run: Run[LineMachine],
+        line: RunningLine,
+        motion: LineMotion,
+        name: str,
+        kind: tuple[str, int],
     ) -> Array:
         """Deviation from the nominal speed that a toothed wheel shows, (sample,) rad/s."""
         place, wheel = self._wheel(name)
         disc = (
-            run.discs[place] if run.discs else Disc(index=0.0, places=wheel.spacing * np.arange(float(wheel.n_teeth)))
+            run.discs[place]
+            if run.discs
+            else Disc(index=0.0, places=wheel.spacing * np.arange(float(wheel.n_teeth)))
         )
         ratio = self.engine.ratios[wheel.node]
         angle = ratio * (line.turned + motion.nominal_angle) + motion.signals[kind]
-        return instantaneous_speed(wheel, disc, angle, self.sensing.sampling_rate) - ratio * motion.nominal_speed
-
-
-def read_line_machine(config: Configuration) -> LineMachine:
-    """The machine of a configuration whose system is a drive line.
-
-    Raises
-    ------
-    ConfigError    for keys or tables that make no engine, and for a mesh that has no records
-    """
-    engine = read_engine_line(config)
-    place = _record_mesh(engine)
-    if read_heat(config).is_any or read_modification(config).is_any:
-        raise ConfigError("heat and modification are of a single gear pair; a drive line takes heat=none")
-    operating, quality = (
-        read_operating(config.section("operating")),
-        read(Quality, config.section("quality"), "quality"),
-    )
-    machine = LineMachine(
-        material=read_material(config),
-        mesh=read_mesh_options(config.section("mesh")),
-        operating=operating,
-        sensing=read_sensing(config.section("sensing")),
-        quality=quality,
-        solver=read(Solver, config.section("solver"), "solver"),
-        engine=engine,
-        place=place,
-        slices=read_slice_options(config.section("mesh")),
-    )
-    return replace(machine, operating=replace(operating, speed=operating.speed * machine.ratio))
-
-
-def _record_mesh(engine: EngineLine) -> int:
-    drive, names = engine.drive, engine.mesh_names
-    if drive.record_mesh is None:
-        raise ConfigError(
-            f"system.record_mesh = null: records follow the teeth of one mesh; give its two nodes, one of "
-            f"{', '.join(names) or 'none: this line has no mesh'}"
+        return (
+            instantaneous_speed(wheel, disc, angle, self.sensing.sampling_rate)
+            - ratio * motion.nominal_speed
         )
-    wanted = "/".join(str(node) for node in drive.record_mesh)
-    if wanted not in names:
-        raise ConfigError(
-            f"system.record_mesh = {list(drive.record_mesh)}: no such mesh; there are {', '.join(names)}, the driving "
-            "node first"
-        )
-    return names.index(wanted)

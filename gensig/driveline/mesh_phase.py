@@ -39,7 +39,9 @@ def tooth_angles(line: DriveLine, turned: float = 0.0) -> Array:
             sense = math.copysign(1.0, ratio[one])
             known, sought = by_node[one], by_node[other]
             if known is not None and sought is None:
-                by_node[other] = _driven_angle(mesh, pair, sense, _past_pitch_point(mesh, pair, sense, known))
+                by_node[other] = _driven_angle(
+                    mesh, pair, sense, _past_pitch_point(mesh, pair, sense, known)
+                )
             elif sought is not None and known is None:
                 by_node[one] = _driving_angle(mesh, pair, sense, sought)
         if by_node == before:
@@ -85,7 +87,9 @@ def _spread(by_node: list[float | None], one: int, other: int) -> None:
 def _half_teeth(pair: GearPair) -> tuple[float, float]:
     """Half tooth angles on the working pitch circles; together with the other's they fill a pitch."""
     cosine = math.cos(pair.working_pressure_angle)
-    first, second = (gear.half_tooth_angle_at(gear.base_radius / cosine) for gear in (pair.pinion, pair.wheel))
+    first, second = (
+        gear.half_tooth_angle_at(gear.base_radius / cosine) for gear in (pair.pinion, pair.wheel)
+    )
     return first, second
 
 
@@ -105,4 +109,6 @@ def _driving_angle(mesh: GearMesh, pair: GearPair, sense: float, driven_angle: f
     """The reverse of the two above."""
     turned = sense * (mesh.center_line + math.pi - driven_angle) - _half_teeth(pair)[1]
     past = turned * pair.wheel.n_teeth / (2.0 * math.pi)
-    return mesh.center_line + sense * (past * 2.0 * math.pi / pair.pinion.n_teeth - _half_teeth(pair)[0])
+    return mesh.center_line + sense * (
+        past * 2.0 * math.pi / pair.pinion.n_teeth - _half_teeth(pair)[0]
+    )

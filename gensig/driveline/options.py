@@ -29,7 +29,9 @@ class LossFactors:
     def __post_init__(self) -> None:
         for key in ("shaft", "coupling", "gear_mesh"):
             if not 0.0 <= getattr(self, key) < 2.0:
-                raise ConfigError(f"system.loss_factor.{key} = {getattr(self, key):g} must lie in 0..2")
+                raise ConfigError(
+                    f"system.loss_factor.{key} = {getattr(self, key):g} must lie in 0..2"
+                )
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -42,7 +44,9 @@ class Campbell:
 
     def __post_init__(self) -> None:
         if not 0.0 <= self.low_speed < self.high_speed:
-            raise ConfigError("system.campbell: low_speed_rpm must lie between 0 and high_speed_rpm")
+            raise ConfigError(
+                "system.campbell: low_speed_rpm must lie between 0 and high_speed_rpm"
+            )
         if self.orders is not None and (not self.orders or min(self.orders) <= 0.0):
             raise ConfigError(
                 "system.campbell.orders: give orders of the first node, all positive, such as [1, 2], or null"
@@ -62,13 +66,17 @@ class GearHolding:
         if not self.force > 0.0:
             raise ConfigError(f"system.support.force_n = {self.force:g} must be positive")
         if not 0.0 <= self.damping_ratio < 1.0:
-            raise ConfigError(f"system.support.damping_ratio = {self.damping_ratio:g} must lie in 0..1")
+            raise ConfigError(
+                f"system.support.damping_ratio = {self.damping_ratio:g} must lie in 0..1"
+            )
 
     def under(self, mass: float, material: Material) -> Support:
         """The support of a gear of ``mass`` in kg."""
         across, along = support_stiffness(self.bearing, self.shaft, material, self.force)
         rigid = Support(stiffness_x=across, stiffness_y=along, damping_x=0.0, damping_y=0.0)
-        return rigid.damped(Body(mass=mass, inertia=0.0, support=rigid), self.damping_ratio, self.damping_ratio)
+        return rigid.damped(
+            Body(mass=mass, inertia=0.0, support=rigid), self.damping_ratio, self.damping_ratio
+        )
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -112,7 +120,9 @@ def read_options(machine: Section) -> LineOptions:
     own = {key: value for key, value in machine.items() if key not in groups}
     options = read(LineOptions, own, "system", **groups)
     if options.helical_meshes not in HELICAL_MESHES:
-        raise ConfigError(f"system.helical_meshes = {options.helical_meshes!r}; allowed: {', '.join(HELICAL_MESHES)}")
+        raise ConfigError(
+            f"system.helical_meshes = {options.helical_meshes!r}; allowed: {', '.join(HELICAL_MESHES)}"
+        )
     if options.backlash < 0.0:
         raise ConfigError(f"system.backlash_um = {options.backlash * 1e6:g} must not be negative")
     return options

@@ -77,7 +77,9 @@ class EngineCourse:
         if not len(self.time) == len(self.speed) == len(self.torque) >= 1:
             raise ConfigError("the course of an engine needs as many speeds and torques as times")
         if not self.speed.min() > 0.0:
-            raise ConfigError(f"the speed of the crank, {self.speed.min() * 30.0 / math.pi:g} r/min, must be positive")
+            raise ConfigError(
+                f"the speed of the crank, {self.speed.min() * 30.0 / math.pi:g} r/min, must be positive"
+            )
 
 
 def steady_course(speed: float, torque: float) -> EngineCourse:
@@ -108,7 +110,12 @@ class RunningLine:
 
     @one_thread
     def run(
-        self, solver: LineSolver, *, duration: float, channels: Sequence[tuple[str, int]], settling: float
+        self,
+        solver: LineSolver,
+        *,
+        duration: float,
+        channels: Sequence[tuple[str, int]],
+        settling: float,
     ) -> LineMotion:
         """Integrate, from the static place with the linear vibration on it, at least ``settling`` s before time 0.
 
@@ -183,7 +190,9 @@ def running_line(
 def mesh_forces(machine: EngineLine, speed: float, torque: float) -> Array:
     """Mean normal forces of the meshes at a speed of the crank and a brake torque, (mesh,) N."""
     closed, elements = machine.linear()
-    response = steady_response(closed, machine.on_line(machine.torques(speed, torque)), speed, n_orders=1)
+    response = steady_response(
+        closed, machine.on_line(machine.torques(speed, torque)), speed, n_orders=1
+    )
     return response.element_forces(elements)[0]
 
 
@@ -225,7 +234,12 @@ def _geared(
 
 
 def _mesh(
-    machine: EngineLine, matrices: LineMatrices, place: int, force: float, own: OwnMesh | None, roll: float
+    machine: EngineLine,
+    matrices: LineMatrices,
+    place: int,
+    force: float,
+    own: OwnMesh | None,
+    roll: float,
 ) -> LineMesh:
     drive = machine.drive
     pair, mesh = drive.pairs[place], drive.line.meshes[place]
@@ -235,7 +249,9 @@ def _mesh(
     damping = float(matrices.mesh_damping[place]) / reference_force(machine, place, force)
     name, phase = machine.mesh_names[place], (roll + first_slice_lead(pair)) / pair.base_pitch
     if own is not None:
-        make: Callable[..., LineMesh] = sliced_pair_mesh if isinstance(own.table, SlicedTable) else pair_mesh
+        make: Callable[..., LineMesh] = (
+            sliced_pair_mesh if isinstance(own.table, SlicedTable) else pair_mesh
+        )
         return make(
             name,
             own.table,
@@ -273,7 +289,9 @@ def _torques(
     at = _table_times(course)
     found: list[ShaftTorque] = []
     for place, time in enumerate(at):
-        speed, torque = (float(np.interp(time, course.time, one)) for one in (course.speed, course.torque))
+        speed, torque = (
+            float(np.interp(time, course.time, one)) for one in (course.speed, course.torque)
+        )
         tables = first if place == 0 else _tables(machine, matrices, speed, torque)
         share = np.interp(course.time, at, np.eye(len(at))[place]) if len(at) > 1 else None
         least = ROUNDED * float(np.abs(tables).max())
@@ -290,7 +308,11 @@ def _torques(
                 )
             )
     if len(course.time) > 1:  # what speeds the whole line up comes from the throws, or the motor
-        rise = float(rotation @ matrices.mass @ rotation) / crank * np.gradient(course.speed / crank, course.time)
+        rise = (
+            float(rotation @ matrices.mass @ rotation)
+            / crank
+            * np.gradient(course.speed / crank, course.time)
+        )
         driving = machine.engine.driving_nodes
         for node in driving:
             throw = int(np.argmax(matrices.expand[machine.drive.numbers.index(node)]))
@@ -303,7 +325,9 @@ def _table_times(course: EngineCourse) -> Array:
     if len(course.time) == 1:
         return course.time
     greatest = max(float(np.abs(course.torque).max()), 1e-9)
-    steps = np.abs(np.diff(course.speed)) / TABLE_STEP + np.abs(np.diff(course.torque)) / (TABLE_SHARE * greatest)
+    steps = np.abs(np.diff(course.speed)) / TABLE_STEP + np.abs(np.diff(course.torque)) / (
+        TABLE_SHARE * greatest
+    )
     gone = np.concatenate([[0.0], np.cumsum(steps)])
     n_tables = min(MOST_TABLES, 1 + math.ceil(gone[-1]))
     if n_tables < 2:
@@ -313,7 +337,9 @@ def _table_times(course: EngineCourse) -> Array:
 
 
 def _crank(machine: EngineLine, matrices: LineMatrices) -> int:
-    return int(np.argmax(matrices.expand[machine.drive.numbers.index(machine.engine.driving_nodes[0])]))
+    return int(
+        np.argmax(matrices.expand[machine.drive.numbers.index(machine.engine.driving_nodes[0])])
+    )
 
 
 def with_supports(machine: EngineLine, place: int, supports: Sequence[object]) -> EngineLine:

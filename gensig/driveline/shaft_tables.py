@@ -92,7 +92,9 @@ class TableRow:
         if value is None:
             return None
         if value != round(value) or value < 1:
-            raise ConfigError(f"{self.place(column)}: {self.text(column)} must be a whole number of at least 1")
+            raise ConfigError(
+                f"{self.place(column)}: {self.text(column)} must be a whole number of at least 1"
+            )
         return round(value)
 
     def given(self, column: str, value: float | None) -> float:
@@ -135,7 +137,9 @@ def _text_of(key: str, file: str) -> str:
         ) from None
 
 
-def _read(key: str, file: str, columns: Mapping[str, str | None], needed: tuple[str, ...]) -> list[TableRow]:
+def _read(
+    key: str, file: str, columns: Mapping[str, str | None], needed: tuple[str, ...]
+) -> list[TableRow]:
     table = f"{key} = {file}"
     lines = [
         (number, line)
@@ -143,7 +147,9 @@ def _read(key: str, file: str, columns: Mapping[str, str | None], needed: tuple[
         if line.strip(" ,\t") and not line.lstrip().startswith("#")
     ]
     if not lines:
-        raise ConfigError(f"{table} is empty; its first line names the columns: {', '.join(_shown(columns))}")
+        raise ConfigError(
+            f"{table} is empty; its first line names the columns: {', '.join(_shown(columns))}"
+        )
     if len(lines) > MOST_ROWS:
         raise ConfigError(f"{table} has {len(lines)} rows; at most {MOST_ROWS} are read")
     cells = [_cells(f"{table}, row {number}", line) for number, line in lines]
@@ -151,7 +157,9 @@ def _read(key: str, file: str, columns: Mapping[str, str | None], needed: tuple[
     rows = []
     for (number, _), row in zip(lines[1:], cells[1:], strict=True):
         if len(row) != len(names):
-            raise ConfigError(f"{table}, row {number}: {len(row)} cells under {len(names)} column names")
+            raise ConfigError(
+                f"{table}, row {number}: {len(row)} cells under {len(names)} column names"
+            )
         rows.append(
             TableRow(
                 table=table,
@@ -175,7 +183,9 @@ def _cells(place: str, line: str) -> list[str]:
     return [cell.strip() for cell in row]
 
 
-def _header(place: str, header: list[str], columns: Mapping[str, str | None], needed: tuple[str, ...]) -> list[str]:
+def _header(
+    place: str, header: list[str], columns: Mapping[str, str | None], needed: tuple[str, ...]
+) -> list[str]:
     """Bare names of the columns; text columns keep theirs."""
     names = []
     for written in header:
@@ -199,13 +209,19 @@ def _column(place: str, written: str, columns: Mapping[str, str | None]) -> str:
     shown = columns.get(bare)
     if shown and suffix is not None:
         if UNITS[suffix][1] != UNITS[shown][1]:
-            raise ConfigError(f"{place}: {UNITS[suffix][1]}, not {UNITS[shown][1]}; write {_choices(bare, columns)}")
+            raise ConfigError(
+                f"{place}: {UNITS[suffix][1]}, not {UNITS[shown][1]}; write {_choices(bare, columns)}"
+            )
         return bare
     for name, unit in columns.items():  # a unit that there is not
         if unit and written.startswith(f"{name}_"):
             raise ConfigError(f"{place}: no unit known here; write {_choices(name, columns)}")
     close = difflib.get_close_matches(written, [*_shown(columns), *columns], n=1)
-    hint = f"did you mean {close[0]}?" if close else f"known: {', '.join(_shown(columns))}, and name or note for text"
+    hint = (
+        f"did you mean {close[0]}?"
+        if close
+        else f"known: {', '.join(_shown(columns))}, and name or note for text"
+    )
     raise ConfigError(f"{place}: unknown; {hint}")
 
 
@@ -220,4 +236,6 @@ def _shown(columns: Mapping[str, str | None]) -> list[str]:
 def _choices(name: str, columns: Mapping[str, str | None]) -> str:
     """Every header that the column may have."""
     quantity = UNITS[columns[name] or ""][1]
-    return " or ".join(f"{name}_{suffix}" for suffix, (_, measured) in UNITS.items() if measured == quantity)
+    return " or ".join(
+        f"{name}_{suffix}" for suffix, (_, measured) in UNITS.items() if measured == quantity
+    )

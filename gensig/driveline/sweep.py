@@ -100,20 +100,35 @@ def sweep_response(
     n_bins = min(MOST_BINS, int(seconds * low / (CYCLE * LEAST_CYCLES)))
     if n_bins < 2:
         least = 2.0 * CYCLE * LEAST_CYCLES / low
-        raise ConfigError(f"a sweep in {seconds:g} s passes too few cycles at its low end; give {least:.2g} s or more")
+        raise ConfigError(
+            f"a sweep in {seconds:g} s passes too few cycles at its low end; give {least:.2g} s or more"
+        )
     course = sweep_course(low, high, seconds, torque)
-    course = replace(course, torque=machine.load_at(torque, course.speed / machine.engine.reference.speed))
+    course = replace(
+        course, torque=machine.load_at(torque, course.speed / machine.engine.reference.speed)
+    )
     line = running_line(machine, course, governor=GOVERNOR, own=own)
-    solver = LineSolver(sampling_rate=RATE, oversampling=STEPS, max_energy_residual=MOST_ENERGY_RESIDUAL)
+    solver = LineSolver(
+        sampling_rate=RATE, oversampling=STEPS, max_energy_residual=MOST_ENERGY_RESIDUAL
+    )
     names = [(kind, line.dof(node)) for kind in ("angle", "speed") for node in nodes]
     names += [("mesh_force", place) for place in range(len(machine.mesh_names))]
-    motion = line.run(solver, duration=2.0 * seconds, channels=list(dict.fromkeys(names)), settling=SETTLING)
+    motion = line.run(
+        solver, duration=2.0 * seconds, channels=list(dict.fromkeys(names)), settling=SETTLING
+    )
     signals = np.array([motion.signals[name] for name in names])
     edges = seconds * np.arange(n_bins + 1) / n_bins
     rise = (high - low) / seconds
     return Sweep(
         seconds=seconds,
-        up=_way(motion, signals, len(nodes), edges, low + 0.5 * rise * (edges[1:] + edges[:-1]), n_orders),
+        up=_way(
+            motion,
+            signals,
+            len(nodes),
+            edges,
+            low + 0.5 * rise * (edges[1:] + edges[:-1]),
+            n_orders,
+        ),
         down=_way(
             motion,
             signals,
@@ -126,9 +141,13 @@ def sweep_response(
     )
 
 
-def _way(motion: LineMotion, signals: Array, n_nodes: int, edges: Array, speeds: Array, n_orders: int) -> SweepWay:
+def _way(
+    motion: LineMotion, signals: Array, n_nodes: int, edges: Array, speeds: Array, n_orders: int
+) -> SweepWay:
     """One way: ``edges`` (bin + 1,) s of its bins, ``speeds`` (bin,) in their middles."""
-    found: dict[str, list[Array]] = {key: [] for key in ("angle", "mean", "scatter", "force", "spectra")}
+    found: dict[str, list[Array]] = {
+        key: [] for key in ("angle", "mean", "scatter", "force", "spectra")
+    }
     frequencies, n_window = np.zeros(0), min(round(SPECTRUM_WINDOW * RATE), signals.shape[1])
     for begin, end in pairwise(edges):
         inside = slice(math.ceil(begin * RATE), math.floor(end * RATE))
@@ -167,4 +186,6 @@ def amplitude_spectra(signals: Array, highest: float = SPECTRUM_HZ) -> tuple[Arr
     window = np.hanning(n_samples)
     frequencies = np.asarray(np.fft.rfftfreq(n_samples, 1.0 / RATE), dtype=np.float64)
     shown = frequencies <= highest
-    return frequencies[shown], np.asarray(2.0 / window.sum() * np.abs(np.fft.rfft(rest * window))[:, shown])
+    return frequencies[shown], np.asarray(
+        2.0 / window.sum() * np.abs(np.fft.rfft(rest * window))[:, shown]
+    )

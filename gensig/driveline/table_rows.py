@@ -27,13 +27,19 @@ def rows_of_nodes(shafting: list[TableRow]) -> dict[int, TableRow]:
         number = row.whole("node")
         if number is None:
             if row.text("inertia"):
-                raise ConfigError(f"{row.place('node')}: it is empty, but the row has an inertia; number the node")
+                raise ConfigError(
+                    f"{row.place('node')}: it is empty, but the row has an inertia; number the node"
+                )
             continue
         if number in rows:
-            raise ConfigError(f"{row.place('node')}: node {number} is there already, in row {rows[number].line}")
+            raise ConfigError(
+                f"{row.place('node')}: node {number} is there already, in row {rows[number].line}"
+            )
         rows[number] = row
     if not rows:
-        raise ConfigError(f"{shafting[0].table}: there is no node; give each inertia a row with its number")
+        raise ConfigError(
+            f"{shafting[0].table}: there is no node; give each inertia a row with its number"
+        )
     return rows
 
 
@@ -51,15 +57,21 @@ def node_of(
     if inertia is None:
         own = [shape for gear, shape in zip(gears, shapes, strict=True) if gear.node == place]
         if not own:
-            raise ConfigError(f"{row.place('inertia')}: it is empty and node {number} has no gear to derive it from")
+            raise ConfigError(
+                f"{row.place('inertia')}: it is empty and node {number} has no gear to derive it from"
+            )
         inertia = sum(_disc(shape, material)[1] for shape in own)
     if number == options.viscous_damper_node:
         inertia *= 0.5  # Den Hartog, Mechanical Vibrations: at the best damping J + J_ring / 2 meets the fixed point
-    return Node(name=row.text("name") or f"node {number}", inertia=inertia, place=row.place("inertia"))
+    return Node(
+        name=row.text("name") or f"node {number}", inertia=inertia, place=row.place("inertia")
+    )
 
 
 def _disc(gear: Gear, material: Material) -> tuple[float, float]:
-    return solid_disc(gear.pitch_radius, gear.bore_radius, gear.face_width, material.density_kg_per_m3)
+    return solid_disc(
+        gear.pitch_radius, gear.bore_radius, gear.face_width, material.density_kg_per_m3
+    )
 
 
 def gear_of(row: TableRow) -> Gear:
@@ -68,7 +80,9 @@ def gear_of(row: TableRow) -> Gear:
     n_teeth = round(row.given("n_teeth", row.whole("n_teeth")))
     row.given("face_width", row.positive("face_width"))
     if not module > 0.0 or not abs(helix) < 0.5 * math.pi:
-        raise ConfigError(f"{row.place('normal_module')}: module must be positive, helix angle below 90 degrees")
+        raise ConfigError(
+            f"{row.place('normal_module')}: module must be positive, helix angle below 90 degrees"
+        )
     defaults = {
         "profile_shift": 0.0,
         "addendum_coefficient": 1.0,
@@ -85,11 +99,16 @@ def gear_of(row: TableRow) -> Gear:
             helix_angle=abs(helix),
             pressure_angle=row.given("pressure_angle", row.number("pressure_angle")),
             face_width=row.given("face_width", row.positive("face_width")),
-            **{key: default if given[key] is None else given[key] for key, default in defaults.items()},  # type: ignore[arg-type]
+            **{
+                key: default if given[key] is None else given[key]
+                for key, default in defaults.items()
+            },  # type: ignore[arg-type]
         )
     except GensigError as error:
         message = str(error)
-        raise ConfigError(message if message.startswith(row.table) else f"{row.place()}: {message}") from None
+        raise ConfigError(
+            message if message.startswith(row.table) else f"{row.place()}: {message}"
+        ) from None
 
 
 def line_gear(
@@ -117,11 +136,15 @@ def ends_of(row: TableRow, numbers: tuple[int, ...]) -> tuple[int, int] | None:
     if ends == (None, None) and not kind:
         for column in ("stiffness", "mesh_stiffness"):
             if row.text(column):
-                raise ConfigError(f"{row.place(column)}: a stiffness without edge_from, edge_to and edge_kind")
+                raise ConfigError(
+                    f"{row.place(column)}: a stiffness without edge_from, edge_to and edge_kind"
+                )
         return None
     if kind not in EDGE_KINDS:
         raise ConfigError(f"{row.place('edge_kind')}: '{kind}'; allowed: {', '.join(EDGE_KINDS)}")
-    first, second = (round(row.given(key, end)) for key, end in zip(("edge_from", "edge_to"), ends, strict=True))
+    first, second = (
+        round(row.given(key, end)) for key, end in zip(("edge_from", "edge_to"), ends, strict=True)
+    )
     for column, number in (("edge_from", first), ("edge_to", second)):
         if number not in numbers:
             raise ConfigError(f"{row.place(column)}: there is no node {number}")
@@ -135,7 +158,9 @@ def shaft_of(row: TableRow, ends: tuple[int, int], losses: LossFactors) -> Shaft
     kind = row.text("edge_kind")
     for column in ("teeth_from", "teeth_to", "mesh_stiffness", "backlash"):
         if row.text(column):
-            raise ConfigError(f"{row.place(column)}: that is of a gear_mesh, and edge_kind is {kind}")
+            raise ConfigError(
+                f"{row.place(column)}: that is of a gear_mesh, and edge_kind is {kind}"
+            )
     stiffness = row.positive("stiffness")
     if kind != "rigid":
         row.given("stiffness", stiffness)
@@ -162,7 +187,8 @@ def mesh_of(
 ) -> tuple[GearPair, GearMesh]:
     """Two gears in mesh; a torsional stiffness k stands for k / (r_b1 r_b2) along the line of action."""
     driving, driven = (
-        _gear_at(row, node, numbers[node], end, gears, options) for node, end in zip(ends, ("from", "to"), strict=True)
+        _gear_at(row, node, numbers[node], end, gears, options)
+        for node, end in zip(ends, ("from", "to"), strict=True)
     )
     own_backlash = row.not_negative("backlash")
     backlash = options.backlash if own_backlash is None else own_backlash
@@ -173,9 +199,13 @@ def mesh_of(
     except GensigError as error:
         text = str(error)
         named = f"{gears[driving].name} and {gears[driven].name}: {text}"
-        raise ConfigError(text if text.startswith(row.table) else f"{row.place('edge_to')}: {named}") from None
+        raise ConfigError(
+            text if text.startswith(row.table) else f"{row.place('edge_to')}: {named}"
+        ) from None
     if row.text("damping"):
-        raise ConfigError(f"{row.place('damping')}: torsional damping is of shafts; a gear_mesh has its loss_factor")
+        raise ConfigError(
+            f"{row.place('damping')}: torsional damping is of shafts; a gear_mesh has its loss_factor"
+        )
     own = row.not_negative("loss_factor")
     return pair, GearMesh(
         driving=driving,
@@ -193,22 +223,30 @@ def _mesh_stiffness(row: TableRow, pair: GearPair) -> float:
     """As the table has it, N/m; by ISO 6336-1, Method B, where it has none."""
     torsional, linear = row.positive("stiffness"), row.positive("mesh_stiffness")
     if torsional is not None and linear is not None:
-        raise ConfigError(f"{row.place('mesh_stiffness')}: the row has a torsional stiffness too; give one of them")
+        raise ConfigError(
+            f"{row.place('mesh_stiffness')}: the row has a torsional stiffness too; give one of them"
+        )
     if torsional is not None:
         return torsional / (pair.pinion.base_radius * pair.wheel.base_radius)
     if linear is not None:
         return linear
-    if pair.pinion.n_teeth > pair.wheel.n_teeth:  # the standard's gear 1 is the smaller one, whichever drives
+    if (
+        pair.pinion.n_teeth > pair.wheel.n_teeth
+    ):  # the standard's gear 1 is the smaller one, whichever drives
         pair = replace(pair, pinion=pair.wheel, wheel=pair.pinion)
     return mesh_stiffness(pair) * pair.face_width
 
 
-def _gear_at(row: TableRow, node: int, number: int, end: str, gears: list[LineGear], options: LineOptions) -> int:
+def _gear_at(
+    row: TableRow, node: int, number: int, end: str, gears: list[LineGear], options: LineOptions
+) -> int:
     """Place of the gear on a node that the row means; ConfigError where the tables contradict each other."""
     n_teeth = row.whole(f"teeth_{end}")
     there = [place for place, gear in enumerate(gears) if gear.node == node]
     if options.gears_csv is None:
-        raise ConfigError(f"{row.place('edge_kind')}: gear_mesh needs a table of gears; give system.gears_csv")
+        raise ConfigError(
+            f"{row.place('edge_kind')}: gear_mesh needs a table of gears; give system.gears_csv"
+        )
     if not there:
         raise ConfigError(
             f"{row.place(f'edge_{end}')}: system.gears_csv = {options.gears_csv} has no gear on node {number}"
@@ -220,7 +258,9 @@ def _gear_at(row: TableRow, node: int, number: int, end: str, gears: list[LineGe
             f"{row.place(f'teeth_{end}')}: {n_teeth}, but on node {number} the gears table has {has} teeth"
         )
     if len(meant) > 1:
-        raise ConfigError(f"{row.place(f'teeth_{end}')}: node {number} has {len(meant)} such gears; say which by teeth")
+        raise ConfigError(
+            f"{row.place(f'teeth_{end}')}: node {number} has {len(meant)} such gears; say which by teeth"
+        )
     return meant[0]
 
 
@@ -229,14 +269,18 @@ def check_gears_in_mesh(rows: list[TableRow], line: ShaftLine) -> None:
     meshing = {place for mesh in line.meshes for place in (mesh.driving, mesh.driven)}
     for place, row in enumerate(rows):
         if place not in meshing:
-            raise ConfigError(f"{row.place('node')}: {line.gears[place].name} meshes with nothing; leave it out")
+            raise ConfigError(
+                f"{row.place('node')}: {line.gears[place].name} meshes with nothing; leave it out"
+            )
 
 
 def check_whole(rows: list[TableRow], numbers: tuple[int, ...], line: ShaftLine) -> None:
     """Raise for a line that falls apart, and for speed ratios that the teeth contradict."""
     if len(line.parts) > 1:
         lost = line.parts[1]
-        named = ", ".join(str(numbers[node]) for node in lost[:5]) + (", ..." if len(lost) > 5 else "")
+        named = ", ".join(str(numbers[node]) for node in lost[:5]) + (
+            ", ..." if len(lost) > 5 else ""
+        )
         raise ConfigError(
             f"{rows[lost[0]].place('edge_from')}: nothing joins node{'s' if len(lost) > 1 else ''} {named} to node "
             f"{numbers[0]}: the line falls into {len(line.parts)} parts with a rigid mode each; join them"

@@ -31,7 +31,9 @@ from gensig.sensing.manufacturing import Specimen
 Array = NDArray[np.float64]
 
 SOUND_NODES = 128  # most of a pitch of sound helical teeth: short tables are read faster, and these ripple slowly
-FORCES_PER_OCTAVE = 2  # at which sound helical teeth are tabulated: chords reach over all depths of bite
+FORCES_PER_OCTAVE = (
+    2  # at which sound helical teeth are tabulated: chords reach over all depths of bite
+)
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -52,7 +54,9 @@ class ToothStart:
 
 
 @lru_cache(maxsize=48)
-def tooth_table(law: ToothLaw, pair: GearPair, faults: tuple[Fault, ...], force: float) -> PairTable | SlicedTable:
+def tooth_table(
+    law: ToothLaw, pair: GearPair, faults: tuple[Fault, ...], force: float
+) -> PairTable | SlicedTable:
     """Table of a pair under a mean force in N: of spur teeth as they are, of helical ones in slices."""
     teeth = faulty_teeth(pair, faults)
     if pair.pinion.helix_angle == 0.0:
@@ -65,7 +69,9 @@ def require_drive(pair: GearPair, slices: SliceOptions) -> None:
     if pair.pinion.helix_angle == 0.0:
         pair.require_continuous_drive()
     elif slices.slices_in_phase:
-        raise ConfigError("mesh.slices_in_phase = true is for comparing statics; a line has the helix in: take false")
+        raise ConfigError(
+            "mesh.slices_in_phase = true is for comparing statics; a line has the helix in: take false"
+        )
     elif pair.total_contact_ratio < 1.0:
         raise GeometryError(
             f"the total contact ratio {pair.total_contact_ratio:.4f} is below 1, so the drive is interrupted at every "
@@ -84,9 +90,13 @@ def sound_meshes(
     thin = replace(law, options=replace(law.options, points_per_pitch=n_nodes))
     found = {}
     for place, pair in enumerate(machine.drive.pairs):
-        if place not in besides and (machine.drive.slices_helical or pair.pinion.helix_angle == 0.0):
+        if place not in besides and (
+            machine.drive.slices_helical or pair.pinion.helix_angle == 0.0
+        ):
             own = law if pair.pinion.helix_angle == 0.0 else thin
-            found[place] = OwnMesh(table=_table_in_line(machine, own, place, (), float(forces[place])))
+            found[place] = OwnMesh(
+                table=_table_in_line(machine, own, place, (), float(forces[place]))
+            )
     return found
 
 
@@ -148,7 +158,11 @@ def neighbour_meshes(
 
 
 def tooth_there(
-    drive: DriveLine, here: tuple[int, int], there: tuple[int, int], start: ToothStart, turned: float
+    drive: DriveLine,
+    here: tuple[int, int],
+    there: tuple[int, int],
+    start: ToothStart,
+    turned: float,
 ) -> int:
     """The tooth of a gear that is in place in another of its meshes when ``turned`` rad of the first node.
 

@@ -39,16 +39,22 @@ def root_stress_in_time(
     crank_angle, force = response.crank_angle, response.mesh_force[mesh]
     greatest = float(typical_extremes(force[None], crank_angle)[1][0])
     if not greatest > 0.0:
-        raise ConfigError(f"mesh {line.mesh_names[mesh]}: nothing closes its driving flanks in time")
+        raise ConfigError(
+            f"mesh {line.mesh_names[mesh]}: nothing closes its driving flanks in time"
+        )
     torque = greatest * strength.pair.pinion.base_radius
     loaded = replace(strength, flanks=replace(strength.flanks, torque=torque))
     history, in_cycle = loaded.history(), passes_of_a_cycle(line, mesh)
     n_cycles = len(whole_cycles(crank_angle))
     first = in_cycle * math.ceil(crank_angle[0] / CYCLE - 1e-9)
-    crank = crank_of_passes(strength, line, mesh, history.roll, range(first, first + in_cycle * n_cycles))
+    crank = crank_of_passes(
+        strength, line, mesh, history.roll, range(first, first + in_cycle * n_cycles)
+    )
     inside = (crank[:, 0] >= crank_angle[0]) & (crank[:, -1] <= crank_angle[-1])
     if np.count_nonzero(inside) < in_cycle:
-        raise ConfigError("root stress in time needs two cycles of the crank at least; simulate longer")
+        raise ConfigError(
+            "root stress in time needs two cycles of the crank at least; simulate longer"
+        )
     share = np.maximum(np.interp(crank[inside], crank_angle, force), 0.0) / greatest
     return DynamicRootStress(
         strength=loaded,
@@ -61,4 +67,6 @@ def root_stress_in_time(
 def typical_largest(passes: Array, in_cycle: int) -> float:
     """Median over the cycles of the largest root stress in a cycle, Pa, of passes (pass, point)."""
     whole = len(passes) // in_cycle
-    return float(np.median(passes.max(axis=1)[: whole * in_cycle].reshape(whole, in_cycle).max(axis=1)))
+    return float(
+        np.median(passes.max(axis=1)[: whole * in_cycle].reshape(whole, in_cycle).max(axis=1))
+    )

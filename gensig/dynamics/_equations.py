@@ -69,21 +69,33 @@ def set_out(group, time, q, drive, forces, work, wide):
     for lane in range(n):
         speed = profile[at(first + layout.NOMINAL_SPEED, lane, n)]
         gain = profile[at(first + layout.NOMINAL_ACCELERATION, lane, n)]
-        turned = profile[at(first + layout.NOMINAL_ANGLE, lane, n)] + since * (speed + 0.5 * gain * since)
-        torque, slope = profile[at(first + layout.TORQUE, lane, n)], profile[at(first + layout.TORQUE_SLOPE, lane, n)]
+        turned = profile[at(first + layout.NOMINAL_ANGLE, lane, n)] + since * (
+            speed + 0.5 * gain * since
+        )
+        torque, slope = (
+            profile[at(first + layout.TORQUE, lane, n)],
+            profile[at(first + layout.TORQUE_SLOPE, lane, n)],
+        )
         work[at(drive + DRIVE_SPEED, lane, n)] = speed + gain * since
         work[at(drive + DRIVE_GAIN, lane, n)] = gain
         work[at(drive + DRIVE_TORQUE, lane, n)] = torque + since * slope
         work[at(drive + DRIVE_CENTER, lane, n)] = wide[at(CENTER, lane, n)]
         turned += wide[at(CENTER, lane, n)]
         wide[at(NOMINAL, lane, n)] = turned
-        start_roll, radius = exact[at(layout.START_ROLL, lane, n)], exact[at(layout.EXACT_RADIUS, lane, n)]
+        start_roll, radius = (
+            exact[at(layout.START_ROLL, lane, n)],
+            exact[at(layout.EXACT_RADIUS, lane, n)],
+        )
         wide[at(BASE, lane, n)] = start_roll + radius * (turned + work[at(q + P_TURN, lane, n)])
     gain, torque = get_row(work, drive + DRIVE_GAIN), get_row(work, drive + DRIVE_TORQUE)
     center = get_row(work, drive + DRIVE_CENTER)
     for d in range(n_dof):
         held = center * get_row(group.held, d) + gain * get_row(group.carried, d)
-        set_row(work, forces + d, get_row(group.force, d) + get_row(group.set_force, d) * (torque - 1.0) - held)
+        set_row(
+            work,
+            forces + d,
+            get_row(group.force, d) + get_row(group.set_force, d) * (torque - 1.0) - held,
+        )
 
 
 @inlined
@@ -93,7 +105,11 @@ def accelerate(group, law, q, v, torque, forces, a, work):
     normal = law.normal - get_row(numbers, layout.MEAN_FORCE) * torque
     set_row(work, a + P_X, law.friction)
     set_row(work, a + P_Y, normal)
-    set_row(work, a + P_TURN, get_row(numbers, layout.PINION_RADIUS) * (law.along - normal) + law.moment_p)
+    set_row(
+        work,
+        a + P_TURN,
+        get_row(numbers, layout.PINION_RADIUS) * (law.along - normal) + law.moment_p,
+    )
     set_row(work, a + W_X, 0.0 - law.friction)
     set_row(work, a + W_Y, 0.0 - normal)
     set_row(work, a + W_TURN, get_row(numbers, layout.WHEEL_RADIUS) * normal + law.moment_w)

@@ -112,13 +112,18 @@ def integrate(
         seen_row = -1
         if angle_row >= 0 and number % per_angle == 0:
             for lane in range(n):
-                angle[at(angle_row, lane, n)] = wide[at(NOMINAL, lane, n)] + work[at(now + P_TURN, lane, n)]
+                angle[at(angle_row, lane, n)] = (
+                    wide[at(NOMINAL, lane, n)] + work[at(now + P_TURN, lane, n)]
+                )
             if len(seen) > 0:
                 seen_row = angle_row
                 for k in range(layout.MOST_PAIRS):
                     set_row(work, layout.PAIR_FORCE + k, zero)
             angle_row += 1
-        speed, gain = get_row(work, drive + layout.DRIVE_SPEED), get_row(work, drive + layout.DRIVE_GAIN)
+        speed, gain = (
+            get_row(work, drive + layout.DRIVE_SPEED),
+            get_row(work, drive + layout.DRIVE_GAIN),
+        )
         approach, rate = motion(group, now, now + n_dof, work)
         set_row(work, layout.WITHIN, approach + margin)
         turning = radius * (speed + get_row(work, now + n_dof + P_TURN))
@@ -139,9 +144,15 @@ def integrate(
             set_row(work, layout.FLAGS, one)
             gather(group, begin, False, work, wide, near)
         for lane in range(n):
-            work[at(AHEAD + begin, lane, n)] = wide[at(ROLL + begin, lane, n)] - wide[at(BASE, lane, n)]
-        first = min(near[span_place(begin, n) + FIRST_NEAR_PAIR], near[span_place(end, n) + FIRST_NEAR_PAIR])
-        last = max(near[span_place(begin, n) + LAST_NEAR_PAIR], near[span_place(end, n) + LAST_NEAR_PAIR])
+            work[at(AHEAD + begin, lane, n)] = (
+                wide[at(ROLL + begin, lane, n)] - wide[at(BASE, lane, n)]
+            )
+        first = min(
+            near[span_place(begin, n) + FIRST_NEAR_PAIR], near[span_place(end, n) + FIRST_NEAR_PAIR]
+        )
+        last = max(
+            near[span_place(begin, n) + LAST_NEAR_PAIR], near[span_place(end, n) + LAST_NEAR_PAIR]
+        )
         cover(begin, first, last, work, near)
         cover(end, first, last, work, near)
         q_0 = get_row(work, now + P_TURN)
@@ -153,7 +164,13 @@ def integrate(
             if part == 1:
                 target, slot_1, h = parted, PART, share * step
             elif part == 2:
-                source, target, slot_0, h, offset = parted, parted, PART, (1.0 - share) * step, share * step
+                source, target, slot_0, h, offset = (
+                    parted,
+                    parted,
+                    PART,
+                    (1.0 - share) * step,
+                    share * step,
+                )
             between(slot_0, slot_1, MIDDLE, first, last, work)
             if is_helical(group):
                 beside_between(slot_0, slot_1, MIDDLE, first, last, work)
@@ -170,10 +187,16 @@ def integrate(
                 since = offset + since
                 q, v = at_stage, at_stage + n_dof
                 approach, rate = motion(group, q, v, work)
-                turned = radius * ((speed + 0.5 * gain * since) * since + (get_row(work, q + P_TURN) - q_0))
+                turned = radius * (
+                    (speed + 0.5 * gain * since) * since + (get_row(work, q + P_TURN) - q_0)
+                )
                 roll_rate = radius * (speed + gain * since + get_row(work, v + P_TURN))
-                law = mesh_law(group, first, last, slot, rows, turned, approach, rate, roll_rate, work, wide)
-                accelerate(group, law, q, v, get_row(work, drive + layout.DRIVE_TORQUE), forces, a, work)
+                law = mesh_law(
+                    group, first, last, slot, rows, turned, approach, rate, roll_rate, work, wide
+                )
+                accelerate(
+                    group, law, q, v, get_row(work, drive + layout.DRIVE_TORQUE), forces, a, work
+                )
                 if part == 0:
                     if stage == 0:
                         loaded = law.loaded
@@ -192,13 +215,19 @@ def integrate(
                 reach = h if stage == LAST_STAGE - 1 else half
                 for d in range(n_dof):
                     gained = get_row(work, a + d)
-                    set_row(work, ahead + d, get_row(work, source + d) + reach * get_row(work, v + d))
-                    set_row(work, ahead + n_dof + d, get_row(work, source + n_dof + d) + reach * gained)
+                    set_row(
+                        work, ahead + d, get_row(work, source + d) + reach * get_row(work, v + d)
+                    )
+                    set_row(
+                        work, ahead + n_dof + d, get_row(work, source + n_dof + d) + reach * gained
+                    )
                     if stage == 0:
                         set_row(work, sum_q + d, RK4.position[0] * gained)
                         set_row(work, sum_v + d, RK4.weight[0] * gained)
                     else:
-                        set_row(work, sum_q + d, get_row(work, sum_q + d) + RK4.position[1] * gained)
+                        set_row(
+                            work, sum_q + d, get_row(work, sum_q + d) + RK4.position[1] * gained
+                        )
                         set_row(work, sum_v + d, get_row(work, sum_v + d) + RK4.weight[1] * gained)
                 at_stage, ahead = ahead, trial_b if ahead == trial_a else trial_a
             per_sum = h * RK4.share
@@ -228,7 +257,9 @@ def integrate(
                 set_row(work, layout.FLAGS, changed)
                 set_row(work, AHEAD + PART, share * get_row(work, AHEAD + end))
                 for lane in range(n):
-                    wide[at(ROLL + PART, lane, n)] = wide[at(BASE, lane, n)] + work[at(AHEAD + PART, lane, n)]
+                    wide[at(ROLL + PART, lane, n)] = (
+                        wide[at(BASE, lane, n)] + work[at(AHEAD + PART, lane, n)]
+                    )
                 gather(group, PART, False, work, wide, near)
                 first = min(first, near[span_place(PART, n) + FIRST_NEAR_PAIR])
                 last = max(last, near[span_place(PART, n) + LAST_NEAR_PAIR])
@@ -237,10 +268,14 @@ def integrate(
                 cover(end, first, last, work, near)
         if n_parts > 1:
             for i in range(2 * n_dof):
-                chosen = where_above(changed, zero, get_row(work, parted + i), get_row(work, single + i))
+                chosen = where_above(
+                    changed, zero, get_row(work, parted + i), get_row(work, single + i)
+                )
                 set_row(work, single + i, chosen)
             for c in range(n_channels):
-                chosen = where_above(changed, zero, get_row(work, part_mean + c), get_row(work, mean + c))
+                chosen = where_above(
+                    changed, zero, get_row(work, part_mean + c), get_row(work, mean + c)
+                )
                 set_row(work, mean + c, chosen)
         out_first = (out_row + number - first_step) * n_channels
         for c in range(n_channels):
@@ -277,7 +312,9 @@ def tell(seen, row, normal, work, near):
         seen[at(first + layout.SEEN_NEWEST, lane, n)] = near[at(layout.NEWEST, lane, n)]
         seen[at(first + layout.SEEN_FORCE, lane, n)] = work[at(layout.LAW, lane, n)]
         for k in range(layout.MOST_PAIRS):
-            seen[at(first + layout.SEEN_PAIRS + k, lane, n)] = work[at(layout.PAIR_FORCE + k, lane, n)]
+            seen[at(first + layout.SEEN_PAIRS + k, lane, n)] = work[
+                at(layout.PAIR_FORCE + k, lane, n)
+            ]
 
 
 @compiled
@@ -323,7 +360,10 @@ def record(
     n, n_channels, n_kept = width(work), len(channels), len(taps) - (2 * TOGETHER - 1) * factor
     angle_row, now, done = 0, first_step, 0
     samples = n_kept + BLOCK * factor
-    n_steps, out_row = 1, -1  # then what the first sample needs before its last steps, then block by block
+    n_steps, out_row = (
+        1,
+        -1,
+    )  # then what the first sample needs before its last steps, then block by block
     while True:
         angle_row = integrate(
             group, state, lost, fresh, step, now, n_steps, channels, means, out_row, angle, angle_row, factor, seen,
@@ -345,7 +385,9 @@ def record(
             done += n_block
         if done == n_samples:
             break
-        n_steps, out_row = (n_kept, 0) if out_row < 0 else (min(BLOCK, n_samples - done) * factor, n_kept)
+        n_steps, out_row = (
+            (n_kept, 0) if out_row < 0 else (min(BLOCK, n_samples - done) * factor, n_kept)
+        )
 
 
 @compiled
@@ -360,7 +402,9 @@ def law_at(group, motion, work, wide, near, found):
         near[at(layout.NEWEST, lane, n)] = layout.NOBODY
         wide[at(BASE, lane, n)] = motion[at(0, lane, n)]
         wide[at(ROLL + EVEN, lane, n)] = motion[at(0, lane, n)]
-        work[at(layout.WITHIN, lane, n)] = motion[at(1, lane, n)] if group.one_sided else 2.0 * layout.FAR
+        work[at(layout.WITHIN, lane, n)] = (
+            motion[at(1, lane, n)] if group.one_sided else 2.0 * layout.FAR
+        )
     set_row(work, AHEAD + EVEN, spread(work, 0.0))
     set_row(work, layout.TOTAL, spread(work, 0.0))
     span = span_place(EVEN, n)
@@ -371,7 +415,9 @@ def law_at(group, motion, work, wide, near, found):
             break
         first, last = near[span + FIRST_NEAR_PAIR], near[span + LAST_NEAR_PAIR]
         turned = spread(work, 0.0)
-        law = mesh_law(group, first, last, EVEN, layout.MARGIN, turned, approach, rate, roll_rate, work, wide)
+        law = mesh_law(
+            group, first, last, EVEN, layout.MARGIN, turned, approach, rate, roll_rate, work, wide
+        )
         for row in range(layout.N_LAW):
             set_row(found, row, law[row])
         if not is_helical(group):

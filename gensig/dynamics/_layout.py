@@ -53,7 +53,9 @@ WITHIN = AHEAD + N_SLOTS
 FLAGS = WITHIN + 1
 STEP_APPROACH = FLAGS + 1  # the approach at the last stage of a step
 # the motion of the mesh at a stage; the roll is counted from the begin of the step
-MOTION_ROLL, MOTION_APPROACH, MOTION_RATE, MOTION_ROLL_RATE = range(STEP_APPROACH + 1, STEP_APPROACH + 5)
+MOTION_ROLL, MOTION_APPROACH, MOTION_RATE, MOTION_ROLL_RATE = range(
+    STEP_APPROACH + 1, STEP_APPROACH + 5
+)
 N_LAW = 8
 LAW = MOTION_ROLL_RATE + 1  # fields of ``Law``
 RAW = LAW + N_LAW  # table rows as they are read, lane by lane
@@ -69,7 +71,17 @@ N_MESH = BESIDE + N_SLOTS * BESIDE_ROWS
 # blocks of the machine behind the rows of the mesh, in rows per degree of freedom: five states, each q and then v; the
 # accelerations of a stage and their sums for q and v. Behind them the rows of the drive, the forces, and the mean
 # accelerations of a step and of its first part
-NOW, SINGLE, PARTED, TRIAL_A, TRIAL_B, ACCELERATIONS, SUM_Q, SUM_V, BEHIND = 0, 2, 4, 6, 8, 10, 11, 12, 13
+NOW, SINGLE, PARTED, TRIAL_A, TRIAL_B, ACCELERATIONS, SUM_Q, SUM_V, BEHIND = (
+    0,
+    2,
+    4,
+    6,
+    8,
+    10,
+    11,
+    12,
+    13,
+)
 # rows of the drive at the begin of a step: nominal speed, its change, share of the set torque, the pinion's turn
 DRIVE_SPEED, DRIVE_GAIN, DRIVE_TORQUE, DRIVE_CENTER, N_DRIVE = range(5)
 # what is told of the mesh at an output sample: the newest pair, the normal force, and that of every pair

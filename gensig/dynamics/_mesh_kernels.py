@@ -95,7 +95,9 @@ def _sliding(numbers, position):
 def _rubbed(numbers, position, load_of_pair):
     """Friction force, and its moments about pinion and wheel."""
     force = get_row(numbers, FRICTION) * load_of_pair * _sliding(numbers, position)
-    arm = get_row(numbers, START_CURVATURE) + _clip(position, spread(numbers, 0.0), get_row(numbers, PATH))
+    arm = get_row(numbers, START_CURVATURE) + _clip(
+        position, spread(numbers, 0.0), get_row(numbers, PATH)
+    )
     return force, 0.0 - force * arm, force * (get_row(numbers, TANGENT_LENGTH) - arm)
 
 
@@ -152,7 +154,15 @@ def one_sided_law(
         set_row(work, BITE + k, where_above(driven, zero, bite, zero))
     rounds = MOST_PAIRS if helical else N_PAIRS
     total, stiffness = _total_load(numbers, rounds, first, last, slot, work)
-    normal, friction, moment_p, moment_w, along, lost, loaded = zero, zero, zero, zero, zero, zero, zero
+    normal, friction, moment_p, moment_w, along, lost, loaded = (
+        zero,
+        zero,
+        zero,
+        zero,
+        zero,
+        zero,
+        zero,
+    )
     stored = 0.0 - 0.5 * shared * total * total
     for k in range(first, last):
         pair = pair_rows(slot, k)
@@ -207,7 +217,11 @@ def papers_law(numbers, first, last, slot, margin, ahead, approach, approach_rat
     Rows ``margin`` take how far every pair is in, from 0 to 1 and beyond, ``PAIR_FORCE`` its force; none if negative.
     """
     zero, one = spread(work, 0.0), spread(work, 1.0)
-    shared, damping, half_lag = get_row(numbers, SHARED), get_row(numbers, DAMPING), get_row(numbers, HALF_LAG)
+    shared, damping, half_lag = (
+        get_row(numbers, SHARED),
+        get_row(numbers, DAMPING),
+        get_row(numbers, HALF_LAG),
+    )
     path = get_row(numbers, PATH) + 2.0 * half_lag
     stiffness, loaded = zero, zero
     for k in range(first, last):
@@ -216,7 +230,9 @@ def papers_law(numbers, first, last, slot, margin, ahead, approach, approach_rat
         inside = where_above(position, path - position, path - position, position)
         share = 0.5 * (1.0 + inside * get_row(numbers, PER_SWITCH_WIDTH))
         # a pair that is not there is never in
-        share = where_above(get_row(work, pair + STIFFNESS), spread(work, 1e-20), share, spread(work, -1.0))
+        share = where_above(
+            get_row(work, pair + STIFFNESS), spread(work, 1e-20), share, spread(work, -1.0)
+        )
         if margin >= 0:
             set_row(work, margin + k, share)
         share = _clip(share, zero, one)
@@ -226,7 +242,9 @@ def papers_law(numbers, first, last, slot, margin, ahead, approach, approach_rat
         stiffness = stiffness + own
     together = stiffness / (1.0 + shared * stiffness)
     normal = together * approach + damping * approach_rate
-    per_stiffness = where_above(stiffness, zero, 1.0 / where_above(stiffness, zero, stiffness, one), zero)
+    per_stiffness = where_above(
+        stiffness, zero, 1.0 / where_above(stiffness, zero, stiffness, one), zero
+    )
     friction, moment_p, moment_w = zero, zero, zero
     for k in range(first, last):
         position = get_row(work, pair_rows(slot, k) + POSITION) + (ahead - half_lag)
@@ -255,13 +273,17 @@ def coast_law(group, lane, roll, approach, rate, roll_rate, work):
     n_pairs = places[at(FOLLOWED, lane, n)] if is_helical(group) else N_PAIRS
     wheel = places[at(WHEEL_ROWS, lane, n)] * stride
     for k in range(n_pairs):
-        tooth_p = (places[at(START_PINION, lane, n)] - newest + k) % places[at(PINION_TEETH, lane, n)]
+        tooth_p = (places[at(START_PINION, lane, n)] - newest + k) % places[
+            at(PINION_TEETH, lane, n)
+        ]
         tooth_w = (places[at(START_WHEEL, lane, n)] - newest + k) % places[at(WHEEL_TEETH, lane, n)]
         there = (
             group.tooth_row[places[at(PINION_TOOTH, lane, n)] + tooth_p] >= 0
             and group.tooth_row[places[at(WHEEL_TOOTH, lane, n)] + tooth_w] >= 0
         )
-        x = (mirrored - (newest - k) * pitch - exact[at(TABLE_START, lane, n)]) * exact[at(NODES_PER_METER, lane, n)]
+        x = (mirrored - (newest - k) * pitch - exact[at(TABLE_START, lane, n)]) * exact[
+            at(NODES_PER_METER, lane, n)
+        ]
         cell = min(max(int(x), 0), places[at(LAST_CELL, lane, n)])
         p = start + cell * COLUMNS
         pair = pair_rows(COAST, k)

@@ -72,7 +72,9 @@ class Newmark(NamedTuple):
 def average_acceleration(beta: float, gamma: float) -> Newmark:
     """Newmark's coefficients; ValueError for others than those of the average acceleration."""
     if gamma != 0.5 or beta != 0.5 * gamma:
-        raise ValueError(f"beta = {beta}, gamma = {gamma}: the core is written for the average acceleration, 1/4, 1/2")
+        raise ValueError(
+            f"beta = {beta}, gamma = {gamma}: the core is written for the average acceleration, 1/4, 1/2"
+        )
     return Newmark(beta=beta, gamma=gamma, mass=1.0 / beta, damping=gamma / beta)
 
 

@@ -103,8 +103,12 @@ def _meet(group, lane, newest, work, near):
         near[at(AT_PINION + k, lane, n)] = start + pinion * stride if there else -1
         near[at(AT_WHEEL + k, lane, n)] = wheel
         near[at(CHORD + k, lane, n)] = 0
-        work[at(ERROR + k, lane, n)] = group.tooth_error[first_p + tooth_p] + group.tooth_error[first_w + tooth_w]
-        work[at(TILT + k, lane, n)] = group.tooth_tilt[first_p + tooth_p] + group.tooth_tilt[first_w + tooth_w]
+        work[at(ERROR + k, lane, n)] = (
+            group.tooth_error[first_p + tooth_p] + group.tooth_error[first_w + tooth_w]
+        )
+        work[at(TILT + k, lane, n)] = (
+            group.tooth_tilt[first_p + tooth_p] + group.tooth_tilt[first_w + tooth_w]
+        )
         tooth_p = tooth_p - 1 if tooth_p > 0 else n_pinion - 1
         tooth_w = tooth_w - 1 if tooth_w > 0 else n_wheel - 1
 
@@ -127,7 +131,10 @@ def gather(group, slot, renew, work, wide, near):
         roll = wide[at(ROLL + slot, lane, n)]
         pitch, nodes = exact[at(PITCH, lane, n)], exact[at(NODES_PER_METER, lane, n)]
         if renew:
-            newest = int(np.floor(roll * exact[at(PER_PITCH, lane, n)])) - group.places[at(FIRST_PITCH, lane, n)]
+            newest = (
+                int(np.floor(roll * exact[at(PER_PITCH, lane, n)]))
+                - group.places[at(FIRST_PITCH, lane, n)]
+            )
             if newest != near[at(NEWEST, lane, n)]:
                 near[at(NEWEST, lane, n)] = newest
                 changed = True
@@ -144,19 +151,27 @@ def gather(group, slot, renew, work, wide, near):
                 cell = min(max(int(x), 0), last_cell)
                 if is_helical(group):
                     if renew:
-                        changed = _choose(group, lane, k, pinion, cell, x - cell, position, work, near) or changed
+                        changed = (
+                            _choose(group, lane, k, pinion, cell, x - cell, position, work, near)
+                            or changed
+                        )
                     pinion += near[at(CHORD + k, lane, n)] * group.places[at(CHORD_STRIDE, lane, n)]
                     _read_beside(group, lane, k, pinion + cell * COLUMNS, x - cell, work)
                 p, wheel = pinion + cell * COLUMNS, near[at(AT_WHEEL + k, lane, n)]
                 low, high = load_four(group.table, p), load_four(group.table, p + COLUMNS)
                 if wheel >= 0:
                     w = wheel + cell * COLUMNS
-                    low, high = low + load_four(group.table, w), high + load_four(group.table, w + COLUMNS)
+                    low, high = (
+                        low + load_four(group.table, w),
+                        high + load_four(group.table, w + COLUMNS),
+                    )
                 step, part = high - low, x - cell
                 bent = (part * (1.0 - part)) * load_four(group.bend, lane * COLUMNS)
                 store(work, here, low + part * step - bent * second_and_fourth(step))
                 first, last = min(first, k), max(last, k + 1)
-                tilted = work[at(TILT + k, lane, n)] * (position - group.numbers[at(MIDDLE_POINT, lane, n)])
+                tilted = work[at(TILT + k, lane, n)] * (
+                    position - group.numbers[at(MIDDLE_POINT, lane, n)]
+                )
                 if work[here + GAP] + work[at(ERROR + k, lane, n)] + tilted < within:
                     near_first, near_last = min(near_first, k), max(near_last, k + 1)
             else:
@@ -181,7 +196,11 @@ def _choose(group, lane, k, pair, cell, part, position, work, near):
     p = pair + cell * COLUMNS
     step = group.table[p + COLUMNS + GAP] - group.table[p + GAP]
     step_slope = group.table[p + COLUMNS + GAP_SLOPE] - group.table[p + GAP_SLOPE]
-    gap = group.table[p + GAP] + part * step - part * (1.0 - part) * group.bend[lane * COLUMNS + GAP] * step_slope
+    gap = (
+        group.table[p + GAP]
+        + part * step
+        - part * (1.0 - part) * group.bend[lane * COLUMNS + GAP] * step_slope
+    )
     tilted = work[at(TILT + k, lane, n)] * (position - group.numbers[at(MIDDLE_POINT, lane, n)])
     bite = work[at(LOCAL, lane, n)] - (gap + work[at(ERROR + k, lane, n)] + tilted)
     chord = 0
@@ -223,7 +242,10 @@ def _spread_rows(group, slot, k, work):
         own = own - load_four(group.numbers, at(SHARED, lane, n))
         store(work, at(pair + OWN, lane, n), own)
         store(work, at(pair + OWN_SLOPE, lane, n), own_slope)
-        tilt, error = load_four(work, at(TILT + k, lane, n)), load_four(work, at(ERROR + k, lane, n))
+        tilt, error = (
+            load_four(work, at(TILT + k, lane, n)),
+            load_four(work, at(ERROR + k, lane, n)),
+        )
         position = load_four(work, at(pair + POSITION, lane, n))
         beyond = position - load_four(group.numbers, at(MIDDLE_POINT, lane, n))
         store(work, at(pair + GAP, lane, n), gap + error + tilt * beyond)
@@ -237,7 +259,10 @@ def _spread_beside(group, slot, k, work):
     n, pair, chord = width(work), pair_rows(slot, k), chord_rows(slot, k)
     for lane in range(0, n, FOUR):
         energy, energy_slope, touch, touch_slope = _columns(work, RAW_BESIDE, k, lane)
-        tilt, error = load_four(work, at(TILT + k, lane, n)), load_four(work, at(ERROR + k, lane, n))
+        tilt, error = (
+            load_four(work, at(TILT + k, lane, n)),
+            load_four(work, at(ERROR + k, lane, n)),
+        )
         position = load_four(work, at(pair + POSITION, lane, n))
         beyond = position - load_four(group.numbers, at(MIDDLE_POINT, lane, n))
         store(work, at(chord + LEFT_OUT, lane, n), energy)
@@ -285,9 +310,15 @@ def between(a, b, middle, first, last, work):
             mean = CUBIC_MIDDLE.value_by_values * (before + after) + bend * (slope_p - slope_q)
             least = where_above(before, after, after, before)
             set_row(work, m + value, where_above(mean, least, mean, least))
-            set_row(work, m + slope, growth * (after - before) - CUBIC_MIDDLE.slope_by_slopes * (slope_p + slope_q))
+            set_row(
+                work,
+                m + slope,
+                growth * (after - before) - CUBIC_MIDDLE.slope_by_slopes * (slope_p + slope_q),
+            )
         set_row(work, m + STIFFNESS, 1.0 / get_row(work, m + OWN))
-        set_row(work, m + POSITION, 0.5 * (get_row(work, p + POSITION) + get_row(work, q + POSITION)))
+        set_row(
+            work, m + POSITION, 0.5 * (get_row(work, p + POSITION) + get_row(work, q + POSITION))
+        )
 
 
 @inlined
@@ -303,4 +334,8 @@ def beside_between(a, b, middle, first, last, work):
             slope_p, slope_q = get_row(work, p + slope), get_row(work, q + slope)
             mean = CUBIC_MIDDLE.value_by_values * (before + after) + bend * (slope_p - slope_q)
             set_row(work, m + value, mean)
-            set_row(work, m + slope, growth * (after - before) - CUBIC_MIDDLE.slope_by_slopes * (slope_p + slope_q))
+            set_row(
+                work,
+                m + slope,
+                growth * (after - before) - CUBIC_MIDDLE.slope_by_slopes * (slope_p + slope_q),
+            )

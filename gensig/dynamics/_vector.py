@@ -78,7 +78,9 @@ class Vector(types.Type):  # type: ignore[misc]
 
     def __init__(self, element: Any, count: int) -> None:
         self.element, self.count = element, count
-        self.llvm = ir.VectorType(ir.DoubleType() if element is types.float64 else ir.FloatType(), count)
+        self.llvm = ir.VectorType(
+            ir.DoubleType() if element is types.float64 else ir.FloatType(), count
+        )
         super().__init__(name=f"{element}x{count}")
 
 
@@ -97,7 +99,9 @@ VECTORS = (*GROUPS.values(), *ROWS.values())
 def _filled(builder: Any, kind: Vector, number: Any) -> Any:
     """A float64 in every place of a vector."""
     return _repeated(
-        builder, kind, builder.fptrunc(number, ir.FloatType()) if kind.element is types.float32 else number
+        builder,
+        kind,
+        builder.fptrunc(number, ir.FloatType()) if kind.element is types.float32 else number,
     )
 
 
@@ -105,7 +109,9 @@ def _repeated(builder: Any, kind: Vector, number: Any) -> Any:
     """A number of a vector's kind in every place."""
     nothing = ir.Constant(kind.llvm, ir.Undefined)
     one = builder.insert_element(nothing, number, ir.Constant(_INDEX, 0))
-    return builder.shuffle_vector(one, nothing, ir.Constant(ir.VectorType(_INDEX, kind.count), [0] * kind.count))
+    return builder.shuffle_vector(
+        one, nothing, ir.Constant(ir.VectorType(_INDEX, kind.count), [0] * kind.count)
+    )
 
 
 def _binary(function: Any, instruction: str) -> None:
@@ -173,7 +179,11 @@ def store(typing_context: Any, array: Any, place: Any, value: Any) -> Any:
 
     def build(context: Any, builder: Any, sig: Any, args: Any) -> Any:
         size = sig.args[2].element.bitwidth // 8
-        builder.store(args[2], _address(context, builder, sig.args[0], args[0], args[1], sig.args[2]), align=size)
+        builder.store(
+            args[2],
+            _address(context, builder, sig.args[0], args[0], args[1], sig.args[2]),
+            align=size,
+        )
         return context.get_dummy_value()
 
     return types.void(array, types.intp, value), build
@@ -259,9 +269,13 @@ def plus_product(typing_context: Any, total: Any, factors: Any, place: Any, valu
 
     def build(context: Any, builder: Any, sig: Any, args: Any) -> Any:
         kind = sig.return_type
-        number = builder.load(_address(context, builder, sig.args[1], args[1], args[2], kind.element))
+        number = builder.load(
+            _address(context, builder, sig.args[1], args[1], args[2], kind.element)
+        )
         name = f"llvm.fma.v{kind.count}f{kind.element.bitwidth}"
-        fma = get_or_insert_function(builder.module, ir.FunctionType(kind.llvm, (kind.llvm,) * 3), name)
+        fma = get_or_insert_function(
+            builder.module, ir.FunctionType(kind.llvm, (kind.llvm,) * 3), name
+        )
         return builder.call(fma, (_repeated(builder, kind, number), args[3], args[0]))
 
     return total(total, factors, types.intp, total), build
@@ -274,7 +288,9 @@ def any_above(typing_context: Any, a: Any, b: Any) -> Any:
     def build(context: Any, builder: Any, sig: Any, args: Any) -> Any:
         bits = ir.IntType(sig.args[0].count)
         return builder.icmp_unsigned(
-            "!=", builder.bitcast(builder.fcmp_ordered(">", args[0], args[1]), bits), ir.Constant(bits, 0)
+            "!=",
+            builder.bitcast(builder.fcmp_ordered(">", args[0], args[1]), bits),
+            ir.Constant(bits, 0),
         )
 
     return types.boolean(a, a), build

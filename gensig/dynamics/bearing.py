@@ -64,7 +64,9 @@ class BallBearing:
         along the race is 2 / (d_m - D) inside and -2 / (d_m + D) outside, across it -1 / (f D).
         """
         ball, sign = 2.0 / self.ball_diameter, 1.0 if race == "inner" else -1.0
-        conformity = self.inner_groove_conformity if race == "inner" else self.outer_groove_conformity
+        conformity = (
+            self.inner_groove_conformity if race == "inner" else self.outer_groove_conformity
+        )
         along = sign * 2.0 / (self.pitch_diameter - sign * self.ball_diameter)
         return ball, ball, along, -1.0 / (conformity * self.ball_diameter)
 
@@ -87,7 +89,9 @@ class Shaft:
         return 0.75 * math.pi * youngs_modulus * self.diameter**4 / self.span**3
 
 
-def point_contact_coefficient(curvatures: tuple[float, float, float, float], material: Material) -> float:
+def point_contact_coefficient(
+    curvatures: tuple[float, float, float, float], material: Material
+) -> float:
     """K of Q = K delta^1.5 for two bodies of one material in Hertzian point contact, N/m^1.5.
 
     Parameters
@@ -134,7 +138,10 @@ def _ellipticity(difference: float) -> float:
 @lru_cache(maxsize=64)
 def ball_coefficient(bearing: BallBearing, material: Material) -> float:
     """K of Q = K delta^1.5 for a ball between both races, N/m^1.5; deflections of inner and outer contact add."""
-    contacts = [point_contact_coefficient(bearing.groove_curvatures(race), material) for race in ("inner", "outer")]
+    contacts = [
+        point_contact_coefficient(bearing.groove_curvatures(race), material)
+        for race in ("inner", "outer")
+    ]
     return sum(value ** (-2.0 / 3.0) for value in contacts) ** -1.5
 
 
@@ -156,7 +163,9 @@ def cage_positions(bearing: BallBearing) -> Array:
     return (np.arange(CAGE_POSITIONS) + 0.5) / CAGE_POSITIONS * math.pi / bearing.n_balls
 
 
-def bearing_equilibrium(bearing: BallBearing, material: Material, load: float, positions: Array) -> BearingState:
+def bearing_equilibrium(
+    bearing: BallBearing, material: Material, load: float, positions: Array
+) -> BearingState:
     """Where the inner ring rests under a radial ``load`` in N along y, for cage ``positions`` (position,) rad.
 
     Ball j at theta_j = position + 2 pi j / Z from y is pressed by delta_j = x sin(theta_j) + y cos(theta_j) - P / 2,
@@ -181,7 +190,9 @@ def bearing_equilibrium(bearing: BallBearing, material: Material, load: float, p
         return 0.4 * coefficient * (pressed(place) ** 2.5).sum(axis=1) - place @ force
 
     def tangent(delta: Array) -> Array:
-        return np.einsum("pb,pba,pbc->pac", 1.5 * coefficient * np.sqrt(delta), direction, direction)
+        return np.einsum(
+            "pb,pba,pbc->pac", 1.5 * coefficient * np.sqrt(delta), direction, direction
+        )
 
     largest = (5.0 * load / (bearing.n_balls * coefficient)) ** (2.0 / 3.0)
     place = np.tile([0.0, gap + largest], (len(positions), 1))
@@ -190,19 +201,25 @@ def bearing_equilibrium(bearing: BallBearing, material: Material, load: float, p
         delta = pressed(place)
         rest = np.einsum("pb,pba->pa", coefficient * delta**1.5, direction) - force
         if np.abs(rest).max() <= BALANCED * load:
-            return BearingState(displacement=place, ball_load=coefficient * delta**1.5, stiffness=tangent(delta))
+            return BearingState(
+                displacement=place, ball_load=coefficient * delta**1.5, stiffness=tangent(delta)
+            )
         step = np.linalg.solve(tangent(delta) + softest, -rest[:, :, None])[:, :, 0]
         longest = np.abs(step).max(axis=1, keepdims=True)
         step *= np.minimum(1.0, (abs(gap) + 4.0 * largest) / np.maximum(longest, 1e-300))
         before, share = energy(place), np.ones((len(place), 1))
         slope = np.einsum("pa,pa->p", rest, step)
         for _ in range(40):
-            worse = energy(place + share * step) > before + 1e-4 * share[:, 0] * slope + 1e-14 * np.abs(before)
+            worse = energy(place + share * step) > before + 1e-4 * share[
+                :, 0
+            ] * slope + 1e-14 * np.abs(before)
             if not worse.any():
                 break
             share[worse] *= 0.5
         place = place + share * step
-    raise SimulationError(f"a bearing finds no equilibrium under {load:g} N; check its sizes and its clearance")
+    raise SimulationError(
+        f"a bearing finds no equilibrium under {load:g} N; check its sizes and its clearance"
+    )
 
 
 def bearing_stiffness(bearing: BallBearing, material: Material, load: float) -> tuple[float, float]:
@@ -216,11 +233,16 @@ def bearing_stiffness(bearing: BallBearing, material: Material, load: float) -> 
 
 
 @lru_cache(maxsize=1024)
-def support_stiffness(bearing: BallBearing, shaft: Shaft, material: Material, force: float) -> tuple[float, float]:
+def support_stiffness(
+    bearing: BallBearing, shaft: Shaft, material: Material, force: float
+) -> tuple[float, float]:
     """Stiffness under a gear across and along its static force in N, N/m: two bearings, in series with their shaft.
 
     Each bearing carries half, since the gear is in the middle of the span. Housing and seats are rigid.
     """
     bending = shaft.bending_stiffness(material.youngs_modulus)
-    across, along = (1.0 / (0.5 / one + 1.0 / bending) for one in bearing_stiffness(bearing, material, 0.5 * force))
+    across, along = (
+        1.0 / (0.5 / one + 1.0 / bending)
+        for one in bearing_stiffness(bearing, material, 0.5 * force)
+    )
     return across, along

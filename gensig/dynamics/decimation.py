@@ -20,7 +20,9 @@ Array = NDArray[np.float64]
 
 PASS_SHARE, STOP_SHARE, ATTENUATION_DB = LOW_PASS
 LOWEST_HZ = 20.0
-STORED = Path(__file__).with_name("low_pass.json")  # first halves of symmetric taps, by oversampling
+STORED = Path(__file__).with_name(
+    "low_pass.json"
+)  # first halves of symmetric taps, by oversampling
 
 
 def usable_band(sampling_rate: float) -> tuple[float, float]:
@@ -74,7 +76,9 @@ def decimator(oversampling: int) -> Decimator:
     stored = json.loads(STORED.read_text("utf-8")).get(str(oversampling))
     if stored is None:
         return design(oversampling)
-    return Decimator(np.array([*stored, *reversed(stored)]), oversampling, len(stored) // oversampling)
+    return Decimator(
+        np.array([*stored, *reversed(stored)]), oversampling, len(stored) // oversampling
+    )
 
 
 def design(oversampling: int) -> Decimator:
@@ -95,7 +99,9 @@ def design(oversampling: int) -> Decimator:
     gain = np.append(1.0 / np.sinc(frequency[:65] / oversampling), [0.0, 0.0])
     n_grid = max(16385, 1 + 2 ** math.ceil(math.log2(256 * oversampling)))
     window = ("kaiser", beta)
-    taps = firwin2(2 * margin * oversampling, frequency, gain, nfreqs=n_grid, window=window, fs=2.0 * nyquist)
+    taps = firwin2(
+        2 * margin * oversampling, frequency, gain, nfreqs=n_grid, window=window, fs=2.0 * nyquist
+    )
     return Decimator(taps, oversampling, margin)
 
 
@@ -112,6 +118,10 @@ def in_band_error(found: Array, exact: Array, sampling_rate: float) -> Array:
     frequency = np.fft.rfftfreq(n_samples, 1.0 / sampling_rate)
     inside = (frequency >= LOWEST_HZ) & (frequency <= usable_band(sampling_rate)[1])
     window = np.hanning(n_samples)
-    spectra = [np.fft.rfft(signal * window, axis=-1)[..., inside] for signal in (found - exact, exact)]
+    spectra = [
+        np.fft.rfft(signal * window, axis=-1)[..., inside] for signal in (found - exact, exact)
+    ]
     off, level = (np.linalg.norm(spectrum, axis=-1) for spectrum in spectra)
-    return np.asarray(np.divide(off, level, out=np.zeros_like(off), where=level != 0.0).max(axis=-1))
+    return np.asarray(
+        np.divide(off, level, out=np.zeros_like(off), where=level != 0.0).max(axis=-1)
+    )

@@ -15,7 +15,14 @@ from gensig.mesh.sliced.sliced_table import SlicedTable
 
 Array = NDArray[np.float64]
 
-AXIAL_DOFS = ("pinion_z", "pinion_tilt_x", "pinion_tilt_y", "wheel_z", "wheel_tilt_x", "wheel_tilt_y")
+AXIAL_DOFS = (
+    "pinion_z",
+    "pinion_tilt_x",
+    "pinion_tilt_y",
+    "wheel_z",
+    "wheel_tilt_x",
+    "wheel_tilt_y",
+)
 
 
 def axial_reach(pair: GearPair) -> Array:

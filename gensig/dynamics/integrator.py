@@ -75,7 +75,9 @@ def records_together(solver: Solver) -> int:
 
 def check_machine(dynamics: PairDynamics, solver: Solver, sampling_rate: float) -> None:
     """Raise SimulationError for a machine that the backend cannot integrate at this step."""
-    BACKENDS[solver.backend].check_step(dynamics, sampling_rate, solver.oversampling, solver.max_error)
+    BACKENDS[solver.backend].check_step(
+        dynamics, sampling_rate, solver.oversampling, solver.max_error
+    )
 
 
 def check_memory(duration: float, sampling_rate: float, n_channels: int, solver: Solver) -> None:
@@ -95,4 +97,6 @@ def check_channels(channels: tuple[str, ...], dofs: tuple[str, ...] = DOFS) -> N
     """Raise ConfigError for a channel that a machine has not."""
     unknown = [name for name in channels if name not in dofs]
     if unknown:
-        raise ConfigError(f"sensing.channels: no channel {', '.join(unknown)}; allowed: {', '.join(dofs)}")
+        raise ConfigError(
+            f"sensing.channels: no channel {', '.join(unknown)}; allowed: {', '.join(dofs)}"
+        )

@@ -59,7 +59,10 @@ def pack(
     tables, rows, steps = zip(*[_rows(one.table) for one in lanes], strict=True)
     sizes, depth = [table[..., :COLUMNS].size for table in tables], _depths(lanes)
     teeth = [len(row) for row in rows]
-    numbers, exact = np.empty((N_NUMBERS, len(lanes)), dtype=precision), np.empty((N_EXACT, len(lanes)))
+    numbers, exact = (
+        np.empty((N_NUMBERS, len(lanes)), dtype=precision),
+        np.empty((N_EXACT, len(lanes))),
+    )
     places = np.empty((N_PLACES, len(lanes)), dtype=np.int64)
     rests = [one.rest() for one in lanes]
     for lane, one in enumerate(lanes):
@@ -82,12 +85,15 @@ def pack(
             first_pitch,
             last_pitch - first_pitch,
             per_chord,
-            first_table + per_chord * (one.table.set_chord if isinstance(one.table, SlicedTable) else 0),
+            first_table
+            + per_chord * (one.table.set_chord if isinstance(one.table, SlicedTable) else 0),
         )
     systems = [one.system() for one in lanes]
     stiffness = np.stack([system.stiffness for system in systems])
     damping = np.stack([system.damping for system in systems])
-    mass, rotation = (np.stack([getattr(system, name) for system in systems]) for name in ("mass", "rotation"))
+    mass, rotation = (
+        np.stack([getattr(system, name) for system in systems]) for name in ("mass", "rotation")
+    )
     n_dof = mass.shape[1]
     coupled = np.any((stiffness != 0.0) | (damping != 0.0), axis=0) & ~np.eye(n_dof, dtype=bool)
     row, column = np.nonzero(coupled)
@@ -99,7 +105,10 @@ def pack(
 
     diagonal = np.arange(n_dof)
     set_force = np.stack(
-        [system.force - one.mesh_force * one.approach_direction() for system, one in zip(systems, lanes, strict=True)]
+        [
+            system.force - one.mesh_force * one.approach_direction()
+            for system, one in zip(systems, lanes, strict=True)
+        ]
     )
     options = lanes[0].table.options
     kind = HelicalGroup if lanes[0].is_helical else Group
@@ -114,8 +123,12 @@ def pack(
         beside=np.concatenate([table[..., COLUMNS:].ravel() for table in tables]).astype(precision),
         bend=np.outer(0.5 / exact[NODES_PER_METER], [1.0, 0.0, 1.0, 0.0]).astype(precision).ravel(),
         tooth_row=np.concatenate(rows),
-        tooth_error=np.concatenate([error for one in lanes for error in (one.pinion_error, one.wheel_error)]),
-        tooth_tilt=np.concatenate([tilt for one in lanes for tilt in (one.pinion_tilt, one.wheel_tilt)]),
+        tooth_error=np.concatenate(
+            [error for one in lanes for error in (one.pinion_error, one.wheel_error)]
+        ),
+        tooth_tilt=np.concatenate(
+            [tilt for one in lanes for tilt in (one.pinion_tilt, one.wheel_tilt)]
+        ),
         one_sided=options.law == "one_sided",
         consistent=options.roll_torque == "consistent",
         reach=side_by_side(np.stack([one.approach_direction() for one in lanes])),
@@ -154,11 +167,16 @@ def _nominal(lanes: Sequence[PairDynamics], span: tuple[float, float]) -> tuple[
     profile = np.empty((last - first, N_PROFILE, len(lanes)))
     for lane, one in enumerate(lanes):
         nominal = one.nominal(edges)
-        gain, slope = (np.diff(values) * CELLS_PER_SECOND for values in (nominal.speed, nominal.torque_factor))
+        gain, slope = (
+            np.diff(values) * CELLS_PER_SECOND for values in (nominal.speed, nominal.torque_factor)
+        )
         turned = 0.5 * (nominal.speed[1:] + nominal.speed[:-1]) / CELLS_PER_SECOND
         before, after = turned[:-first], turned[-first:]
         angle = np.concatenate([-np.cumsum(before[::-1])[::-1], [0.0], np.cumsum(after)])
-        profile[:, NOMINAL_ANGLE, lane], profile[:, NOMINAL_SPEED, lane] = angle[:-1], nominal.speed[:-1]
+        profile[:, NOMINAL_ANGLE, lane], profile[:, NOMINAL_SPEED, lane] = (
+            angle[:-1],
+            nominal.speed[:-1],
+        )
         profile[:, NOMINAL_ACCELERATION, lane] = gain
         profile[:, TORQUE, lane], profile[:, TORQUE_SLOPE, lane] = nominal.torque_factor[:-1], slope
     return profile.ravel(), first, CELLS_PER_SECOND
@@ -182,14 +200,32 @@ def _rows(table: PairTable | SlicedTable) -> tuple[Array, NDArray[np.int64], tup
     (pinion, pinion_row), (wheel, wheel_row) = (
         np.unique(kind, return_inverse=True) for kind in (table.pinion_kind, table.wheel_kind)
     )
-    touch = [np.broadcast_to(value[:, :, :1], value.shape) for value in (table.gap, table.gap_slope)]
-    values = [table.compliance, table.compliance_slope, table.gap, table.gap_slope, *left_out_energy(table), *touch]
-    pairs = np.stack([value[np.ix_(pinion, wheel)].reshape(-1, *value.shape[2:]) for value in values], axis=-1)
+    touch = [
+        np.broadcast_to(value[:, :, :1], value.shape) for value in (table.gap, table.gap_slope)
+    ]
+    values = [
+        table.compliance,
+        table.compliance_slope,
+        table.gap,
+        table.gap_slope,
+        *left_out_energy(table),
+        *touch,
+    ]
+    pairs = np.stack(
+        [value[np.ix_(pinion, wheel)].reshape(-1, *value.shape[2:]) for value in values], axis=-1
+    )
     if pinion[0] != 0 or wheel[0] != 0:  # back flanks are those of sound teeth
         pairs = np.concatenate([np.stack([value[0, 0] for value in values], axis=-1)[None], pairs])
         wheel_row = wheel_row + 1
-    sides = ((table.pinion_kind, table.pinion_present, pinion_row), (table.wheel_kind, table.wheel_present, wheel_row))
-    return pairs, np.concatenate([np.where(present[kind], row, -1) for kind, present, row in sides]), (len(wheel), 0)
+    sides = (
+        (table.pinion_kind, table.pinion_present, pinion_row),
+        (table.wheel_kind, table.wheel_present, wheel_row),
+    )
+    return (
+        pairs,
+        np.concatenate([np.where(present[kind], row, -1) for kind, present, row in sides]),
+        (len(wheel), 0),
+    )
 
 
 def _columns(side: GearTable) -> Array:
@@ -216,8 +252,12 @@ def _table_rows(table: PairTable) -> tuple[Array, NDArray[np.int64], tuple[int, 
         row = np.concatenate([_present(side, side.kind) for side in (table.pinion, table.wheel)])
         return everything, row, (1, len(table.pinion.compliance))
     pairs = (pinion[:, None] + wheel[None]).reshape(-1, *pinion.shape[1:])
-    if not (np.any(table.pinion.kind == 0) and np.any(table.wheel.kind == 0)):  # back flanks are those of sound teeth
-        pairs = np.concatenate([(_columns(table.pinion)[0] + _columns(table.wheel)[0])[None], pairs])
+    if not (
+        np.any(table.pinion.kind == 0) and np.any(table.wheel.kind == 0)
+    ):  # back flanks are those of sound teeth
+        pairs = np.concatenate(
+            [(_columns(table.pinion)[0] + _columns(table.wheel)[0])[None], pairs]
+        )
         wheel_row = wheel_row + 1
     row = np.concatenate([_present(table.pinion, pinion_row), _present(table.wheel, wheel_row)])
     return pairs, row, (len(wheel), 0)

@@ -77,7 +77,10 @@ def mesh_state(
     def placed(rows: NDArray[np.generic]) -> NDArray[np.generic]:
         return np.take_along_axis(rows, order, axis=0)
 
-    loaded = {gear: placed(np.where(forces > 0.0, tooth, NO_TOOTH)).astype(np.int16) for gear, tooth in teeth.items()}
+    loaded = {
+        gear: placed(np.where(forces > 0.0, tooth, NO_TOOTH)).astype(np.int16)
+        for gear, tooth in teeth.items()
+    }
     return MeshState(
         pinion_tooth=loaded["pinion"],
         wheel_tooth=loaded["wheel"],

@@ -36,7 +36,9 @@ def loss_arm(table: PairTable | SlicedTable, position: Array) -> Array:
 def least_gaps(table: PairTable | SlicedTable) -> list[Array]:
     """Two gaps by node of which no pair of teeth has less than the sum, (node,) m each."""
     if isinstance(table, SlicedTable):
-        touch = table.gap[np.ix_(table.pinion_present, table.wheel_present)][:, :, 0].min(axis=(0, 1))
+        touch = table.gap[np.ix_(table.pinion_present, table.wheel_present)][:, :, 0].min(
+            axis=(0, 1)
+        )
         return [touch, np.zeros_like(touch)]
     return [np.asarray(side.gap[side.present].min(axis=0)) for side in (table.pinion, table.wheel)]
 
@@ -61,7 +63,11 @@ def mean_mesh_stiffness(table: PairTable | SlicedTable, force: float) -> float:
     else:
         mesh = table
         if pinion is not None and wheel is not None:
-            mesh = replace(table, pinion=replace(table.pinion, kind=pinion), wheel=replace(table.wheel, kind=wheel))
+            mesh = replace(
+                table,
+                pinion=replace(table.pinion, kind=pinion),
+                wheel=replace(table.wheel, kind=wheel),
+            )
         stiffness = static_mesh(mesh, pair_states(mesh, roll), force).stiffness
     return float(np.median(stiffness.reshape(-1, 32), axis=0).mean())
 

@@ -30,7 +30,9 @@ DOFS = (*PAIR_DOFS, *AXIAL_DOFS, "motor_rotation", "load_rotation")
 APPROACH_SIGN = (0.0, -1.0, 1.0, 0.0, 1.0, -1.0)
 # a prime: no tooth is looked at where the last one was, so that few places a tooth show all of its path
 FRICTION_PLACES = 509
-PINION_X, PINION_Y, PINION_ROTATION, WHEEL_X, WHEEL_Y, WHEEL_ROTATION = range(6)  # places in PAIR_DOFS
+PINION_X, PINION_Y, PINION_ROTATION, WHEEL_X, WHEEL_Y, WHEEL_ROTATION = range(
+    6
+)  # places in PAIR_DOFS
 PINION_Z, WHEEL_Z = 6, 9  # of helical gears, each with its tilts behind it
 
 
@@ -49,7 +51,10 @@ class Support:
     damping_tilt: float = unit("nms_per_rad", default=0.0)
 
     def __post_init__(self) -> None:
-        for name, suffixes in (("stiffness", ("n_per_m", "nm_per_rad")), ("damping", ("ns_per_m", "nms_per_rad"))):
+        for name, suffixes in (
+            ("stiffness", ("n_per_m", "nm_per_rad")),
+            ("damping", ("ns_per_m", "nms_per_rad")),
+        ):
             keys = [f"{name}_{axis}_{suffixes[axis == 'tilt']}" for axis in ("x", "y", "z", "tilt")]
             for key in keys:
                 value = getattr(self, split_unit(key)[0])
@@ -99,7 +104,9 @@ class Rotor:
         return 2.0 * self.coupling_damping_ratio * math.sqrt(self.coupling_stiffness * joined)
 
 
-def solid_disc(radius: float, bore_radius: float, width: float, density: float) -> tuple[float, float]:
+def solid_disc(
+    radius: float, bore_radius: float, width: float, density: float
+) -> tuple[float, float]:
     """Mass in kg and moment of inertia in kg m2 of a disc with a bore: for gears whose source prints none."""
     mass = density * math.pi * (radius**2 - bore_radius**2) * width
     return mass, 0.5 * mass * (radius**2 + bore_radius**2)
@@ -133,7 +140,11 @@ class PairDynamics:
             return
         for name, body in (("pinion", self.pinion), ("wheel", self.wheel)):
             support = body.support
-            if not (body.tilt_inertia > 0.0 and support.stiffness_z > 0.0 and support.stiffness_tilt > 0.0):
+            if not (
+                body.tilt_inertia > 0.0
+                and support.stiffness_z > 0.0
+                and support.stiffness_tilt > 0.0
+            ):
                 raise ConfigError(
                     f"gear.{name}: a helical pair needs support.stiffness_z_n_per_m = {support.stiffness_z:g}, "
                     f"stiffness_tilt_nm_per_rad = {support.stiffness_tilt:g} and the inertia of tilting "
@@ -166,7 +177,10 @@ class PairDynamics:
     def equivalent_mass(self) -> float:
         """Inertias of the two gears reduced to the line of action, kg."""
         pair = self.table.pair
-        return 1.0 / (pair.pinion.base_radius**2 / self.pinion.inertia + pair.wheel.base_radius**2 / self.wheel.inertia)
+        return 1.0 / (
+            pair.pinion.base_radius**2 / self.pinion.inertia
+            + pair.wheel.base_radius**2 / self.wheel.inertia
+        )
 
     @property
     def mesh_force(self) -> float:
@@ -230,19 +244,31 @@ class PairDynamics:
             stiffness[axes, axes] = held.stiffness_z, held.stiffness_tilt, held.stiffness_tilt
             damping[axes, axes] = held.damping_z, held.damping_tilt, held.damping_tilt
         driver, driven = self._ends
-        for rotor, place, gear in ((self.motor, driver, PINION_ROTATION), (self.load, driven, WHEEL_ROTATION)):
+        for rotor, place, gear in (
+            (self.motor, driver, PINION_ROTATION),
+            (self.load, driven, WHEEL_ROTATION),
+        ):
             if rotor is not None:
                 mass[place], rotation[place] = rotor.inertia, rotation[gear]
                 _couple(stiffness, place, gear, rotor.coupling_stiffness)
                 _couple(damping, place, gear, rotor.coupling_damping(mass[gear]))
         drive_stiffness, reduced = self.drive_stiffness, self.reduced_inertia
         stiffness[driver, driver] += drive_stiffness
-        damping[driver, driver] += 2.0 * self.operating.drive_damping_ratio * reduced * self._drive_rate
+        damping[driver, driver] += (
+            2.0 * self.operating.drive_damping_ratio * reduced * self._drive_rate
+        )
         force[driver] = self.operating.torque + self.friction_torque()
         if self.motor is not None:
             force[driver] += drive_stiffness * force[driver] / self.motor.coupling_stiffness
         force[driven] = -self.operating.torque * ratio
-        return LumpedSystem(names=dofs, mass=mass, stiffness=stiffness, damping=damping, force=force, rotation=rotation)
+        return LumpedSystem(
+            names=dofs,
+            mass=mass,
+            stiffness=stiffness,
+            damping=damping,
+            force=force,
+            rotation=rotation,
+        )
 
     def nominal(self, times: Array) -> Nominal:
         """Nominal motion of the pinion and share of the set torque at times in s, (time,)."""
@@ -251,7 +277,16 @@ class PairDynamics:
     def approach_direction(self) -> Array:
         """Gradient of the approach along the line of action, (dof,)."""
         direction = np.zeros(len(self.dofs))
-        radii = np.array([1.0, 1.0, self.table.pair.pinion.base_radius, 1.0, 1.0, self.table.pair.wheel.base_radius])
+        radii = np.array(
+            [
+                1.0,
+                1.0,
+                self.table.pair.pinion.base_radius,
+                1.0,
+                1.0,
+                self.table.pair.wheel.base_radius,
+            ]
+        )
         direction[: len(PAIR_DOFS)] = np.array(APPROACH_SIGN) * radii
         if self.is_helical:
             direction[len(PAIR_DOFS) : len(self.gear_dofs)] = axial_reach(self.table.pair)
@@ -265,7 +300,11 @@ class PairDynamics:
     @property
     def mesh_damping(self) -> float:
         """Damper along the line of action that the mesh's damping is on average, N s/m."""
-        return 2.0 * self.table.options.damping_ratio * math.sqrt(self.mean_mesh_stiffness * self.equivalent_mass)
+        return (
+            2.0
+            * self.table.options.damping_ratio
+            * math.sqrt(self.mean_mesh_stiffness * self.equivalent_mass)
+        )
 
     @cached_property
     def stiff_rates(self) -> NDArray[np.complex128]:
@@ -328,7 +367,9 @@ class PairDynamics:
         """Mean friction torque reduced to the pinion, from the static loads over one turn of the wheel, N m."""
         pair = self.table.pair
         places = (np.arange(FRICTION_PLACES) + 0.5) / FRICTION_PLACES
-        position, static = self._statics(pair.base_pitch * pair.wheel.n_teeth * places, self.mesh_force)
+        position, static = self._statics(
+            pair.base_pitch * pair.wheel.n_teeth * places, self.mesh_force
+        )
         return self.table.options.friction_coefficient * float(
             np.mean((static.load * loss_arm(self.table, position)).sum(axis=1))
         )
@@ -344,10 +385,15 @@ class PairDynamics:
         Under a nominal acceleration it is that of the accelerated machine; a ripple is too quick to be at rest with.
         """
         pair, system, (driver, driven) = self.table.pair, self.system(), self._ends
-        nominal, smooth = (one.nominal(np.array([time])) for one in (self.operating, self.operating.without_ripple))
+        nominal, smooth = (
+            one.nominal(np.array([time])) for one in (self.operating, self.operating.without_ripple)
+        )
         factor, acceleration = float(nominal.torque_factor[0]), float(smooth.acceleration[0])
         wheel_acceleration = acceleration / pair.ratio
-        force = factor * self.mesh_force + wheel_acceleration * self.driven_inertia / pair.wheel.base_radius
+        force = (
+            factor * self.mesh_force
+            + wheel_acceleration * self.driven_inertia / pair.wheel.base_radius
+        )
         start = np.zeros(len(system.mass))
         start[PINION_ROTATION] -= acceleration / self._drive_rate**2
         if self.motor is not None:
@@ -388,7 +434,14 @@ class PairDynamics:
     @property
     def _teeth(self) -> dict[str, Any]:
         """Which teeth meet, and their errors, as the statics ask for them."""
-        names = ("start_tooth_pinion", "start_tooth_wheel", "pinion_error", "wheel_error", "pinion_tilt", "wheel_tilt")
+        names = (
+            "start_tooth_pinion",
+            "start_tooth_wheel",
+            "pinion_error",
+            "wheel_error",
+            "pinion_tilt",
+            "wheel_tilt",
+        )
         return {name: getattr(self, name) for name in names}
 
 

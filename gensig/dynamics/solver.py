@@ -33,8 +33,12 @@ class Solver:
         if not 2 <= self.oversampling <= 256:
             raise ConfigError(f"solver.oversampling = {self.oversampling} must lie in 2..256")
         if self.precision not in PRECISIONS:
-            raise ConfigError(f"solver.precision = {self.precision!r}; allowed: {', '.join(PRECISIONS)}")
+            raise ConfigError(
+                f"solver.precision = {self.precision!r}; allowed: {', '.join(PRECISIONS)}"
+            )
         if self.max_error is not None and not 1e-6 <= self.max_error <= 1.0:
-            raise ConfigError(f"solver.max_error = {self.max_error:g} must lie in 1e-6..1, or be null")
+            raise ConfigError(
+                f"solver.max_error = {self.max_error:g} must lie in 1e-6..1, or be null"
+            )
         if self.backend not in BACKENDS:
             raise ConfigError(f"solver.backend = {self.backend!r}; allowed: {', '.join(BACKENDS)}")

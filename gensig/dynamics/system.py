@@ -37,10 +37,14 @@ class LumpedSystem:
             if not np.allclose(matrix, matrix.T, rtol=1e-12, atol=0.0):
                 raise SimulationError(f"the {what} matrix is not symmetric")
             if np.linalg.eigvalsh(matrix).min() < -1e-9 * max(1.0, float(np.abs(matrix).max())):
-                raise SimulationError(f"the {what} matrix would feed energy in; check the signs of the supports")
+                raise SimulationError(
+                    f"the {what} matrix would feed energy in; check the signs of the supports"
+                )
 
 
-def eigenvalues(system: LumpedSystem, direction: Array, mesh_stiffness: float) -> NDArray[np.complex128]:
+def eigenvalues(
+    system: LumpedSystem, direction: Array, mesh_stiffness: float
+) -> NDArray[np.complex128]:
     """Eigenvalues in 1/s of the system with its mesh held at one stiffness.
 
     ``direction`` (dof,) is the gradient of the approach.
@@ -48,7 +52,9 @@ def eigenvalues(system: LumpedSystem, direction: Array, mesh_stiffness: float) -
     n = len(system.mass)
     k = (system.stiffness + mesh_stiffness * np.outer(direction, direction)) / system.mass[:, None]
     c = system.damping / system.mass[:, None]
-    return np.linalg.eigvals(np.block([[np.zeros((n, n)), np.eye(n)], [-k, -c]])).astype(np.complex128)
+    return np.linalg.eigvals(np.block([[np.zeros((n, n)), np.eye(n)], [-k, -c]])).astype(
+        np.complex128
+    )
 
 
 def slowest_decay(system: LumpedSystem, direction: Array, mesh_stiffness: float) -> float:

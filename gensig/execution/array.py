@@ -36,6 +36,8 @@ class ArrayExecutor(Executor):
         """The shards of this task: what others have made meanwhile does not change them."""
         return [index for index in shard_indices if index % self.shard_count == self.shard_index]
 
-    def run(self, job: Callable[[int], T], shard_indices: Sequence[int]) -> Iterator[tuple[int, T | ShardFailure]]:
+    def run(
+        self, job: Callable[[int], T], shard_indices: Sequence[int]
+    ) -> Iterator[tuple[int, T | ShardFailure]]:
         """See ``Executor.run``."""
         yield from LocalExecutor(n_workers=self.n_workers).run(job, self.share(shard_indices))

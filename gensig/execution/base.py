@@ -13,7 +13,12 @@ from gensig.errors import ConfigError
 T = TypeVar("T")
 
 TRIES = 3  # times a shard is begun before the death of its worker is held against it
-THREAD_VARIABLES = ("OMP_NUM_THREADS", "OPENBLAS_NUM_THREADS", "MKL_NUM_THREADS", "NUMBA_NUM_THREADS")
+THREAD_VARIABLES = (
+    "OMP_NUM_THREADS",
+    "OPENBLAS_NUM_THREADS",
+    "MKL_NUM_THREADS",
+    "NUMBA_NUM_THREADS",
+)
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -34,7 +39,9 @@ class Executor(ABC):
     closes = True
 
     @abstractmethod
-    def run(self, job: Callable[[int], T], shard_indices: Sequence[int]) -> Iterator[tuple[int, T | ShardFailure]]:
+    def run(
+        self, job: Callable[[int], T], shard_indices: Sequence[int]
+    ) -> Iterator[tuple[int, T | ShardFailure]]:
         """Run ``job`` for the shards and yield each shard's number and result as they come.
 
         ``job`` must be picklable and safe to run twice. An exception that it raises is yielded as a failure and not
@@ -68,7 +75,11 @@ def one_line(error: BaseException) -> str:
 def read_n_workers(requested: Any) -> int:
     """Number of worker processes: as asked, else one a usable core."""
     if requested is None:
-        return len(os.sched_getaffinity(0)) if hasattr(os, "sched_getaffinity") else os.cpu_count() or 1
+        return (
+            len(os.sched_getaffinity(0))
+            if hasattr(os, "sched_getaffinity")
+            else os.cpu_count() or 1
+        )
     return whole_number("n_workers", requested, at_least=1)
 
 
@@ -76,5 +87,7 @@ def whole_number(key: str, value: Any, *, at_least: int) -> int:
     """Check a whole number among the keys of ``executor``."""
     if isinstance(value, bool) or not isinstance(value, int) or value < at_least:
         null = ", or null" if key == "n_workers" else ""
-        raise ConfigError(f"executor.{key} = {value!r} must be a whole number of at least {at_least}{null}")
+        raise ConfigError(
+            f"executor.{key} = {value!r} must be a whole number of at least {at_least}{null}"
+        )
     return value

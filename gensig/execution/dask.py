@@ -32,12 +32,18 @@ class DaskExecutor(Executor):
         """Shards that are made at a time on a cluster of this machine."""
         return self.n_workers
 
-    def run(self, job: Callable[[int], T], shard_indices: Sequence[int]) -> Iterator[tuple[int, T | ShardFailure]]:
+    def run(
+        self, job: Callable[[int], T], shard_indices: Sequence[int]
+    ) -> Iterator[tuple[int, T | ShardFailure]]:
         """See ``Executor.run``; the scheduler counts the tries, and one of your own counts as it is configured."""
         distributed = load_distributed()
         with self._client(distributed) as client:
-            futures = client.map(functools.partial(guarded, job), shard_indices, pure=False, retries=TRIES - 1)
-            numbers = {future.key: index for future, index in zip(futures, shard_indices, strict=True)}
+            futures = client.map(
+                functools.partial(guarded, job), shard_indices, pure=False, retries=TRIES - 1
+            )
+            numbers = {
+                future.key: index for future, index in zip(futures, shard_indices, strict=True)
+            }
             for future in distributed.as_completed(futures, loop=client.loop):
                 try:
                     result = future.result()
@@ -85,7 +91,9 @@ class DaskExecutor(Executor):
             many = {worker: n for worker, n in threads.items() if n != 1}
             if many:
                 worker, n = next(iter(many.items()))
-                raise ConfigError(f"the Dask worker {worker} has {n} threads; start each with --nthreads 1")
+                raise ConfigError(
+                    f"the Dask worker {worker} has {n} threads; start each with --nthreads 1"
+                )
             yield client
 
 

@@ -30,7 +30,9 @@ class LocalExecutor(Executor):
         """Shards that are made at a time."""
         return self.n_workers
 
-    def run(self, job: Callable[[int], T], shard_indices: Sequence[int]) -> Iterator[tuple[int, T | ShardFailure]]:
+    def run(
+        self, job: Callable[[int], T], shard_indices: Sequence[int]
+    ) -> Iterator[tuple[int, T | ShardFailure]]:
         """See ``Executor.run``."""
         if self.n_workers == 1 or len(shard_indices) <= 1:
             for index in shard_indices:

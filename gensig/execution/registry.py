@@ -19,7 +19,9 @@ def _local(section: Section) -> Executor:
 def _dask(section: Section) -> Executor:
     address = section["address"]
     if address is not None and not isinstance(address, str):
-        raise ConfigError(f"executor.address = {address!r} must be text such as tcp://10.0.0.1:8786, or null")
+        raise ConfigError(
+            f"executor.address = {address!r} must be text such as tcp://10.0.0.1:8786, or null"
+        )
     return DaskExecutor(n_workers=read_n_workers(section["n_workers"]), address=address)
 
 
@@ -37,7 +39,11 @@ def _slurm(section: Section) -> Executor:
     )
 
 
-EXECUTORS: dict[str, Callable[[Section], Executor]] = {"local": _local, "dask": _dask, "slurm": _slurm}
+EXECUTORS: dict[str, Callable[[Section], Executor]] = {
+    "local": _local,
+    "dask": _dask,
+    "slurm": _slurm,
+}
 
 
 def read_executor(section: Section) -> Executor:

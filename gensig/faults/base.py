@@ -49,11 +49,17 @@ class Fault(ABC):
         if self.gear not in SIDES:
             raise FaultError(f"fault.gear = {self.gear!r}; allowed: {', '.join(SIDES)}")
         if isinstance(self.tooth, str) and self.tooth != ALL:
-            raise FaultError(f"fault.tooth = {self.tooth!r}; give a number, a list of numbers, or {ALL}")
+            raise FaultError(
+                f"fault.tooth = {self.tooth!r}; give a number, a list of numbers, or {ALL}"
+            )
         if isinstance(self.tooth, tuple) and not 0 < len(set(self.tooth)) == len(self.tooth):
-            raise FaultError(f"fault.tooth = {list(self.tooth)} must name one tooth or more, each once")
+            raise FaultError(
+                f"fault.tooth = {list(self.tooth)} must name one tooth or more, each once"
+            )
         if self.first_tooth < 0 and self.tooth != ALL:
-            raise FaultError(f"fault.tooth = {self.first_tooth} must be at least 0 (teeth are counted from 0)")
+            raise FaultError(
+                f"fault.tooth = {self.first_tooth} must be at least 0 (teeth are counted from 0)"
+            )
 
     @property
     def first_tooth(self) -> int:

@@ -83,7 +83,12 @@ class ChippedTooth(Fault):
     def __post_init__(self) -> None:
         Fault.__post_init__(self)
         require_not_negative(self, "chip_height_mm", "chip_width_mm")
-        require(self, "chip_shape", self.chip_shape in CHIP_SHAPES, f"is none of {', '.join(CHIP_SHAPES)}")
+        require(
+            self,
+            "chip_shape",
+            self.chip_shape in CHIP_SHAPES,
+            f"is none of {', '.join(CHIP_SHAPES)}",
+        )
 
     def severity(self, gear: Gear) -> float:
         """Broken share of height times width."""

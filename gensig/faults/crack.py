@@ -49,7 +49,9 @@ class Crack(Fault):
         # slots make a new class, so the zero-argument super() would look at the old one
         Fault.__post_init__(self)
         require_not_negative(self, "crack_depth_mm")
-        require(self, "crack_angle_deg", 0.0 < self.crack_angle <= 0.5 * math.pi, "must lie in 0..90")
+        require(
+            self, "crack_angle_deg", 0.0 < self.crack_angle <= 0.5 * math.pi, "must lie in 0..90"
+        )
         for key, allowed in (
             ("crack_start", CRACK_STARTS),
             ("crack_front", CRACK_FRONTS),
@@ -57,7 +59,9 @@ class Crack(Fault):
             ("crack_faces", CRACK_FACES),
         ):
             if getattr(self, key) not in allowed:
-                raise FaultError(f"fault.{key} = {getattr(self, key)!r}; allowed: {', '.join(allowed)}")
+                raise FaultError(
+                    f"fault.{key} = {getattr(self, key)!r}; allowed: {', '.join(allowed)}"
+                )
 
     def root_chord(self, gear: Gear) -> float:
         """Thickness of the sound tooth where the crack starts, m."""

@@ -108,7 +108,12 @@ class Runout(FlankForm):
     def __post_init__(self) -> None:
         FlankForm.__post_init__(self)
         require_not_negative(self, "eccentricity_um")
-        require(self, "tooth", isinstance(self.tooth, int), "must be the one tooth that stands back most")
+        require(
+            self,
+            "tooth",
+            isinstance(self.tooth, int),
+            "must be the one tooth that stands back most",
+        )
 
     def teeth(self, gear: Gear) -> tuple[int, ...]:
         """All of them."""
@@ -128,7 +133,9 @@ class Runout(FlankForm):
             return tooth
         assert isinstance(self.tooth, int)
         gear = tooth.gear
-        roll = tooth.profile.curvature_radius / gear.base_radius - np.tan(gear.transverse_pressure_angle)
+        roll = tooth.profile.curvature_radius / gear.base_radius - np.tan(
+            gear.transverse_pressure_angle
+        )
         turn = 2.0 * np.pi / gear.n_teeth * (number - self.tooth)
         angle = roll + (turn if self.gear == "pinion" else -turn)
         return tooth.with_deviation(self.eccentricity * np.cos(angle))
@@ -176,7 +183,9 @@ class Wear(FlankForm):
         require_not_negative(self, "wear_depth_um")
         given = self.wear_profile
         rule = "must hold two depths or more, none negative"
-        require(self, "wear_profile", given is None or (len(given) >= 2 and min(given) >= 0.0), rule)
+        require(
+            self, "wear_profile", given is None or (len(given) >= 2 and min(given) >= 0.0), rule
+        )
 
     def size(self) -> float:
         """The greatest depth."""
@@ -204,7 +213,12 @@ class TipRelief(FlankForm):
     def __post_init__(self) -> None:
         FlankForm.__post_init__(self)
         require_not_negative(self, "relief_um", "relief_length_mm")
-        require(self, "relief_curve", self.relief_curve in RELIEF_CURVES, f"is none of {', '.join(RELIEF_CURVES)}")
+        require(
+            self,
+            "relief_curve",
+            self.relief_curve in RELIEF_CURVES,
+            f"is none of {', '.join(RELIEF_CURVES)}",
+        )
 
     def size(self) -> float:
         """The relief at the tip, none without length."""
@@ -219,7 +233,9 @@ class TipRelief(FlankForm):
         rule = f"must not be above {span * 1e3:.4g} mm, the involute of the {self.gear}"
         require(self, "relief_length_mm", self.relief_length <= span, rule)
         share = np.maximum(1.0 - (curvature[-1] - curvature) / self.relief_length, 0.0)
-        return tooth.with_deviation(self.relief * (share if self.relief_curve == "linear" else share**2))
+        return tooth.with_deviation(
+            self.relief * (share if self.relief_curve == "linear" else share**2)
+        )
 
 
 def _share(tooth: Tooth) -> Array:

@@ -92,7 +92,11 @@ class Spalling(Fault):
     def severity(self, gear: Gear) -> float:
         """Spalled share of the flank."""
         share = 0.25 * math.pi if self.spall_shape == "elliptic" else 1.0
-        return 0.0 if self.spall_depth == 0.0 else share * self.spall_length * self.spall_width / flank_area(gear)
+        return (
+            0.0
+            if self.spall_depth == 0.0
+            else share * self.spall_length * self.spall_width / flank_area(gear)
+        )
 
     def on_other_flank(self) -> None:
         """None: a spall is in one flank."""
@@ -111,7 +115,11 @@ class Spalling(Fault):
 
 
 def _patch(
-    gear: Gear, shape: str, size: tuple[float, float, float], position: float | None, face_position: float | None
+    gear: Gear,
+    shape: str,
+    size: tuple[float, float, float],
+    position: float | None,
+    face_position: float | None,
 ) -> Patch:
     return Patch(
         shape=shape,
@@ -176,7 +184,9 @@ class DistributedPitting(Fault):
             return tooth
         gear = tooth.gear
         sliced = tooth.split(np.linspace(0.0, gear.face_width, N_SLICES + 1))
-        rng = np.random.Generator(np.random.Philox(np.random.SeedSequence(self.pit_seed, spawn_key=(number,))))
+        rng = np.random.Generator(
+            np.random.Philox(np.random.SeedSequence(self.pit_seed, spawn_key=(number,)))
+        )
         low, high = flank_ends(gear)
         flank = sliced.profile.abscissa[sliced.profile.n_root_cells :]
         cell_area = np.outer(sliced.slice_width, np.gradient(flank)) / flank_area(gear)

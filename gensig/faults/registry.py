@@ -31,11 +31,17 @@ def fault_parts(values: Mapping[str, Any], where: str = "fault") -> list[Mapping
     if kind != COMPOUND:
         return [values]
     parts = values.get("parts")
-    if not isinstance(parts, list | tuple) or not parts or not all(isinstance(part, Mapping) for part in parts):
+    if (
+        not isinstance(parts, list | tuple)
+        or not parts
+        or not all(isinstance(part, Mapping) for part in parts)
+    ):
         raise FaultError(f"{where}.parts = {parts!r} must be a list of faults, each with its kind")
     unknown = sorted(set(values) - {"kind", "parts", "vary"})
     if unknown:
-        raise FaultError(f"{where}: unknown key '{unknown[0]}'; a compound fault has parts, each with its own keys")
+        raise FaultError(
+            f"{where}: unknown key '{unknown[0]}'; a compound fault has parts, each with its own keys"
+        )
     return list(parts)
 
 

@@ -48,7 +48,9 @@ class GearPair:
         if self.backlash < 0.0:
             raise GeometryError(f"gear.backlash_um = {self.backlash * 1e6:g} must not be negative")
         if self.path_of_contact <= 0.0:
-            raise GeometryError("pinion and wheel never touch on the line of action; check teeth and profile shifts")
+            raise GeometryError(
+                "pinion and wheel never touch on the line of action; check teeth and profile shifts"
+            )
         for gear, lowest in (
             (self.pinion, self.start_curvature_radius),
             (self.wheel, self.wheel_curvature(self.path_of_contact)),
@@ -108,17 +110,23 @@ class GearPair:
         alpha = self.pinion.transverse_pressure_angle
         if shift == 0.0:
             return alpha
-        return inverse_involute(involute(alpha) + 2.0 * shift * math.tan(self.pinion.pressure_angle) / teeth)
+        return inverse_involute(
+            involute(alpha) + 2.0 * shift * math.tan(self.pinion.pressure_angle) / teeth
+        )
 
     @property
     def center_distance(self) -> float:
         """Working centre distance, m."""
-        return (self.pinion.base_radius + self.wheel.base_radius) / math.cos(self.working_pressure_angle)
+        return (self.pinion.base_radius + self.wheel.base_radius) / math.cos(
+            self.working_pressure_angle
+        )
 
     @property
     def tangent_length(self) -> float:
         """Length N1N2 between the tangent points on the base circles, m."""
-        return (self.pinion.base_radius + self.wheel.base_radius) * math.tan(self.working_pressure_angle)
+        return (self.pinion.base_radius + self.wheel.base_radius) * math.tan(
+            self.working_pressure_angle
+        )
 
     @property
     def start_curvature_radius(self) -> float:
@@ -153,7 +161,11 @@ class GearPair:
     @property
     def overlap_ratio(self) -> float:
         """Overlap ratio eps_beta = b sin(beta) / (pi m_n)."""
-        return self.face_width * math.sin(abs(self.pinion.helix_angle)) / (math.pi * self.pinion.normal_module)
+        return (
+            self.face_width
+            * math.sin(abs(self.pinion.helix_angle))
+            / (math.pi * self.pinion.normal_module)
+        )
 
     @property
     def total_contact_ratio(self) -> float:
@@ -163,7 +175,10 @@ class GearPair:
     @property
     def pitch_point(self) -> float:
         """Position s of the pitch point C, m."""
-        return self.pinion.base_radius * math.tan(self.working_pressure_angle) - self.start_curvature_radius
+        return (
+            self.pinion.base_radius * math.tan(self.working_pressure_angle)
+            - self.start_curvature_radius
+        )
 
     def pinion_curvature(self, position: Array | float) -> Array | float:
         """Curvature radius of the pinion's flank at positions s, m."""
@@ -226,19 +241,27 @@ def _pinion_tip_gap(pair: GearPair, position: Array) -> Array:
     roll_tip = pair.end_curvature_radius / r_p
     polar = (pair.start_curvature_radius + position) / r_p - roll_tip + math.atan(roll_tip) - alpha
     x, y = pair.center_distance - radius * np.cos(polar), radius * np.sin(polar)
-    return r_g * _flank_lead(np.hypot(x, y), np.arctan2(y, x), r_g, alpha, np.asarray(pair.wheel_curvature(position)))
+    return r_g * _flank_lead(
+        np.hypot(x, y), np.arctan2(y, x), r_g, alpha, np.asarray(pair.wheel_curvature(position))
+    )
 
 
 def _wheel_tip_gap(pair: GearPair, position: Array) -> Array:
     alpha, radius = pair.working_pressure_angle, pair.wheel.tip_radius
     r_p, r_g = pair.pinion.base_radius, pair.wheel.base_radius
     roll_tip = math.sqrt(radius**2 - r_g**2) / r_g
-    polar = alpha - np.asarray(pair.wheel_curvature(position)) / r_g + roll_tip - math.atan(roll_tip)
+    polar = (
+        alpha - np.asarray(pair.wheel_curvature(position)) / r_g + roll_tip - math.atan(roll_tip)
+    )
     x, y = pair.center_distance - radius * np.cos(polar), radius * np.sin(polar)
-    return r_p * _flank_lead(np.hypot(x, y), -np.arctan2(y, x), r_p, alpha, np.asarray(pair.pinion_curvature(position)))
+    return r_p * _flank_lead(
+        np.hypot(x, y), -np.arctan2(y, x), r_p, alpha, np.asarray(pair.pinion_curvature(position))
+    )
 
 
-def _flank_lead(radius: Array, polar: Array, base_radius: float, alpha: float, curvature: Array) -> Array:
+def _flank_lead(
+    radius: Array, polar: Array, base_radius: float, alpha: float, curvature: Array
+) -> Array:
     """Angle by which a flank with the given nominal curvature radius leads a corner at (radius, polar).
 
     Both angles are measured from the line of centres towards the flank's tangent point.

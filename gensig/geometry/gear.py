@@ -85,7 +85,9 @@ class Gear:
                 f"-{LARGEST_HELIX:g} and {LARGEST_HELIX:g}"
             )
         if not 0.0 <= self.clearance_coefficient <= 1.0:
-            raise GeometryError(f"{self.name}: clearance_coefficient = {self.clearance_coefficient:g} must lie in 0..1")
+            raise GeometryError(
+                f"{self.name}: clearance_coefficient = {self.clearance_coefficient:g} must lie in 0..1"
+            )
         rounding = self.cutter_tip_radius_coefficient
         room = self.clearance_coefficient / (1.0 - math.sin(self.transverse_pressure_angle))
         if not 0.0 < rounding <= room * 1.001:
@@ -124,7 +126,10 @@ class Gear:
     @property
     def tip_radius(self) -> float:
         """Tip radius r_a, without tip shortening."""
-        return self.pitch_radius + (self.addendum_coefficient + self.profile_shift) * self.normal_module
+        return (
+            self.pitch_radius
+            + (self.addendum_coefficient + self.profile_shift) * self.normal_module
+        )
 
     @property
     def root_radius(self) -> float:
@@ -181,7 +186,9 @@ class Gear:
     @property
     def straight_flank_depth(self) -> float:
         """Depth below the pitch line at which the rack's straight flank ends, m."""
-        return self.rounding_center_depth + self.cutter_tip_radius * math.sin(self.transverse_pressure_angle)
+        return self.rounding_center_depth + self.cutter_tip_radius * math.sin(
+            self.transverse_pressure_angle
+        )
 
     @property
     def junction_curvature_radius(self) -> float:

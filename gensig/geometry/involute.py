@@ -19,7 +19,9 @@ def inverse_involute(value: float) -> float:
     """
     upper = math.radians(80.0)
     if not 0.0 <= value <= involute(upper):
-        raise GeometryError(f"no pressure angle has the involute {value:.6g}; check the profile shifts")
+        raise GeometryError(
+            f"no pressure angle has the involute {value:.6g}; check the profile shifts"
+        )
     angle, before = min(math.cbrt(3.0 * value), upper), math.inf
     while 0.0 < angle < before:
         angle, before = angle - (involute(angle) - value) / math.tan(angle) ** 2, angle

@@ -116,7 +116,13 @@ def _sound_tooth(gear: Gear) -> Tooth:
 def _tooth_on(profile: ToothProfile) -> Tooth:
     nothing = np.zeros((1, len(profile.curvature_radius)))
     edges = np.array([0.0, profile.gear.face_width])
-    for array in (nothing, edges, profile.abscissa, profile.half_thickness, profile.curvature_radius):
+    for array in (
+        nothing,
+        edges,
+        profile.abscissa,
+        profile.half_thickness,
+        profile.curvature_radius,
+    ):
         array.flags.writeable = False
     return Tooth(
         profile=profile,

@@ -34,7 +34,9 @@ def root_curve(gear: Gear, gamma: Array) -> tuple[Array, Array]:
     r = gear.pitch_radius
     phi = (a1 / np.tan(gamma) + b1) / r
     reach = a1 / np.sin(gamma) + gear.cutter_tip_radius
-    return r * np.cos(phi) - reach * np.sin(gamma - phi), r * np.sin(phi) - reach * np.cos(gamma - phi)
+    return r * np.cos(phi) - reach * np.sin(gamma - phi), r * np.sin(phi) - reach * np.cos(
+        gamma - phi
+    )
 
 
 def involute_point(gear: Gear, curvature_radius: Array) -> tuple[Array, Array]:
@@ -69,7 +71,9 @@ N_ROOT_CELLS = 256
 N_FLANK_CELLS = 384
 
 
-def tooth_profile(gear: Gear, *, n_root_cells: int = N_ROOT_CELLS, n_flank_cells: int = N_FLANK_CELLS) -> ToothProfile:
+def tooth_profile(
+    gear: Gear, *, n_root_cells: int = N_ROOT_CELLS, n_flank_cells: int = N_FLANK_CELLS
+) -> ToothProfile:
     """Sample the outline: cells uniform in gamma on the root curve, in curvature radius on the involute."""
     gamma = np.linspace(0.5 * np.pi, gear.transverse_pressure_angle, n_root_cells + 1)
     tip = np.sqrt(gear.tip_radius**2 - gear.base_radius**2)
@@ -115,5 +119,7 @@ def root_curve_slope(gear: Gear, where: str) -> float:
     gamma - phi to the tooth's thickness direction.
     """
     gamma = root_curve_middle(gear, where)
-    phi = (gear.rounding_center_depth / np.tan(gamma) + gear.rounding_center_offset) / gear.pitch_radius
+    phi = (
+        gear.rounding_center_depth / np.tan(gamma) + gear.rounding_center_offset
+    ) / gear.pitch_radius
     return float(gamma - phi)

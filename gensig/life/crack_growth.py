@@ -45,12 +45,18 @@ class CrackGrowthOptions(GrowthOptions):
     start_scatter: float
 
     def __post_init__(self) -> None:
-        for key, low, high in (("coefficient", 0.0, 1e-6), ("exponent", 0.5, 10.0), ("threshold", -1e-9, 1e9)):
+        for key, low, high in (
+            ("coefficient", 0.0, 1e-6),
+            ("exponent", 0.5, 10.0),
+            ("threshold", -1e-9, 1e9),
+        ):
             if not low < getattr(self, key) <= high:
                 allowed = "must not be negative" if low < 0.0 else f"must lie above 0, to {high:g}"
                 raise ConfigError(f"life.crack.{key} = {getattr(self, key):g}: it {allowed}")
         if not 0.0 < self.width_share <= 1.0:
-            raise ConfigError(f"life.crack.width_share = {self.width_share:g} must lie above 0, to 1")
+            raise ConfigError(
+                f"life.crack.width_share = {self.width_share:g} must lie above 0, to 1"
+            )
         if self.end_share > DEEPEST:
             raise ConfigError(
                 f"life.crack.end_share = {self.end_share:g}: cracks are known up to {DEEPEST:g} of the root chord"
@@ -126,7 +132,9 @@ class CrackGrowth(GrowthLaw):
         return (row + 1 - place) * self.intensity[row] + (place - row) * self.intensity[row + 1]
 
 
-def crack_growth(pair: GearPair, material: Material, crack: Crack, options: CrackGrowthOptions) -> CrackGrowth:
+def crack_growth(
+    pair: GearPair, material: Material, crack: Crack, options: CrackGrowthOptions
+) -> CrackGrowth:
     """The law of a crack like ``crack``, of which depth, width and front are left aside.
 
     The stress intensity follows Irwin's K^2 = E' G, plane strain, with the energy release rate of the loaded tooth,
@@ -154,7 +162,9 @@ def crack_growth(pair: GearPair, material: Material, crack: Crack, options: Crac
     sizes = crack_depths(options, chord)
 
     def compliance(depth: float, width: float | None) -> Array:
-        cut = replace(crack, crack_depth=depth, crack_width=width, crack_front="straight").apply(tooth, 0)
+        cut = replace(crack, crack_depth=depth, crack_width=width, crack_front="straight").apply(
+            tooth, 0
+        )
         return crack_compliance(cut, curvature, strain, allow_extrapolation=True)
 
     if options.width_share == 1.0:
@@ -180,12 +190,16 @@ def crack_growth(pair: GearPair, material: Material, crack: Crack, options: Crac
 def require_open(crack: Crack) -> None:
     """Refuse a crack that no load opens."""
     if crack.crack_side == "compression":
-        raise ConfigError("life: a crack under compression does not open, so it does not grow; crack_side=tension")
+        raise ConfigError(
+            "life: a crack under compression does not open, so it does not grow; crack_side=tension"
+        )
 
 
 def crack_depths(options: CrackGrowthOptions, chord: float) -> Array:
     """Depths at which rates are looked at, from the least first one to the end, (node,) m."""
-    return np.geomspace(options.start_share / options.most * chord, options.end_share * chord, N_DEPTHS)
+    return np.geomspace(
+        options.start_share / options.most * chord, options.end_share * chord, N_DEPTHS
+    )
 
 
 def _slope(depth: Array, values: Array) -> Array:
@@ -195,13 +209,17 @@ def _slope(depth: Array, values: Array) -> Array:
     return np.asarray(CubicSpline(np.log(depth), values, axis=0)(np.log(depth), 1)) / depth[:, None]
 
 
-def _part_of_face(sizes: Array, face: float, options: CrackGrowthOptions, compliance: Any) -> tuple[Array, Array]:
+def _part_of_face(
+    sizes: Array, face: float, options: CrackGrowthOptions, compliance: Any
+) -> tuple[Array, Array]:
     """Width that goes with each depth, (node,) m, and the greatest energy release rate at 1 N, (node,) N/m."""
     from scipy.interpolate import RectBivariateSpline
 
     depths, widths = sizes[::WIDTH_STEP], crack_widths(face, options)
     table = np.array([[compliance(float(a), float(w)) for w in widths] for a in depths])
-    splines = [RectBivariateSpline(np.log(depths), widths, table[:, :, k]) for k in range(table.shape[2])]
+    splines = [
+        RectBivariateSpline(np.log(depths), widths, table[:, :, k]) for k in range(table.shape[2])
+    ]
 
     def release(depth: float, width: float) -> tuple[float, float]:
         place = (math.log(depth), width)

@@ -23,7 +23,9 @@ class Drift:
 
     def __post_init__(self) -> None:
         if not -1.0 < self.change <= 100.0:
-            raise ConfigError(f"life.drift: change = {self.change:g} must lie in -1..100, -1 excluded")
+            raise ConfigError(
+                f"life.drift: change = {self.change:g} must lie in -1..100, -1 excluded"
+            )
         if not self.time > 0.0:
             raise ConfigError(f"life.drift: time_h = {self.time / 3600.0:g} must be positive")
         if not 0.0 <= self.scatter <= 2.0:

@@ -58,7 +58,10 @@ class GrowthLaw(ABC):
         """
         middle, width = 0.5 * (self.sizes[1:] + self.sizes[:-1]), np.diff(self.sizes)
         rates = np.array(
-            [np.mean([self.rate(middle, float(one)) for one in np.atleast_1d(row)], axis=0) for row in torque]
+            [
+                np.mean([self.rate(middle, float(one)) for one in np.atleast_1d(row)], axis=0)
+                for row in torque
+            ]
         )
         return np.divide(width, rates, out=np.full_like(rates, np.inf), where=rates > 0.0)
 
@@ -117,7 +120,9 @@ def grow(sizes: Array, turns: Array, history: History, start: float) -> Course:
     size, running, turned = start, 0.0, 0.0
     knots: list[tuple[float, float, float, float, int, bool]] = []
     failed = False
-    blocks = zip(history.begin.tolist(), history.end.tolist(), history.setpoint.tolist(), strict=True)
+    blocks = zip(
+        history.begin.tolist(), history.end.tolist(), history.setpoint.tolist(), strict=True
+    )
     for begin, end, setpoint in blocks:
         seconds_a_turn = 2.0 * math.pi / float(history.speed[setpoint])
         clock, left = begin, (end - begin) / seconds_a_turn

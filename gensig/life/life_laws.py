@@ -45,10 +45,14 @@ def life_map(case: WearCase, torques: Sequence[float], speeds: Sequence[float]) 
     """
     for name, values in (("torques", torques), ("speeds", speeds)):
         if len(set(values)) < 2 or not min(values) > 0.0:
-            raise ConfigError(f"a map needs two {name} or more, all positive; {len(set(values))} different given")
+            raise ConfigError(
+                f"a map needs two {name} or more, all positive; {len(set(values))} different given"
+            )
     torque = np.unique(np.asarray(torques, dtype=np.float64))
     turns = np.array([_life_under(case, float(one)) for one in torque])
-    return LifeMap(torque=torque, speed=np.unique(np.asarray(speeds, dtype=np.float64)), turns=turns)
+    return LifeMap(
+        torque=torque, speed=np.unique(np.asarray(speeds, dtype=np.float64)), turns=turns
+    )
 
 
 def _life_under(case: WearCase, torque: float) -> float:
@@ -60,7 +64,10 @@ def _life_under(case: WearCase, torque: float) -> float:
 
 def torque_exponent(case: WearCase) -> float:
     """Local exponent n of life ~ T^-n at the case's torque."""
-    low, high = (wear_life(case.under(case.torque * (1.0 + step))).life for step in (-EXPONENT_STEP, EXPONENT_STEP))
+    low, high = (
+        wear_life(case.under(case.torque * (1.0 + step))).life
+        for step in (-EXPONENT_STEP, EXPONENT_STEP)
+    )
     return -math.log(high / low) / math.log((1.0 + EXPONENT_STEP) / (1.0 - EXPONENT_STEP))
 
 
@@ -97,7 +104,10 @@ class FittedLaw:
         ExtrapolationError    beyond the fitted range, unless allowed
         SimulationError       where the formula gives no life at all, which it may even inside its range
         """
-        for name, value, (low, high) in (("torque", torque, self.torque), ("speed", speed, self.speed)):
+        for name, value, (low, high) in (
+            ("torque", torque, self.torque),
+            ("speed", speed, self.speed),
+        ):
             if not low * (1.0 - 1e-9) <= value <= high * (1.0 + 1e-9) and not allow_extrapolation:
                 unit = "N m" if name == "torque" else "rad/s"
                 raise ExtrapolationError(
@@ -140,19 +150,44 @@ def fitted_laws(lives: LifeMap, torque: float, speed: float) -> tuple[FittedLaw,
     at = {"torque": (lives.torque[at_torque],) * 2, "speed": (lives.speed[at_speed],) * 2}
     return (
         _law("power", (math.exp(constant), by_torque, by_speed), spans, lives, values),
-        _law("logarithm", (level, -slope, 0.0), spans | {"speed": at["speed"]}, lives, values[:, at_speed, None]),
-        _law("exponential", (math.exp(start), -decay, 0.0), spans | {"torque": at["torque"]}, lives, values[at_torque]),
+        _law(
+            "logarithm",
+            (level, -slope, 0.0),
+            spans | {"speed": at["speed"]},
+            lives,
+            values[:, at_speed, None],
+        ),
+        _law(
+            "exponential",
+            (math.exp(start), -decay, 0.0),
+            spans | {"torque": at["torque"]},
+            lives,
+            values[at_torque],
+        ),
     )
 
 
 def _law(
-    form: str, numbers: tuple[float, float, float], spans: dict[str, tuple[float, float]], lives: LifeMap, values: Array
+    form: str,
+    numbers: tuple[float, float, float],
+    spans: dict[str, tuple[float, float]],
+    lives: LifeMap,
+    values: Array,
 ) -> FittedLaw:
     a, b, c = (float(number) for number in numbers)
-    law = FittedLaw(form=form, a=a, b=b, c=c, largest_error=0.0, torque=spans["torque"], speed=spans["speed"])
+    law = FittedLaw(
+        form=form, a=a, b=b, c=c, largest_error=0.0, torque=spans["torque"], speed=spans["speed"]
+    )
     found = law.formula(lives.torque[:, None], lives.speed)
-    error = np.max(np.abs(np.broadcast_to(found, np.broadcast_shapes(np.shape(found), values.shape)) / values - 1.0))
-    return FittedLaw(form=form, a=a, b=b, c=c, largest_error=float(error), torque=law.torque, speed=law.speed)
+    error = np.max(
+        np.abs(
+            np.broadcast_to(found, np.broadcast_shapes(np.shape(found), values.shape)) / values
+            - 1.0
+        )
+    )
+    return FittedLaw(
+        form=form, a=a, b=b, c=c, largest_error=float(error), torque=law.torque, speed=law.speed
+    )
 
 
 def _span(values: Array) -> tuple[float, float]:

@@ -77,10 +77,16 @@ class LifeOptions:
         if not self.horizon > 0.0:
             raise ConfigError(f"life.horizon_h = {self.horizon / 3600.0:g} must be positive")
         if self.snapshot_count < 3:
-            raise ConfigError(f"life.snapshot_count = {self.snapshot_count}: a life needs 3 snapshots or more")
+            raise ConfigError(
+                f"life.snapshot_count = {self.snapshot_count}: a life needs 3 snapshots or more"
+            )
         if self.snapshot_spacing not in SPACINGS:
-            raise ConfigError(f"life.snapshot_spacing = {self.snapshot_spacing!r}; allowed: {', '.join(SPACINGS)}")
-        if self.snapshot_every is not None and not (self.snapshot_every > 0.0 and self.snapshot_spacing == "linear"):
+            raise ConfigError(
+                f"life.snapshot_spacing = {self.snapshot_spacing!r}; allowed: {', '.join(SPACINGS)}"
+            )
+        if self.snapshot_every is not None and not (
+            self.snapshot_every > 0.0 and self.snapshot_spacing == "linear"
+        ):
             raise ConfigError(
                 f"life.snapshot_every_h = {self.snapshot_every / 3600.0:g} must be positive, and goes with "
                 f"life.snapshot_spacing=linear only"
@@ -154,5 +160,9 @@ def _blocks(rows: Any) -> tuple[tuple[float, ...], ...] | None:
         if not isinstance(row, list | tuple) or len(row) != len(BLOCK_COLUMNS):
             raise ConfigError(f"life.blocks.{place} = {row!r}: life.blocks must be {shape}")
         numbers = zip(BLOCK_COLUMNS, row, strict=True)
-        found.append(tuple(to_si(key, _number(f"life.blocks.{place}.{key}", value)) for key, value in numbers))
+        found.append(
+            tuple(
+                to_si(key, _number(f"life.blocks.{place}.{key}", value)) for key, value in numbers
+            )
+        )
     return tuple(found)

@@ -32,12 +32,22 @@ class History:
     torque: Array
 
     def __post_init__(self) -> None:
-        if not len(self.begin) or (self.end <= self.begin).any() or (self.begin[1:] < self.end[:-1]).any():
-            raise ConfigError("a history needs blocks that end after they begin and do not overlap, in order of time")
+        if (
+            not len(self.begin)
+            or (self.end <= self.begin).any()
+            or (self.begin[1:] < self.end[:-1]).any()
+        ):
+            raise ConfigError(
+                "a history needs blocks that end after they begin and do not overlap, in order of time"
+            )
         if self.begin[0] < 0.0:
-            raise ConfigError(f"a history begins at {self.begin[0] / 3600.0:g} h; times count from 0, the new machine")
+            raise ConfigError(
+                f"a history begins at {self.begin[0] / 3600.0:g} h; times count from 0, the new machine"
+            )
         if not (self.speed > 0.0).all() or not (self.torque > 0.0).all():
-            raise ConfigError("the speeds and torques of a history must be positive; a standstill is a gap")
+            raise ConfigError(
+                "the speeds and torques of a history must be positive; a standstill is a gap"
+            )
 
     @property
     def running(self) -> Array:
@@ -77,7 +87,9 @@ class DrawnBlocks:
             raise ConfigError(f"life.gap_chance = {self.gap_chance:g} must lie in 0..1, 1 excluded")
 
 
-def draw_history(blocks: DrawnBlocks, speed: Array, torque: Array, horizon: float, rng: np.random.Generator) -> History:
+def draw_history(
+    blocks: DrawnBlocks, speed: Array, torque: Array, horizon: float, rng: np.random.Generator
+) -> History:
     """Blocks at set-points drawn with equal chance, up to the horizon in s of clock time, where the last is cut.
 
     Raises
@@ -92,13 +104,17 @@ def draw_history(blocks: DrawnBlocks, speed: Array, torque: Array, horizon: floa
         )
     lengths = rng.uniform(blocks.shortest, blocks.longest, most)
     gaps = np.where(
-        rng.random(most) < blocks.gap_chance, rng.uniform(blocks.gap_shortest, blocks.gap_longest, most), 0.0
+        rng.random(most) < blocks.gap_chance,
+        rng.uniform(blocks.gap_shortest, blocks.gap_longest, most),
+        0.0,
     )
     setpoint = rng.integers(len(speed), size=most)
     begin = np.concatenate([[0.0], np.cumsum(lengths + gaps)[:-1]])
     kept = begin < horizon
     end = np.minimum(begin + lengths, horizon)
-    return History(begin=begin[kept], end=end[kept], setpoint=setpoint[kept], speed=speed, torque=torque)
+    return History(
+        begin=begin[kept], end=end[kept], setpoint=setpoint[kept], speed=speed, torque=torque
+    )
 
 
 def given_history(rows: tuple[tuple[float, ...], ...], horizon: float) -> History:
@@ -113,7 +129,11 @@ def given_history(rows: tuple[tuple[float, ...], ...], horizon: float) -> Histor
     kept = table[:, 0] < horizon
     # checked whole: a mistake behind the horizon is one too
     whole = History(
-        begin=table[:, 0], end=table[:, 1], setpoint=setpoint.ravel(), speed=points[:, 0], torque=points[:, 1]
+        begin=table[:, 0],
+        end=table[:, 1],
+        setpoint=setpoint.ravel(),
+        speed=points[:, 0],
+        torque=points[:, 1],
     )
     if not kept.any():
         raise ConfigError(f"life.blocks: none begins before life.horizon_h = {horizon / 3600.0:g}")

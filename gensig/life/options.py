@@ -70,11 +70,19 @@ class WearOptions:
                 raise ConfigError(f"wear.{key} = {value!r}; allowed: {', '.join(allowed)}")
         if not 1 <= self.n_intervals <= 1_000_000:
             raise ConfigError(f"wear.n_intervals = {self.n_intervals} must lie in 1..1000000")
-        ends = ("threshold_um", "transmission_error_limit_um", "vibration_limit_m_per_s2", "vibration_rise_db")
+        ends = (
+            "threshold_um",
+            "transmission_error_limit_um",
+            "vibration_limit_m_per_s2",
+            "vibration_rise_db",
+        )
         _require_positive("wear", self, (*ends, "step_um", "coefficient", "hardness_hbs"))
         for name in SIDES:
             _require_positive(f"wear.{name}", getattr(self, name), ("coefficient", "hardness_hbs"))
-        for place, values in (("wear", self), *((f"wear.{name}", getattr(self, name)) for name in SIDES)):
+        for place, values in (
+            ("wear", self),
+            *((f"wear.{name}", getattr(self, name)) for name in SIDES),
+        ):
             if values.coefficient is not None and values.coefficient > 1.0:
                 raise ConfigError(
                     f"{place}.coefficient = {values.coefficient:g} must be at most 1: it is the share of the meetings "

@@ -47,9 +47,13 @@ class PitGrowthOptions(GrowthOptions):
             ("cycles", 1e12), ("strength", 1e10), ("exponent", 40.0), ("pits_per_life", 1e4), ("end_share", 1.0),
         ):  # fmt: skip
             if not 0.0 < getattr(self, key) <= high:
-                raise ConfigError(f"life.pitting.{key} = {getattr(self, key):g} must lie above 0, to {high:g}")
+                raise ConfigError(
+                    f"life.pitting.{key} = {getattr(self, key):g} must lie above 0, to {high:g}"
+                )
         if not 0.0 <= self.size_exponent <= 2.0:
-            raise ConfigError(f"life.pitting.size_exponent = {self.size_exponent:g} must lie in 0..2")
+            raise ConfigError(
+                f"life.pitting.size_exponent = {self.size_exponent:g} must lie in 0..2"
+            )
 
     @property
     def spread(self) -> Spread:
@@ -96,11 +100,21 @@ class PitGrowth(GrowthLaw):
 
     def share(self, size: float) -> float:
         """Pitted share of the flank, pits side by side."""
-        return self.n_pits(size) * 0.25 * math.pi * self.diameter(size) ** 2 * self.spread_area / self.area
+        return (
+            self.n_pits(size)
+            * 0.25
+            * math.pi
+            * self.diameter(size) ** 2
+            * self.spread_area
+            / self.area
+        )
 
     def fault(self, size: float) -> dict[str, Any]:
         """Pitted share and size of the pits."""
-        return {"pitted_share": round(self.share(size), 12), "pit_diameter_mm": round(self.diameter(size) * 1e3, 9)}
+        return {
+            "pitted_share": round(self.share(size), 12),
+            "pit_diameter_mm": round(self.diameter(size) * 1e3, 9),
+        }
 
     def measures(self, size: float, torque: float) -> dict[str, float]:
         """Damage and mean number of pits."""
@@ -137,8 +151,14 @@ def pit_growth(
     ConfigError    for helical gears without stresses, and an end that such pits do not reach
     """
     if stresses is None and pair.pinion.helix_angle != 0.0:
-        raise ConfigError("life: the nominal contact stress of pit growth is that of a spur pair; take its slices")
-    torques, stress = (np.ones(1), np.array([contact_stress(pair, material, 1.0)])) if stresses is None else stresses
+        raise ConfigError(
+            "life: the nominal contact stress of pit growth is that of a spur pair; take its slices"
+        )
+    torques, stress = (
+        (np.ones(1), np.array([contact_stress(pair, material, 1.0)]))
+        if stresses is None
+        else stresses
+    )
     gear = pair.gears[pits.gear]
     law = PitGrowth(
         options=options,
@@ -164,5 +184,10 @@ def pit_growth(
     for _ in range(60):
         middle = 0.5 * (low + end)
         low, end = (middle, end) if law.share(middle) < options.end_share else (low, middle)
-    sizes = np.concatenate([np.linspace(0.0, 1.0, 20, endpoint=False), np.linspace(1.0, end, N_SIZES - 20)])
-    return PitGrowth(**{name: getattr(law, name) for name in law.__dataclass_fields__ if name != "sizes"}, sizes=sizes)
+    sizes = np.concatenate(
+        [np.linspace(0.0, 1.0, 20, endpoint=False), np.linspace(1.0, end, N_SIZES - 20)]
+    )
+    return PitGrowth(
+        **{name: getattr(law, name) for name in law.__dataclass_fields__ if name != "sizes"},
+        sizes=sizes,
+    )

@@ -66,7 +66,9 @@ def sliced_crack_growth(
 
     def cut(depth: float, width: float) -> SlicedMesh:
         own = None if width >= face else width
-        return mesh_of((replace(crack, tooth=0, crack_depth=depth, crack_width=own, crack_front="straight"),))
+        return mesh_of(
+            (replace(crack, tooth=0, crack_depth=depth, crack_width=own, crack_front="straight"),)
+        )
 
     def rates(depth: float, width: float) -> Array:
         """Greatest release rate over the depth, and over the width, (torque, 2) N/m."""
@@ -77,7 +79,12 @@ def sliced_crack_growth(
             ends = (width - step, min(width + step, face))
             spans.append(([cut(depth, end) for end in ends], (ends[1] - ends[0]) * depth))
         mesh = cut(depth, width)
-        return np.array([_greatest(mesh, crack.gear, spans, torque / pair.pinion.base_radius) for torque in torques])
+        return np.array(
+            [
+                _greatest(mesh, crack.gear, spans, torque / pair.pinion.base_radius)
+                for torque in torques
+            ]
+        )
 
     width, found = _followed(looked, face, options, rates)
     greatest = np.array([_smooth(looked, column, sizes) for column in found.T])
@@ -112,7 +119,10 @@ def _greatest(
         rest = phases.structure[here] - _softening(mesh, gear, position)
         less, more = (
             structure_energy(
-                rest + _softening(end, gear, position), load, mesh.slice_width, mesh.coupling_length_squared
+                rest + _softening(end, gear, position),
+                load,
+                mesh.slice_width,
+                mesh.coupling_length_squared,
             )
             for end in ends
         )
@@ -135,7 +145,10 @@ def _greatest(
 def _softening(mesh: SlicedMesh, gear: str, position: Array) -> Array:
     """What the crack makes its pair softer, (phase, slice) m2/N."""
     softening = mesh.sides[gear].softening[-1]
-    return np.stack([np.interp(at, mesh.position, one) for at, one in zip(position.T, softening, strict=True)], axis=1)
+    return np.stack(
+        [np.interp(at, mesh.position, one) for at, one in zip(position.T, softening, strict=True)],
+        axis=1,
+    )
 
 
 def _smooth(looked: Array, values: Array, sizes: Array) -> Array:

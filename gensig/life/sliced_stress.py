@@ -12,7 +12,9 @@ from gensig.mesh.sliced.slices import SlicedMesh, loaded_contact
 Array = NDArray[np.float64]
 
 
-def sliced_contact_stress(mesh: SlicedMesh, material: Material, torques: Array, exponent: float) -> Array:
+def sliced_contact_stress(
+    mesh: SlicedMesh, material: Material, torques: Array, exponent: float
+) -> Array:
     """Contact stress whose damage is that of the flank's slices on average, (torque,) Pa.
 
     Parameters

@@ -25,7 +25,9 @@ def snapshot_times(course: Course, spacing: str, count: int, every: float | None
     """
     life = float(course.running[-1])
     if every is not None:
-        return every * np.arange(min(count, int(life / every * (1.0 + 1e-12)) + 1), dtype=np.float64)
+        return every * np.arange(
+            min(count, int(life / every * (1.0 + 1e-12)) + 1), dtype=np.float64
+        )
     if spacing == "logarithmic":
         left = np.geomspace(1.0, LAST_SHARE, count - 1)
         return life * (1.0 - np.concatenate([left, [0.0]]))

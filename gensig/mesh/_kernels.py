@@ -14,7 +14,9 @@ from numba import njit
 _compiled: Any = functools.partial(njit, nogil=True, cache=True, error_model="numpy")()
 
 ROUNDS = 40  # at most, of the logarithm's load: each leaves about a tenth of the error
-LEAST_INTENSITY = 1e-3  # of the even load per width: the logarithm has no limit where a slice lets go
+LEAST_INTENSITY = (
+    1e-3  # of the even load per width: the logarithm has no limit where a slice lets go
+)
 
 
 @_compiled
@@ -46,7 +48,9 @@ def lower_envelope(standing_back, arc, center, relative_radius, gap):
                     if j + 1 < n_profile:
                         least = min(least, _between(back, arc, j, center[k], relative_radius[k]))
                     if j > 0:
-                        least = min(least, _between(back, arc, j - 1, center[k], relative_radius[k]))
+                        least = min(
+                            least, _between(back, arc, j - 1, center[k], relative_radius[k])
+                        )
                     j += direction
             gap[i, k] = least
 
@@ -62,7 +66,9 @@ def _between(back, arc, j, center, radius):
 
 
 @_compiled
-def share_over_slices(slice_gap, width, load, factor, constant, log_weight, bending, gap, compliance):
+def share_over_slices(
+    slice_gap, width, load, factor, constant, log_weight, bending, gap, compliance
+):
     """Gap of the slice that touches first, and the secant compliance from there under the load.
 
     Every slice carries width x (approach - its gap) / (unit compliance), the unit compliance being that of the contact,

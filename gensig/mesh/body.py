@@ -20,7 +20,9 @@ Array = NDArray[np.float64]
 CHECKED_RIM, THINNEST_RIM = 2.0, 1.5
 
 
-def body_compliance(gear: Gear, load_angle: Array, material: Material, options: MeshOptions) -> Array:
+def body_compliance(
+    gear: Gear, load_angle: Array, material: Material, options: MeshOptions
+) -> Array:
     """Compliance along the line of action of the body under one loaded tooth, (phase,) m/N.
 
     Raises
@@ -28,7 +30,9 @@ def body_compliance(gear: Gear, load_angle: Array, material: Material, options: 
     ExtrapolationError    for a bore outside the range on which the model was checked, unless allowed
     """
     if options.body == "sainsot":
-        return fillet_foundation_compliance(gear, load_angle, material, allow_extrapolation=options.allow_extrapolation)
+        return fillet_foundation_compliance(
+            gear, load_angle, material, allow_extrapolation=options.allow_extrapolation
+        )
     rim = (gear.root_radius - gear.bore_radius) / gear.normal_module
     if rim < THINNEST_RIM and not options.allow_extrapolation:
         raise ExtrapolationError(

@@ -18,7 +18,9 @@ from gensig.material import Material
 
 Array = NDArray[np.float64]
 
-STRESS_EXPONENT = 6  # shape xi (1 - xi^6) of the bending stress on the root arc: the one calibrated number
+STRESS_EXPONENT = (
+    6  # shape xi (1 - xi^6) of the bending stress on the root arc: the one calibrated number
+)
 SERIES_LENGTH = 12.0  # harmonics up to n theta_f = 12: cross terms to 1e-4
 
 
@@ -48,7 +50,9 @@ def shared_body_compliance(pair: GearPair, material: Material) -> float:
     return float(np.mean(pinion + wheel))
 
 
-def cross_compliance(gear: Gear, material: Material, loaded: Array, probed: Array, *, pitches: int) -> Array:
+def cross_compliance(
+    gear: Gear, material: Material, loaded: Array, probed: Array, *, pitches: int
+) -> Array:
     """Deflection along its own line of action of the tooth ``pitches`` ahead, per load on tooth 0, (phase,) m/N.
 
     Parameters
@@ -85,7 +89,10 @@ def arc_flexibility(gear: Gear, material: Material, angle: float) -> Array:
     v = -1j * ring[:, 1, 0, None] * s + ring[:, 1, 1, None] * t
     weight = math.pi * r_f * np.exp(1j * n * angle)
     weight[0] *= 2.0
-    work = np.real(np.einsum("n,ni,nj->ij", weight, s.conj(), u) + np.einsum("n,ni,nj->ij", weight, t.conj(), v))
+    work = np.real(
+        np.einsum("n,ni,nj->ij", weight, s.conj(), u)
+        + np.einsum("n,ni,nj->ij", weight, t.conj(), v)
+    )
     inverse = np.linalg.inv(resultants)
     return inverse.T @ work @ inverse / gear.face_width
 
@@ -101,10 +108,16 @@ def ring_harmonic(gear: Gear, material: Material, n: int) -> Array:
     r_f, r_i = gear.root_radius, gear.bore_radius
     if n == 0:
         q = (r_f / r_i) ** 2
-        return np.diag([r_f * (q - 1.0) / (2.0 * (lame + mu) * q + 2.0 * mu), r_f * (q - 1.0) / (2.0 * mu)])
+        return np.diag(
+            [r_f * (q - 1.0) / (2.0 * (lame + mu) * q + 2.0 * mu), r_f * (q - 1.0) / (2.0 * mu)]
+        )
 
     # power p, amplitudes (U, V), reference radius; the logarithm replaces the third for n = 1
-    powers = [(n + 1, kappa - n - 1.0, kappa + n + 1.0, r_f), (n - 1, -1.0, 1.0, r_f), (-n - 1, -1.0, -1.0, r_i)]
+    powers = [
+        (n + 1, kappa - n - 1.0, kappa + n + 1.0, r_f),
+        (n - 1, -1.0, 1.0, r_f),
+        (-n - 1, -1.0, -1.0, r_i),
+    ]
     if n > 1:
         powers.insert(2, (1 - n, kappa - 1.0 + n, n - kappa - 1.0, r_i))
 
@@ -126,7 +139,9 @@ def ring_harmonic(gear: Gear, material: Material, n: int) -> Array:
         )
     if n == 1:
         log = 2.0 * kappa * math.log(r_i / r_f)
-        columns.append([log - 1.0, -log - 1.0, *column(-1.0, -1.0, 2.0 * kappa, -2.0 * kappa), -1.0, -1.0])
+        columns.append(
+            [log - 1.0, -log - 1.0, *column(-1.0, -1.0, 2.0 * kappa, -2.0 * kappa), -1.0, -1.0]
+        )
     system = np.array(columns).T
     system[2:4] /= mu  # one scale for displacements and stresses
     system /= np.abs(system).max(axis=0)
@@ -135,7 +150,9 @@ def ring_harmonic(gear: Gear, material: Material, n: int) -> Array:
     return system[4:6] @ np.linalg.solve(system[:4], loads)
 
 
-def _resultants(theta_f: float, r_f: float, nodes: Array, weights: Array, normal: Array, shear: Array) -> Array:
+def _resultants(
+    theta_f: float, r_f: float, nodes: Array, weights: Array, normal: Array, shear: Array
+) -> Array:
     """(F_x, F_y, moment about the centre) of each stress shape per unit width; columns are shapes."""
     theta, measure = theta_f * nodes, r_f * theta_f * weights
     return np.stack(
@@ -149,4 +166,6 @@ def _resultants(theta_f: float, r_f: float, nodes: Array, weights: Array, normal
 
 def _load(gear: Gear, angle: Array) -> Array:
     """Resultants of a unit force pressing on the loaded flank, (phase, 3)."""
-    return np.stack([-np.sin(angle), -np.cos(angle), np.full_like(angle, -gear.base_radius)], axis=-1)
+    return np.stack(
+        [-np.sin(angle), -np.cos(angle), np.full_like(angle, -gear.base_radius)], axis=-1
+    )

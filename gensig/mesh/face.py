@@ -49,7 +49,9 @@ def slice_gaps(tooth: Tooth, curvature_radius: Array, relative_radius: Array) ->
     gap = np.repeat(level, len(center), axis=1)
     if not even.all():
         shapes, which, moved = _shapes(standing_back[~even])
-        beyond = np.maximum(np.maximum(center - arc[-1], arc[0] - center), 0.0)  # of a nominal flank the end touches
+        beyond = np.maximum(
+            np.maximum(center - arc[-1], arc[0] - center), 0.0
+        )  # of a nominal flank the end touches
         gap[~even] = (envelope(shapes) - beyond**2 / (2.0 * relative_radius))[which] + moved
     return gap[:, place]
 
@@ -61,14 +63,22 @@ def _shapes(standing_back: Array) -> tuple[Array, NDArray[np.int64], Array]:
     """
     moved = np.where(np.isfinite(standing_back[:, :1]), standing_back[:, :1], 0.0)
     known: dict[bytes, int] = {}
-    which = [known.setdefault(row.tobytes(), len(known)) for row in np.round(standing_back - moved, SHAPE_DECIMALS)]
+    which = [
+        known.setdefault(row.tobytes(), len(known))
+        for row in np.round(standing_back - moved, SHAPE_DECIMALS)
+    ]
     place = np.array(which, dtype=np.int64)
     first = np.unique(place, return_index=True)[1]
     return standing_back[first] - moved[first], place, moved
 
 
 def face_contact(
-    tooth: Tooth, curvature_radius: Array, relative_radius: Array, law: ContactLaw, load: Array, bending: Array
+    tooth: Tooth,
+    curvature_radius: Array,
+    relative_radius: Array,
+    law: ContactLaw,
+    load: Array,
+    bending: Array,
 ) -> tuple[Array, Array]:
     """Gap of the slice that touches first; from there, contact compliance and what partial width adds to bending.
 
@@ -83,7 +93,17 @@ def face_contact(
         return gaps[0], law.compliance(tooth.gear.face_width, load)
     gap, compliance = np.empty_like(load), np.empty_like(load)
     unit = bending * tooth.gear.face_width
-    share_over_slices(gaps, tooth.slice_width, load, law.factor, law.constant, law.log_weight, unit, gap, compliance)
+    share_over_slices(
+        gaps,
+        tooth.slice_width,
+        load,
+        law.factor,
+        law.constant,
+        law.log_weight,
+        unit,
+        gap,
+        compliance,
+    )
     return gap, compliance
 
 

@@ -54,7 +54,11 @@ def fillet_foundation_compliance(
     values = body_coefficients(gear, allow_extrapolation=allow_extrapolation)
     height = gear.base_radius / np.cos(load_angle) - gear.root_radius
     lever = height / (2.0 * gear.root_radius * gear.root_half_angle)
-    bracket = values["L"] * lever**2 + values["M"] * lever + values["P"] * (1.0 + values["Q"] * np.tan(load_angle) ** 2)
+    bracket = (
+        values["L"] * lever**2
+        + values["M"] * lever
+        + values["P"] * (1.0 + values["Q"] * np.tan(load_angle) ** 2)
+    )
     return np.cos(load_angle) ** 2 / (gear.face_width * material.youngs_modulus) * bracket
 
 
@@ -63,7 +67,10 @@ def body_coefficients(gear: Gear, *, allow_extrapolation: bool) -> dict[str, flo
     theta, ratio = gear.root_half_angle, gear.root_radius / gear.bore_radius
     _check_range(gear, {"theta_f": theta, "h_f": ratio}, allow_extrapolation)
     terms = (theta**-2, ratio**2, ratio / theta, 1.0 / theta, ratio, 1.0)
-    return {name: math.fsum(c * t for c, t in zip(row, terms, strict=True)) for name, row in COEFFICIENTS.items()}
+    return {
+        name: math.fsum(c * t for c, t in zip(row, terms, strict=True))
+        for name, row in COEFFICIENTS.items()
+    }
 
 
 def _check_range(gear: Gear, found: dict[str, float], allow_extrapolation: bool) -> None:

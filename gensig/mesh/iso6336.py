@@ -62,7 +62,15 @@ def single_stiffness(
     rack = 0.5 * (basic_rack_factor(pair.pinion) + basic_rack_factor(pair.wheel))
     load = 1.0 if line_load is None else min(1.0, line_load / LINEAR_LINE_LOAD) ** 0.25
     helix = math.cos(pair.pinion.helix_angle)
-    return correction_factor * rack * helix * load * youngs_modulus / STEEL_YOUNGS_MODULUS / flexibility(pair)
+    return (
+        correction_factor
+        * rack
+        * helix
+        * load
+        * youngs_modulus
+        / STEEL_YOUNGS_MODULUS
+        / flexibility(pair)
+    )
 
 
 def mesh_stiffness(
@@ -101,10 +109,14 @@ def flexibility(pair: GearPair) -> float:
     z1, z2 = pair.pinion.n_teeth / virtual, pair.wheel.n_teeth / virtual
     x1, x2 = pair.pinion.profile_shift, pair.wheel.profile_shift
     terms = (1.0, 1.0 / z1, 1.0 / z2, x1, x1 / z1, x2, x2 / z2, x1**2, x2**2)
-    return FLEXIBILITY_UNIT * math.fsum(c * term for c, term in zip(FLEXIBILITY, terms, strict=True))
+    return FLEXIBILITY_UNIT * math.fsum(
+        c * term for c, term in zip(FLEXIBILITY, terms, strict=True)
+    )
 
 
 def basic_rack_factor(gear: Gear) -> float:
     """C_B = [1 + 0.5 (1.2 - h_fP / m)] [1 - 0.02 (20 deg - alpha_P)] of one gear; 1 for h_fP = 1.2 m, 20 deg."""
     dedendum = gear.addendum_coefficient + gear.clearance_coefficient
-    return (1.0 + 0.5 * (1.2 - dedendum)) * (1.0 - 0.02 * (20.0 - math.degrees(gear.pressure_angle)))
+    return (1.0 + 0.5 * (1.2 - dedendum)) * (
+        1.0 - 0.02 * (20.0 - math.degrees(gear.pressure_angle))
+    )

@@ -19,7 +19,9 @@ from gensig.mesh.pair_table import N_PAIRS, PairTable, pair_table
 Array = NDArray[np.float64]
 
 LOAD_ROUNDS = 3
-LEAST_LOAD_SHARE = 0.02  # a pair about to take load: its local compliance has no limit as the load falls to 0
+LEAST_LOAD_SHARE = (
+    0.02  # a pair about to take load: its local compliance has no limit as the load falls to 0
+)
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -78,7 +80,9 @@ def pair_states(
             gap += error[teeth]
         if tilt is not None:
             gap += tilt[teeth] * (position - table.pair.pitch_point)
-        compliance += (1.0 - part) * side.compliance[kinds, cell] + part * side.compliance[kinds, cell + 1]
+        compliance += (1.0 - part) * side.compliance[kinds, cell] + part * side.compliance[
+            kinds, cell + 1
+        ]
         gap += (1.0 - part) * side.gap[kinds, cell] + part * side.gap[kinds, cell + 1]
         gap[~side.present[kinds]] = np.inf
     return PairStates(compliance=compliance, gap=gap, position=position)
@@ -91,7 +95,11 @@ def static_mesh(table: PairTable, states: PairStates, force: float) -> StaticMes
     and the approach infinite.
     """
     if table.options.law == "paper":
-        on_path = (states.position >= 0.0) & (states.position <= table.pair.path_of_contact) & np.isfinite(states.gap)
+        on_path = (
+            (states.position >= 0.0)
+            & (states.position <= table.pair.path_of_contact)
+            & np.isfinite(states.gap)
+        )
         gap = np.where(on_path, 0.0, np.inf)
     else:
         gap = states.gap
@@ -102,7 +110,9 @@ def static_mesh(table: PairTable, states: PairStates, force: float) -> StaticMes
     stiffness = np.cumsum(np.where(touching, 1.0 / own, 0.0), axis=1)
     reach = np.cumsum(np.where(touching, np.where(touching, sorted_gap, 0.0) / own, 0.0), axis=1)
     with np.errstate(divide="ignore"):
-        local = (force + reach) / stiffness  # approach less the shared deflection if the first m pairs carry
+        local = (
+            force + reach
+        ) / stiffness  # approach less the shared deflection if the first m pairs carry
     carried = (local > sorted_gap).sum(axis=1)
     last = np.maximum(carried - 1, 0)
     rows = np.arange(len(last))
@@ -127,13 +137,21 @@ def loaded_pair_table(
     modification: PairModification = PLAIN,
 ) -> PairTable:
     """Table whose contact term is the secant at the quasi-static load of sound pairs under a total force in N."""
-    load = force if options.contact == "linear" else sound_load(pair, material, options, force, modification)
+    load = (
+        force
+        if options.contact == "linear"
+        else sound_load(pair, material, options, force, modification)
+    )
     return pair_table(pair, material, options, teeth, load=load, modification=modification)
 
 
 @lru_cache(maxsize=32)  # the records of a condition share it, whatever their faults
 def sound_load(
-    pair: GearPair, material: Material, options: MeshOptions, force: float, modification: PairModification = PLAIN
+    pair: GearPair,
+    material: Material,
+    options: MeshOptions,
+    force: float,
+    modification: PairModification = PLAIN,
 ) -> Array:
     """Quasi-static load of a sound pair at every node under a total force in N, (node,) N; not to be written to.
 
@@ -156,7 +174,9 @@ def _sound_states(table: PairTable) -> PairStates:
         return nodes[:-1].reshape(N_PAIRS, table.options.points_per_pitch).T
 
     return PairStates(
-        compliance=of_pairs(table.pinion.compliance[0] + table.wheel.compliance[0] - table.shared_compliance),
+        compliance=of_pairs(
+            table.pinion.compliance[0] + table.wheel.compliance[0] - table.shared_compliance
+        ),
         gap=of_pairs(table.pinion.gap[0] + table.wheel.gap[0]),
         position=of_pairs(table.position),
     )

@@ -29,7 +29,11 @@ class ContactLaw:
 
     def compliance(self, width: Array | float, load: Array | float) -> Array:
         """Secant compliance along the line of action for a width in contact in m under a load in N, (phase,) m/N."""
-        return self.factor * (self.constant - self.log_weight * np.log(np.asarray(load) / width)) / width
+        return (
+            self.factor
+            * (self.constant - self.log_weight * np.log(np.asarray(load) / width))
+            / width
+        )
 
 
 def linear_contact(position: Array, material: Material) -> ContactLaw:
@@ -60,17 +64,24 @@ def weber_contact(pair: GearPair, position: Array, material: Material) -> Contac
         (pair.pinion, np.asarray(pair.pinion_curvature(position))),
         (pair.wheel, np.asarray(pair.wheel_curvature(position))),
     ):
-        constant += np.log(2.0 * involute_point(gear, curvature)[1] / np.cos(load_angle(gear, curvature)))
+        constant += np.log(
+            2.0 * involute_point(gear, curvature)[1] / np.cos(load_angle(gear, curvature))
+        )
     return ContactLaw(factor=2.0 * reduced, constant=constant, log_weight=1.0)
 
 
 def relative_radius(pair: GearPair, position: Array) -> Array:
     """Relative radius of curvature of the flanks at positions on the path, (phase,) m."""
-    pinion, wheel = np.asarray(pair.pinion_curvature(position)), np.asarray(pair.wheel_curvature(position))
+    pinion, wheel = (
+        np.asarray(pair.pinion_curvature(position)),
+        np.asarray(pair.wheel_curvature(position)),
+    )
     return pinion * wheel / (pinion + wheel)
 
 
-def contact_law(pair: GearPair, position: Array, material: Material, options: MeshOptions) -> ContactLaw:
+def contact_law(
+    pair: GearPair, position: Array, material: Material, options: MeshOptions
+) -> ContactLaw:
     """Local compliance by the chosen term; see the two above."""
     if options.contact == "linear":
         return linear_contact(position, material)

@@ -53,7 +53,9 @@ class FlankModification:
 
     def __post_init__(self) -> None:
         if self.profile_shape not in SHAPES:
-            raise ConfigError(f"profile_shape = {self.profile_shape!r}; allowed: {', '.join(SHAPES)}")
+            raise ConfigError(
+                f"profile_shape = {self.profile_shape!r}; allowed: {', '.join(SHAPES)}"
+            )
         for field in fields(self):
             value: Any = getattr(self, field.name)
             if field.name not in ("profile_shape", "helix_slope") and not value >= 0.0:
@@ -65,7 +67,9 @@ class FlankModification:
             (self.end_relief, self.end_relief_width, "end_relief_width_mm"),
         ):
             if depth > 0.0 and length == 0.0:
-                raise ConfigError(f"{key} = 0: a relief of {depth * 1e6:g} um needs a length to run out over")
+                raise ConfigError(
+                    f"{key} = 0: a relief of {depth * 1e6:g} um needs a length to run out over"
+                )
 
     def profile(self, gear: Gear, curvature_radius: Array, lowest: float) -> Array:
         """Depth over the profile, (point,) m.
@@ -92,7 +96,9 @@ class FlankModification:
         power = SHAPES[self.profile_shape]
         depth = np.zeros_like(radius)
         if tip:
-            depth += self.tip_relief * np.maximum((radius - gear.tip_radius + tip) / tip, 0.0) ** power
+            depth += (
+                self.tip_relief * np.maximum((radius - gear.tip_radius + tip) / tip, 0.0) ** power
+            )
         if root:
             depth += self.root_relief * np.maximum((start + root - radius) / root, 0.0) ** power
         return depth
@@ -113,7 +119,9 @@ class FlankModification:
         depth = self.crowning * from_middle**2 + self.helix_slope * place / face_width
         if self.end_relief:
             from_end = np.minimum(place, face_width - place)
-            depth = depth + self.end_relief * np.maximum(1.0 - from_end / self.end_relief_width, 0.0)
+            depth = depth + self.end_relief * np.maximum(
+                1.0 - from_end / self.end_relief_width, 0.0
+            )
         return depth
 
 
@@ -135,7 +143,8 @@ class PairModification:
         """Whether anything stands otherwise than an aligned involute helicoid."""
         plain = FlankModification()
         return self.misalignment != 0.0 or any(
-            replace(side, profile_shape=plain.profile_shape) != plain for side in self.sides.values()
+            replace(side, profile_shape=plain.profile_shape) != plain
+            for side in self.sides.values()
         )
 
     def deviation(self, pair: GearPair, position: Array, place: Array) -> Array:
@@ -160,7 +169,11 @@ class PairModification:
     def lead(self, pair: GearPair, place: Array) -> Array:
         """Depth of both gears together across the face, (slice,) m; nowhere less than 0."""
         width = pair.face_width
-        lead = self.pinion.lead(place, width) + self.wheel.lead(place, width) + self.misalignment * place / width
+        lead = (
+            self.pinion.lead(place, width)
+            + self.wheel.lead(place, width)
+            + self.misalignment * place / width
+        )
         return np.asarray(lead - min(float(lead.min()), 0.0))
 
 

@@ -81,7 +81,9 @@ class MeshOptions:
     def __post_init__(self) -> None:
         for key, allowed in CHOICES.items():
             if getattr(self, key) not in allowed:
-                raise ConfigError(f"mesh.{key} = {getattr(self, key)!r}; allowed: {', '.join(allowed)}")
+                raise ConfigError(
+                    f"mesh.{key} = {getattr(self, key)!r}; allowed: {', '.join(allowed)}"
+                )
         for key, low, high in (
             ("damping_ratio", 0.0, 1.0),
             ("friction_coefficient", 0.0, 0.5),
@@ -112,7 +114,9 @@ class SliceOptions:
 
     def __post_init__(self) -> None:
         if self.slice_coupling not in SLICE_COUPLINGS:
-            raise ConfigError(f"mesh.slice_coupling = {self.slice_coupling!r}; allowed: {', '.join(SLICE_COUPLINGS)}")
+            raise ConfigError(
+                f"mesh.slice_coupling = {self.slice_coupling!r}; allowed: {', '.join(SLICE_COUPLINGS)}"
+            )
         for key, low, high in (("n_slices", 1, 1000), ("coupling_modules", 0.0, 10.0)):
             value = getattr(self, key)
             if not low <= value <= high:
@@ -124,7 +128,9 @@ SLICE_KEYS = frozenset(field.name for field in fields(SliceOptions))
 
 def read_slice_options(values: Section) -> SliceOptions:
     """Slices from the boundary keys of ``mesh``."""
-    return read(SliceOptions, {key: value for key, value in values.items() if key in SLICE_KEYS}, "mesh")
+    return read(
+        SliceOptions, {key: value for key, value in values.items() if key in SLICE_KEYS}, "mesh"
+    )
 
 
 def read_mesh_options(values: Section) -> MeshOptions:
@@ -133,4 +139,8 @@ def read_mesh_options(values: Section) -> MeshOptions:
     if convention is None:
         raise ConfigError(f"mesh.law = {values.get('law')!r}; allowed: {', '.join(CONVENTIONS)}")
     own = {key: value for key, value in values.items() if key not in SLICE_KEYS}
-    return read(MeshOptions, {**own, **{k: v for k, v in convention.items() if values.get(k) is None}}, "mesh")
+    return read(
+        MeshOptions,
+        {**own, **{k: v for k, v in convention.items() if values.get(k) is None}},
+        "mesh",
+    )

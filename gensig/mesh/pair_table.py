@@ -148,13 +148,17 @@ def _sound_structure(pair: GearPair, material: Material, options: MeshOptions) -
     }
 
 
-def _structure_at_nodes(tooth: Tooth, curvature: Array, material: Material, options: MeshOptions) -> Array:
+def _structure_at_nodes(
+    tooth: Tooth, curvature: Array, material: Material, options: MeshOptions
+) -> Array:
     """Structural compliance at each different curvature radius once, most nodes being held at A or E, (node,)."""
     different, place = np.unique(curvature, return_inverse=True)
     return structural_compliance(tooth, different, material, options)[place]
 
 
-def structural_compliance(tooth: Tooth, curvature: Array, material: Material, options: MeshOptions) -> Array:
+def structural_compliance(
+    tooth: Tooth, curvature: Array, material: Material, options: MeshOptions
+) -> Array:
     """Tooth and body compliance of one loaded tooth, (phase,) m/N; the material as ``Material.in_plane`` gives it."""
     return np.sum(list(structural_terms(tooth, curvature, material, options).values()), axis=0)
 
@@ -175,18 +179,26 @@ def check_teeth(
             continue
         known.add(id(tooth))
         side = sides[name]
-        structural_terms(tooth, np.minimum(side.curvature, tooth.tip_curvature_radius), structure, options)
+        structural_terms(
+            tooth, np.minimum(side.curvature, tooth.tip_curvature_radius), structure, options
+        )
         if options.law == "paper" and not is_nominal(tooth):
             bearing_width(tooth, side.curvature)
 
 
-def structural_terms(tooth: Tooth, curvature: Array, material: Material, options: MeshOptions) -> dict[str, Array]:
+def structural_terms(
+    tooth: Tooth, curvature: Array, material: Material, options: MeshOptions
+) -> dict[str, Array]:
     """The same by its parts: bending, shear, axial, foundation, and what cracks add where they do not cut sections."""
     gear, papers_crack = tooth.gear, options.crack == "paper"
-    parts = tooth_compliance(tooth, curvature, material, reach=options.tooth, papers_crack=papers_crack)
+    parts = tooth_compliance(
+        tooth, curvature, material, reach=options.tooth, papers_crack=papers_crack
+    )
     opened = np.zeros_like(curvature)
     if tooth.cracks and not papers_crack:
-        opened = crack_compliance(tooth, curvature, material, allow_extrapolation=options.allow_extrapolation)
+        opened = crack_compliance(
+            tooth, curvature, material, allow_extrapolation=options.allow_extrapolation
+        )
     return {
         "bending": parts.bending,
         "shear": parts.shear,
@@ -196,7 +208,9 @@ def structural_terms(tooth: Tooth, curvature: Array, material: Material, options
     }
 
 
-def slice_bending(pair: GearPair, position: Array, material: Material, options: MeshOptions) -> Array:
+def slice_bending(
+    pair: GearPair, position: Array, material: Material, options: MeshOptions
+) -> Array:
     """Compliance of both sound teeth that belongs to the slices of the face, (phase,) m/N; 0 with ``bending=whole``.
 
     Three-dimensional finite elements of a pinion loaded over part of its face give it 0.8 (middle, or both ends) to
@@ -208,7 +222,10 @@ def slice_bending(pair: GearPair, position: Array, material: Material, options: 
     on_path, place = np.unique(np.clip(position, 0.0, pair.path_of_contact), return_inverse=True)
     structure = material.in_plane(options.elasticity)
     own = np.zeros_like(on_path)
-    for gear, curvature in ((pair.pinion, pair.pinion_curvature), (pair.wheel, pair.wheel_curvature)):
+    for gear, curvature in (
+        (pair.pinion, pair.pinion_curvature),
+        (pair.wheel, pair.wheel_curvature),
+    ):
         radius = np.asarray(curvature(on_path))
         own += tooth_compliance(healthy_tooth(gear), radius, structure, reach=options.tooth).total
     return own[place]
@@ -231,7 +248,9 @@ class FlankSide:
     def under(self, load: Array | float) -> FlankSide:
         """The same under another load of a pair in N, (phase,) or one for all."""
         loads = np.array(np.broadcast_to(np.asarray(load, dtype=np.float64), self.curvature.shape))
-        return replace(self, load=loads, base=self.share * self.law.compliance(self.gear.face_width, loads))
+        return replace(
+            self, load=loads, base=self.share * self.law.compliance(self.gear.face_width, loads)
+        )
 
     def contact(self, tooth: Tooth, bending: Array, options: MeshOptions) -> tuple[Array, Array]:
         """Gap and contact compliance of one tooth against a sound mate, (phase,) m and m/N, less ``base``.
@@ -239,11 +258,15 @@ class FlankSide:
         ``bending`` (phase,) m/N is what bends slice by slice, see ``slice_bending``.
         """
         if is_nominal(tooth) or not tooth.present:
-            return np.zeros_like(self.load), self.law.compliance(self.gear.face_width, self.load) - self.base
+            return np.zeros_like(self.load), self.law.compliance(
+                self.gear.face_width, self.load
+            ) - self.base
         if options.law == "paper":
             width = bearing_width(tooth, self.curvature)
             return np.zeros_like(self.load), self.law.compliance(width, self.load) - self.base
-        gap, compliance = face_contact(tooth, self.flank_curvature, self.relative_radius, self.law, self.load, bending)
+        gap, compliance = face_contact(
+            tooth, self.flank_curvature, self.relative_radius, self.law, self.load, bending
+        )
         return gap, compliance - self.base
 
 
@@ -276,7 +299,12 @@ def flank_sides(
         ).under(load)
         for gear, curvature, beyond_tip, share in (
             (pair.pinion, pair.pinion_curvature, np.maximum(position, 0.0), 1.0 - pinion_share),
-            (pair.wheel, pair.wheel_curvature, np.minimum(position, pair.path_of_contact), pinion_share),
+            (
+                pair.wheel,
+                pair.wheel_curvature,
+                np.minimum(position, pair.path_of_contact),
+                pinion_share,
+            ),
         )
     }
 
@@ -306,7 +334,9 @@ def _gear_table(
         compliance[row] = structures[key] + contact
         gap[row] = own_gap + corner
     distance = float(position[1] - position[0])
-    compliance, compliance_slope = smooth(compliance, distance, SMOOTHED_SHARE * float(compliance[0].min()))
+    compliance, compliance_slope = smooth(
+        compliance, distance, SMOOTHED_SHARE * float(compliance[0].min())
+    )
     gap, gap_slope = smooth(gap, distance, SMOOTHED_GAP)
     return GearTable(
         compliance=compliance,
@@ -335,7 +365,9 @@ def _structure_key(tooth: Tooth) -> tuple[int, ...]:
     return id(tooth.material_loss), id(tooth.slice_edges), id(tooth.cracks)
 
 
-def pair_compliance(table: PairTable, position: Array, pinion_kind: int = 0, wheel_kind: int = 0) -> Array:
+def pair_compliance(
+    table: PairTable, position: Array, pinion_kind: int = 0, wheel_kind: int = 0
+) -> Array:
     """Compliance of a single pair under the table's load, (phase,) m/N."""
     return np.interp(position, table.position, table.pinion.compliance[pinion_kind]) + np.interp(
         position, table.position, table.wheel.compliance[wheel_kind]

@@ -42,13 +42,20 @@ def crack_compliance(
     elements of whole gears (``tests/reference``), so the body behind the crack gives way too.
     """
     return sum(
-        (_one(tooth, crack, curvature_radius, material, allow_extrapolation) for crack in tooth.cracks),
+        (
+            _one(tooth, crack, curvature_radius, material, allow_extrapolation)
+            for crack in tooth.cracks
+        ),
         start=np.zeros_like(curvature_radius),
     )
 
 
 def _one(
-    tooth: Tooth, crack: RootCrack, curvature_radius: Array, material: Material, allow_extrapolation: bool
+    tooth: Tooth,
+    crack: RootCrack,
+    curvature_radius: Array,
+    material: Material,
+    allow_extrapolation: bool,
 ) -> Array:
     gear = tooth.gear
     if crack.side == "compression" and crack.breathing:
@@ -61,7 +68,9 @@ def _one(
     through = intensity**2 / (material.youngs_modulus * gear.face_width)
     if len(depth) == 1:
         return through[0]
-    own = tooth_compliance(tooth, curvature_radius, material, reach="to_centreline", papers_crack=False).total
+    own = tooth_compliance(
+        tooth, curvature_radius, material, reach="to_centreline", papers_crack=False
+    ).total
     return _side_by_side(own, through)
 
 
@@ -87,7 +96,9 @@ def root_loads(gear: Gear, crack: RootCrack, load_angle: Array) -> Array:
     return np.stack([moment, np.cos(load_angle), normal])
 
 
-def _require_checked(tooth: Tooth, crack: RootCrack, depth: float, allow_extrapolation: bool) -> None:
+def _require_checked(
+    tooth: Tooth, crack: RootCrack, depth: float, allow_extrapolation: bool
+) -> None:
     if allow_extrapolation:
         return
     chord = 2.0 * crack.mouth_half_thickness

@@ -40,7 +40,9 @@ def sections(tooth: Tooth, *, papers_crack: bool) -> tuple[Array, Array]:
 
 def _kept_height(tooth: Tooth, half: Array) -> Array:
     """Height of the sections on the involute that is left in each slice, (slice, cell) m."""
-    lost = np.minimum(tooth.material_loss, 2.0 * tooth.profile.half_thickness[tooth.profile.n_root_cells :])
+    lost = np.minimum(
+        tooth.material_loss, 2.0 * tooth.profile.half_thickness[tooth.profile.n_root_cells :]
+    )
     return 2.0 * half - 0.5 * (lost[:, 1:] + lost[:, :-1])
 
 

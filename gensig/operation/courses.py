@@ -21,7 +21,9 @@ Array = NDArray[np.float64]
 MOST_POINTS = 100_000
 LATEST = 1e6  # s
 SHORTEST_PIECE = 1e-3  # s; the integration takes the course as straight through every millisecond
-FASTEST_RIPPLE = 150.0  # Hz; straight pieces of 1 ms take sinc^2(0.15) of it, 7.2 % too little; points are exact
+FASTEST_RIPPLE = (
+    150.0  # Hz; straight pieces of 1 ms take sinc^2(0.15) of it, 7.2 % too little; points are exact
+)
 EARLIEST = -2.0  # s; a walk begins here, before any machine begins to settle
 POINTS_PER_CORRELATION_TIME = 20  # straight lines between points take 1.6 % of the variance
 WALK_LIMIT = 4.0  # standard deviations at which a walk is cut, so that its slowest is known; 6e-5 of the time
@@ -113,7 +115,9 @@ class RandomWalk:
             raise ConfigError(f"scatter = {self.scatter:g} must lie in 0..{MOST_SCATTER:g}")
         least = POINTS_PER_CORRELATION_TIME * SHORTEST_PIECE
         if not least <= self.correlation_time <= LATEST:
-            raise ConfigError(f"correlation_time_s = {self.correlation_time:g} must lie in {least:g}..{LATEST:g}")
+            raise ConfigError(
+                f"correlation_time_s = {self.correlation_time:g} must lie in {least:g}..{LATEST:g}"
+            )
 
     @property
     def least(self) -> float:
@@ -137,8 +141,12 @@ class RandomWalk:
         fresh = math.sqrt(1.0 - rho * rho)
         normal = rng.standard_normal(n_points).tolist()
         walk = itertools.accumulate(normal, lambda value, draw: rho * value + fresh * draw)
-        factors = tuple(1.0 + self.scatter * min(max(value, -WALK_LIMIT), WALK_LIMIT) for value in walk)
-        return Profile(times=tuple(EARLIEST + step * place for place in range(n_points)), factors=factors)
+        factors = tuple(
+            1.0 + self.scatter * min(max(value, -WALK_LIMIT), WALK_LIMIT) for value in walk
+        )
+        return Profile(
+            times=tuple(EARLIEST + step * place for place in range(n_points)), factors=factors
+        )
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -176,7 +184,9 @@ class Ripple:
         """The angle of the sine at times in s with their set angles in rad, (time,) rad."""
         return (self.order or 0.0) * set_angle + self._fixed_rate * times + self.phase
 
-    def gained(self, times: Array, set_angle: Array, set_speed: float, profile: Profile | None) -> Array:
+    def gained(
+        self, times: Array, set_angle: Array, set_speed: float, profile: Profile | None
+    ) -> Array:
         """Integral of profile x share x sin(psi) from time 0, (time,) s.
 
         With an order it is share / (order set_speed) [-cos psi], since the set angle grows by profile x set_speed.
@@ -195,11 +205,19 @@ class Ripple:
             sine = np.sin(rate * np.array(knots) + self.phase) / rate
             slope = np.diff(factors) / np.diff(knots)
             before = np.concatenate([[0.0], np.cumsum(slope * np.diff(sine))])
-            partly = before[piece] + slope[piece] * (np.sin(rate * held + self.phase) / rate - sine[piece])
-            return np.asarray((partly - np.interp(time, knots, factors) * np.cos(rate * time + self.phase)) / rate)
+            partly = before[piece] + slope[piece] * (
+                np.sin(rate * held + self.phase) / rate - sine[piece]
+            )
+            return np.asarray(
+                (partly - np.interp(time, knots, factors) * np.cos(rate * time + self.phase)) / rate
+            )
 
-        return self.share * (primitive(np.asarray(times, dtype=np.float64)) - primitive(np.zeros(1)))
+        return self.share * (
+            primitive(np.asarray(times, dtype=np.float64)) - primitive(np.zeros(1))
+        )
 
     def later(self, delay: float, set_angle: float) -> Ripple:
         """The same ripple, ``delay`` s and ``set_angle`` rad later."""
-        return replace(self, phase=self.phase - (self.order or 0.0) * set_angle - self._fixed_rate * delay)
+        return replace(
+            self, phase=self.phase - (self.order or 0.0) * set_angle - self._fixed_rate * delay
+        )

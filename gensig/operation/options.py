@@ -64,9 +64,13 @@ class Schedule:
 
     def __post_init__(self) -> None:
         if self.turns is not None and not self.turns > 0.0:
-            raise ConfigError(f"operating.turns = {self.turns:g} must be positive, or null to use duration_s")
+            raise ConfigError(
+                f"operating.turns = {self.turns:g} must be positive, or null to use duration_s"
+            )
         if self.turns_of not in TURNS_OF:
-            raise ConfigError(f"operating.turns_of = {self.turns_of!r}; allowed: {', '.join(TURNS_OF)}")
+            raise ConfigError(
+                f"operating.turns_of = {self.turns_of!r}; allowed: {', '.join(TURNS_OF)}"
+            )
         if self.course_seed < 0:
             raise ConfigError(f"operating.course_seed = {self.course_seed} must not be negative")
 
@@ -87,7 +91,11 @@ def read_operating(values: Section) -> Operating:
     ConfigError    for unknown or missing keys, kinds, values and files
     """
     seed = read_schedule(values).course_seed
-    own = {key: value for key, value in values.items() if key not in (*SCHEDULE_KEYS, *QUANTITIES, *RIPPLES)}
+    own = {
+        key: value
+        for key, value in values.items()
+        if key not in (*SCHEDULE_KEYS, *QUANTITIES, *RIPPLES)
+    }
     steady = read(Operating, own, "operating")
     ripples = {key: read_ripple(values, key) for key in RIPPLES}
     profiles = {}
@@ -138,11 +146,18 @@ def read_profile(key: str, value: Any) -> Profile | None:
             f"{key} = {value!r} is no list; give [time_s, factor] pairs, a group with a kind, or null for a constant"
         )
     for place, point in enumerate(value):
-        if not (isinstance(point, list | tuple) and len(point) == 2 and all(_is_number(one) for one in point)):
-            raise ConfigError(f"{key}: point {place} = {point!r}; give two finite numbers, [time_s, factor]")
+        if not (
+            isinstance(point, list | tuple)
+            and len(point) == 2
+            and all(_is_number(one) for one in point)
+        ):
+            raise ConfigError(
+                f"{key}: point {place} = {point!r}; give two finite numbers, [time_s, factor]"
+            )
     try:
         return Profile(
-            times=tuple(float(time) for time, _ in value), factors=tuple(float(factor) for _, factor in value)
+            times=tuple(float(time) for time, _ in value),
+            factors=tuple(float(factor) for _, factor in value),
         )
     except ConfigError as error:
         raise ConfigError(f"{key}: {error}") from None
@@ -151,18 +166,26 @@ def read_profile(key: str, value: Any) -> Profile | None:
 def _profile(course: Course | None, duration: float, rng: np.random.Generator) -> Profile | None:
     if course is None or isinstance(course, Profile):
         return course
-    return course.profile(duration, rng) if isinstance(course, RandomWalk) else course.profile(duration)
+    return (
+        course.profile(duration, rng)
+        if isinstance(course, RandomWalk)
+        else course.profile(duration)
+    )
 
 
 def _read_file(where: str, own: Mapping[str, Any], quantity: str, set_point: Any) -> FileCourse:
     """``time_s`` and ``factor``, or ``time_s`` and the quantity itself, which is divided by the set-point."""
     if not (set(own) == {"file"} and isinstance(own["file"], str)):
-        raise ConfigError(f"{where}: kind = file needs exactly file, the name of a CSV file with a header")
+        raise ConfigError(
+            f"{where}: kind = file needs exactly file, the name of a CSV file with a header"
+        )
     file, key = own["file"], f"{where}.file"
     names, columns = read_table(key, file, least_rows=2)
     value = quantity if quantity in names else "factor"
     if value == "factor" and "factor" not in names:
-        raise ConfigError(f"{key} = {file}: no column {quantity} or factor; it must have time_s and one of the two")
+        raise ConfigError(
+            f"{key} = {file}: no column {quantity} or factor; it must have time_s and one of the two"
+        )
     check_columns(key, file, names, ["time_s", value])
     times, factors = columns[names.index("time_s")], columns[names.index(value)]
     if value == quantity:
@@ -174,7 +197,9 @@ def _read_file(where: str, own: Mapping[str, Any], quantity: str, set_point: Any
     except ConfigError as error:
         raise ConfigError(f"{key} = {file}: {error}") from None
     step = float(times[-1] - times[-2])
-    return FileCourse(key=where, file=file, profile_given=profile, step=step, is_absolute=value == quantity)
+    return FileCourse(
+        key=where, file=file, profile_given=profile, step=step, is_absolute=value == quantity
+    )
 
 
 def read_ripple(values: Section, key: str) -> Ripple | None:
@@ -199,7 +224,11 @@ def _named(where: str, error: ConfigError) -> str:
 
 
 def _is_number(value: Any) -> bool:
-    return isinstance(value, int | float) and not isinstance(value, bool) and abs(value) <= sys.float_info.max
+    return (
+        isinstance(value, int | float)
+        and not isinstance(value, bool)
+        and abs(value) <= sys.float_info.max
+    )
 
 
 def operating_signals(
@@ -216,5 +245,9 @@ def operating_signals(
     if len(shaft_angle) > 2:
         speed = np.gradient(shaft_angle, 1.0 / sampling_rate, edge_order=2)
     nominal = operating.nominal(times)
-    torque = operating.torque * nominal.torque_factor * (nominal.speed / operating.speed) ** load_exponent
+    torque = (
+        operating.torque
+        * nominal.torque_factor
+        * (nominal.speed / operating.speed) ** load_exponent
+    )
     return {"shaft_speed": speed.astype(np.float32), "torque_set": torque.astype(np.float32)}

@@ -50,20 +50,32 @@ class Operating:
     torque_ripple: Ripple | None = None
 
     def __post_init__(self) -> None:
-        for key, suffix in (("speed", "rpm"), ("torque", "nm"), ("duration", "s"), ("drive_frequency", "hz")):
+        for key, suffix in (
+            ("speed", "rpm"),
+            ("torque", "nm"),
+            ("duration", "s"),
+            ("drive_frequency", "hz"),
+        ):
             value = getattr(self, key)
             if not value > 0.0:
                 name = f"{key}_{suffix}"
                 raise ConfigError(f"operating.{name} = {from_si(name, value):g} must be positive")
         if not 0.0 < self.drive_damping_ratio <= 10.0:
-            raise ConfigError(f"operating.drive_damping_ratio = {self.drive_damping_ratio:g} must lie in 0..10")
+            raise ConfigError(
+                f"operating.drive_damping_ratio = {self.drive_damping_ratio:g} must lie in 0..10"
+            )
         if self.speed_profile is not None and not min(self.speed_profile.factors) > 0.0:
-            raise ConfigError(f"operating.speed_profile: factor {min(self.speed_profile.factors):g} must be positive")
+            raise ConfigError(
+                f"operating.speed_profile: factor {min(self.speed_profile.factors):g} must be positive"
+            )
         if self.torque_profile is not None and min(self.torque_profile.factors) < 0.0:
             raise ConfigError(
                 f"operating.torque_profile: factor {min(self.torque_profile.factors):g} must not be negative"
             )
-        for key, ripple in (("speed_ripple", self.speed_ripple), ("torque_ripple", self.torque_ripple)):
+        for key, ripple in (
+            ("speed_ripple", self.speed_ripple),
+            ("torque_ripple", self.torque_ripple),
+        ):
             if ripple is not None:
                 self._check_ripple(f"operating.{key}", ripple)
 
@@ -71,7 +83,11 @@ class Operating:
         most = 1.0 if self.speed_profile is None else max(self.speed_profile.factors)
         fastest = float(ripple.rate(np.array([most * self.speed]))[0]) / (2.0 * math.pi)
         if fastest > FASTEST_RIPPLE:
-            told = "frequency_hz = " if ripple.order is None else f"order {ripple.order:g} makes up to "
+            told = (
+                "frequency_hz = "
+                if ripple.order is None
+                else f"order {ripple.order:g} makes up to "
+            )
             raise ConfigError(
                 f"{key}: {told}{fastest:g} Hz, above {FASTEST_RIPPLE:g} Hz; the course runs straight through every "
                 f"{SHORTEST_PIECE * 1e3:g} ms, which is too coarse for it"
@@ -96,8 +112,12 @@ class Operating:
             duration=duration,
             speed_profile=None if self.speed_profile is None else self.speed_profile.later(lead),
             torque_profile=None if self.torque_profile is None else self.torque_profile.later(lead),
-            speed_ripple=None if self.speed_ripple is None else self.speed_ripple.later(lead, turned),
-            torque_ripple=None if self.torque_ripple is None else self.torque_ripple.later(lead, turned),
+            speed_ripple=None
+            if self.speed_ripple is None
+            else self.speed_ripple.later(lead, turned),
+            torque_ripple=None
+            if self.torque_ripple is None
+            else self.torque_ripple.later(lead, turned),
         )
 
     def _profile_time(self, times: Array) -> Array:
@@ -116,7 +136,9 @@ class Operating:
         smooth = self._profile_time(times)
         if self.speed_ripple is None:
             return smooth
-        return smooth + self.speed_ripple.gained(times, self.speed * smooth, self.speed, self.speed_profile)
+        return smooth + self.speed_ripple.gained(
+            times, self.speed * smooth, self.speed, self.speed_profile
+        )
 
     def nominal(self, times: Array) -> Nominal:
         """Nominal motion and torque at times in s from the first recorded sample, (time,)."""
@@ -124,8 +146,12 @@ class Operating:
         torque, torque_slope = _factor_and_slope(self.torque_profile, times)
         if self.speed_ripple is not None or self.torque_ripple is not None:
             angle, set_speed = self._set_angle(times), self.speed * speed
-            speed, speed_slope = _rippled(self.speed_ripple, speed, speed_slope, times, angle, set_speed)
-            torque, torque_slope = _rippled(self.torque_ripple, torque, torque_slope, times, angle, set_speed)
+            speed, speed_slope = _rippled(
+                self.speed_ripple, speed, speed_slope, times, angle, set_speed
+            )
+            torque, torque_slope = _rippled(
+                self.torque_ripple, torque, torque_slope, times, angle, set_speed
+            )
         return Nominal(
             angle=self.speed * self.time_at_set_speed(times),
             speed=self.speed * speed,
@@ -143,11 +169,18 @@ def _factor_and_slope(profile: Profile | None, times: Array) -> tuple[Array, Arr
 
 
 def _rippled(
-    ripple: Ripple | None, factor: Array, slope: Array, times: Array, set_angle: Array, set_speed: Array
+    ripple: Ripple | None,
+    factor: Array,
+    slope: Array,
+    times: Array,
+    set_angle: Array,
+    set_speed: Array,
 ) -> tuple[Array, Array]:
     """A factor and its slope with the ripple on them, (time,) each."""
     if ripple is None:
         return factor, slope
     psi = ripple.psi(times, set_angle)
     whole = 1.0 + ripple.share * np.sin(psi)
-    return factor * whole, slope * whole + factor * ripple.share * np.cos(psi) * ripple.rate(set_speed)
+    return factor * whole, slope * whole + factor * ripple.share * np.cos(psi) * ripple.rate(
+        set_speed
+    )

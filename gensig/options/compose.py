@@ -28,7 +28,9 @@ from gensig.text import nearest
 CONFIG_MODULE = "gensig.configs"
 
 
-def compose(config_name: str, overrides: Sequence[str] = (), *, config_dir: str | Path | None = None) -> Configuration:
+def compose(
+    config_name: str, overrides: Sequence[str] = (), *, config_dir: str | Path | None = None
+) -> Configuration:
     """Compose one configuration.
 
     Parameters
@@ -104,7 +106,11 @@ def _one_value(override: Any) -> str:
     default = None
     for primary in option_files.PRIMARY:
         with _hydra():
-            default = OmegaConf.select(hydra_compose(config_name=primary), key) if default is None else default
+            default = (
+                OmegaConf.select(hydra_compose(config_name=primary), key)
+                if default is None
+                else default
+            )
     numbers = re.fullmatch(r"[-+]?\d+, ?\d+", text)
     if isinstance(default, ListConfig) or (default is None and "." in key and not numbers):
         return f"; or is it a list? Then write '{key}=[{','.join(parts)}]'"
@@ -156,7 +162,9 @@ class _hydra:
 def _parse(overrides: Sequence[str]) -> list[Any]:
     for word in overrides:
         if not isinstance(word, str):
-            raise ConfigError(f"an override is a text such as 'seed=1', not {word!r}; give each as its own argument")
+            raise ConfigError(
+                f"an override is a text such as 'seed=1', not {word!r}; give each as its own argument"
+            )
         if "=" not in word and not word.startswith("~"):
             text = "is neither group=option nor key=value, such as fault=crack or seed=1"
             raise ConfigError(f"cannot read the override: '{word}' {text}")
@@ -166,7 +174,9 @@ def _parse(overrides: Sequence[str]) -> list[Any]:
         raise ConfigError(f"cannot read the override: {_first_line(error)}") from None
 
 
-def _explain(error: Exception, config_name: str, overrides: Sequence[str], config_dir: str | Path | None) -> str:
+def _explain(
+    error: Exception, config_name: str, overrides: Sequence[str], config_dir: str | Path | None
+) -> str:
     """One line for a failed composition, with the nearest existing names."""
     text = " ".join(str(error).split())
     if "Config group override must be" in text:
@@ -174,7 +184,9 @@ def _explain(error: Exception, config_name: str, overrides: Sequence[str], confi
         for one in _parse(overrides):
             key, value = str(one.key_or_group), one.value()
             if key in groups and not isinstance(value, str | list):
-                return f"{one.input_line}: a group takes one of its options: {', '.join(options(key))}"
+                return (
+                    f"{one.input_line}: a group takes one of its options: {', '.join(options(key))}"
+                )
     if isinstance(error, ValueError) and not isinstance(error, HydraException):
         return text
     for pattern in (r"Could not override '([^']+)'", r"Key '([^']+)' is not in struct"):
@@ -222,7 +234,9 @@ def _nearest(key: str, names: Sequence[str]) -> str:
     close = difflib.get_close_matches(key, names, n=3, cutoff=0.6)
     if not close:
         leaf = key.rpartition(".")[2]
-        leaves = difflib.get_close_matches(leaf, [name.rpartition(".")[2] for name in names], n=3, cutoff=0.75)
+        leaves = difflib.get_close_matches(
+            leaf, [name.rpartition(".")[2] for name in names], n=3, cutoff=0.75
+        )
         close = [name for name in names if name.rpartition(".")[2] in leaves][:3]
     return f"; did you mean {' or '.join(repr(name) for name in close)}?" if close else ""
 

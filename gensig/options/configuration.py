@@ -79,7 +79,9 @@ class Section(Mapping[str, Any]):
 
     def without(self, *keys: str) -> Section:
         """The same group without some keys."""
-        return Section(self.name, {key: value for key, value in self._values.items() if key not in keys})
+        return Section(
+            self.name, {key: value for key, value in self._values.items() if key not in keys}
+        )
 
     def __or__(self, values: Mapping[str, Any]) -> Section:
         """The same group with some values replaced or added."""
@@ -106,7 +108,8 @@ class Configuration(Mapping[str, Any]):
 
     def __init__(self, values: Mapping[str, Any]) -> None:
         self._values: dict[str, Any] = {
-            name: dict(value._values) if isinstance(value, Section) else value for name, value in values.items()
+            name: dict(value._values) if isinstance(value, Section) else value
+            for name, value in values.items()
         }
 
     def __getitem__(self, key: str) -> Any:
@@ -155,7 +158,10 @@ class Configuration(Mapping[str, Any]):
         ConfigError    for a key that does not exist, holds no number, or is fixed for a data set
         """
         varied = {key.partition(".")[0] for key in values}
-        changed = {name: copy.deepcopy(value) if name in varied else value for name, value in self._values.items()}
+        changed = {
+            name: copy.deepcopy(value) if name in varied else value
+            for name, value in self._values.items()
+        }
         for key, value in values.items():
             self._replace(changed, key, value)
         return Configuration(changed)
@@ -167,16 +173,22 @@ class Configuration(Mapping[str, Any]):
     def _replace(self, changed: dict[str, Any], key: str, value: float) -> None:
         """Set a dotted key that must exist and hold a number."""
         if key.startswith(FIXED_KEYS):
-            raise ConfigError(f"plan.vary: '{key}' is one value for a whole data set; give several with -m instead")
+            raise ConfigError(
+                f"plan.vary: '{key}' is one value for a whole data set; give several with -m instead"
+            )
         *parents, leaf = key.split(".")
         node: Any = changed
         for name in parents:
             node = node.get(name) if isinstance(node, dict) else None
         if not isinstance(node, dict) or not _is_number(node.get(leaf, "")):
-            known = [name for name in _numeric_keys(self._values) if not name.startswith(FIXED_KEYS)]
+            known = [
+                name for name in _numeric_keys(self._values) if not name.startswith(FIXED_KEYS)
+            ]
             near = nearest.near(key, known)
             hint = f"; did you mean {' or '.join(map(repr, near))}?" if near else ""
-            raise ConfigError(f"plan.vary: '{key}' is no key of the configuration that holds a number{hint}")
+            raise ConfigError(
+                f"plan.vary: '{key}' is no key of the configuration that holds a number{hint}"
+            )
         is_count = isinstance(node[leaf], int) and float(value).is_integer()
         node[leaf] = int(value) if is_count else value
 
@@ -190,7 +202,9 @@ def whole_number(key: str, value: Any, *, at_least: int) -> int:
 
 def _group(name: str, value: Any) -> Mapping[str, Any]:
     if not isinstance(value, Mapping):
-        raise ConfigError(f"{name} = {value!r} must be a group of keys; choose an option or leave it alone")
+        raise ConfigError(
+            f"{name} = {value!r} must be a group of keys; choose an option or leave it alone"
+        )
     return value
 
 

@@ -101,7 +101,11 @@ class _File:
     def _entry(self, node: Any) -> tuple[str | None, Any, str]:
         if isinstance(node, yaml.MappingNode):
             group, option = node.value[0]
-            return group.value, None if option.value == "null" else option.value, self._comment(group, option)
+            return (
+                group.value,
+                None if option.value == "null" else option.value,
+                self._comment(group, option),
+            )
         return None, node.value, ""
 
     def entries(self, prefix: str = "") -> Iterator[Key]:
@@ -120,8 +124,16 @@ class _File:
             plain = _value(value)
             text = self.source[value.start_mark.index : value.end_mark.index]
             if isinstance(value, yaml.CollectionNode):
-                text = yaml.safe_dump(plain, default_flow_style=True, sort_keys=False, width=10**6).strip()
-            yield Key(name=name, text=text, value=plain, unit=_unit(str(key.value)), comment=self._comment(key, value))
+                text = yaml.safe_dump(
+                    plain, default_flow_style=True, sort_keys=False, width=10**6
+                ).strip()
+            yield Key(
+                name=name,
+                text=text,
+                value=plain,
+                unit=_unit(str(key.value)),
+                comment=self._comment(key, value),
+            )
 
     def _comment(self, key: Any, value: Any) -> str:
         """What is written behind a value and goes on below it, else right above its key."""
@@ -151,7 +163,9 @@ def groups(config_dir: str | Path | None = None) -> list[Group]:
     for folder in _folders(config_dir)[1:]:
         for path in sorted(folder.iterdir()):
             if path.is_dir() and path.name not in found and any(path.glob("*.yaml")):
-                found[path.name] = Group(name=path.name, about="of your own", default=None, primary=PRIMARY[0])
+                found[path.name] = Group(
+                    name=path.name, about="of your own", default=None, primary=PRIMARY[0]
+                )
     return list(found.values())
 
 
@@ -160,7 +174,9 @@ def options(group: str, config_dir: str | Path | None = None) -> list[Option]:
     found: dict[str, Option] = {}
     for folder in _folders(config_dir):
         for path in sorted((folder / group).glob("*.yaml")):
-            found.setdefault(path.stem, Option(name=path.stem, about=_File(path).about(), file=path))
+            found.setdefault(
+                path.stem, Option(name=path.stem, about=_File(path).about(), file=path)
+            )
     return [found[name] for name in sorted(found)]
 
 
@@ -177,7 +193,11 @@ def sections() -> dict[str, str]:
 def section_keys(name: str) -> list[Key]:
     """Keys of one part of a primary file; of those at its top where ``name`` is that file's."""
     keys = list(_primary(sections()[name]).entries())
-    return [key for key in keys if (key.name.startswith(f"{name}.") if name not in PRIMARY else "." not in key.name)]
+    return [
+        key
+        for key in keys
+        if (key.name.startswith(f"{name}.") if name not in PRIMARY else "." not in key.name)
+    ]
 
 
 def option_keys(group: str, option: str, config_dir: str | Path | None = None) -> list[Key]:
@@ -186,7 +206,9 @@ def option_keys(group: str, option: str, config_dir: str | Path | None = None) -
     for key in _option_keys(group, option, group, config_dir):
         before = found.get(key.name)
         if before is not None and not key.comment:
-            key = Key(name=key.name, text=key.text, value=key.value, unit=key.unit, comment=before.comment)
+            key = Key(
+                name=key.name, text=key.text, value=key.value, unit=key.unit, comment=before.comment
+            )
         for outer in [name for name in found if key.name.startswith(f"{name}.")]:
             del found[outer]  # null there, a group of keys here
         found[key.name] = key
@@ -197,18 +219,24 @@ def chosen_beside(group: str, option: str, config_dir: str | Path | None = None)
     """Options of other groups that an option chooses too."""
     entries = _find(group, option, config_dir).defaults()
     return {
-        name.removeprefix("override /"): str(other) for name, other, _ in entries if name and name[:8] == "override"
+        name.removeprefix("override /"): str(other)
+        for name, other, _ in entries
+        if name and name[:8] == "override"
     }
 
 
-def _option_keys(group: str, option: str, package: str, config_dir: str | Path | None) -> Iterator[Key]:
+def _option_keys(
+    group: str, option: str, package: str, config_dir: str | Path | None
+) -> Iterator[Key]:
     file = _find(group, option, config_dir)
     for name, other, _ in file.defaults():
         if name is None and other != "_self_":
             yield from _option_keys(group, other, package, config_dir)
         elif name is not None and not name.startswith("override") and other is not None:
             inner, _, place = name.partition("@")
-            yield from _option_keys(f"{group}/{inner}", other, f"{package}.{place or inner}", config_dir)
+            yield from _option_keys(
+                f"{group}/{inner}", other, f"{package}.{place or inner}", config_dir
+            )
     yield from file.entries("" if file.is_global else f"{package}.")
 
 
@@ -252,7 +280,11 @@ def _value(node: Any) -> Any:
     if isinstance(node, yaml.SequenceNode):
         return [_value(one) for one in node.value]
     value = yaml.safe_load(yaml.serialize(node))
-    if isinstance(value, str) and not node.style and re.fullmatch(r"[-+]?[0-9.]+[eE][-+]?[0-9]+", value):
+    if (
+        isinstance(value, str)
+        and not node.style
+        and re.fullmatch(r"[-+]?[0-9.]+[eE][-+]?[0-9]+", value)
+    ):
         return float(value)
     return value
 

@@ -21,7 +21,11 @@ from gensig.options.configuration import Configuration
 from gensig.record.machines import read_machine
 from gensig.units import to_si
 
-SEED_KEY, DURATION_KEY, SPEED_KEY = "operating.course_seed", "operating.duration_s", "operating.speed_rpm"
+SEED_KEY, DURATION_KEY, SPEED_KEY = (
+    "operating.course_seed",
+    "operating.duration_s",
+    "operating.speed_rpm",
+)
 EVERY_SEED = {"distribution": "integers", "low": 0, "high": 999_999, "levels": None}
 
 
@@ -46,7 +50,9 @@ def settle_courses(config: Configuration, typed: Collection[str]) -> Configurati
             )
     if any(isinstance(course, RandomWalk) for course in courses.values()) and SEED_KEY not in typed:
         config = config.with_keys("operating", course_seed=operating.get("course_seed", 0))
-        config = config.with_keys("plan", vary={**vary, SEED_KEY: vary.get(SEED_KEY, dict(EVERY_SEED))})
+        config = config.with_keys(
+            "plan", vary={**vary, SEED_KEY: vary.get(SEED_KEY, dict(EVERY_SEED))}
+        )
     schedule = read_schedule(operating)
     if schedule.turns is None:
         return config
@@ -56,7 +62,9 @@ def settle_courses(config: Configuration, typed: Collection[str]) -> Configurati
     least = least_speed(config, system.operating.speed)
     pair = system.pair
     n_teeth = {side: gear.n_teeth for side, gear in pair.gears.items()}
-    gears = _faulted(config) & set(n_teeth) if schedule.turns_of == "faulted" else {schedule.turns_of}
+    gears = (
+        _faulted(config) & set(n_teeth) if schedule.turns_of == "faulted" else {schedule.turns_of}
+    )
     slowest = max((n_teeth[gear] for gear in gears), default=pair.pinion.n_teeth)
     slowdown = slowest / pair.pinion.n_teeth
     seconds = schedule.turns * slowdown * 2.0 * math.pi / least
@@ -75,7 +83,11 @@ def least_speed(config: Configuration, set_speed: float) -> float:
     ConfigError    where the plan draws the course itself
     """
     operating, vary = config["operating"], config["plan"]["vary"]
-    if drawn := [key for key in vary if key.startswith(("operating.speed_profile.", "operating.speed_ripple."))]:
+    if drawn := [
+        key
+        for key in vary
+        if key.startswith(("operating.speed_profile.", "operating.speed_ripple."))
+    ]:
         raise ConfigError(
             f"operating.turns: the plan draws {drawn[0]}, so the slowest turn is not known; use duration_s"
         )
@@ -83,7 +95,9 @@ def least_speed(config: Configuration, set_speed: float) -> float:
         drawn_speed = read_distribution(f"plan.vary.{SPEED_KEY}", vary[SPEED_KEY])
         set_speed = to_si(SPEED_KEY, drawn_speed.least)
     course, ripple = read_course(operating, "speed_profile"), read_ripple(operating, "speed_ripple")
-    factor = (1.0 if course is None else course.least) * (1.0 if ripple is None else 1.0 - ripple.share)
+    factor = (1.0 if course is None else course.least) * (
+        1.0 if ripple is None else 1.0 - ripple.share
+    )
     if not set_speed * factor > 0.0:
         raise ConfigError("operating.turns: the slowest speed of the plan must be positive")
     return set_speed * factor
@@ -91,4 +105,6 @@ def least_speed(config: Configuration, set_speed: float) -> float:
 
 def _faulted(config: Configuration) -> set[str]:
     """Gears that carry a fault in any class."""
-    return {str(part.get("gear")) for fault in config["classes"].values() for part in fault_parts(fault)}
+    return {
+        str(part.get("gear")) for fault in config["classes"].values() for part in fault_parts(fault)
+    }

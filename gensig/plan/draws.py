@@ -23,7 +23,10 @@ OWN = ("of", CEILING)
 
 
 def draw_values(
-    config: Configuration, vary: Mapping[str, Distribution], points: NDArray[np.int64], rng: np.random.Generator
+    config: Configuration,
+    vary: Mapping[str, Distribution],
+    points: NDArray[np.int64],
+    rng: np.random.Generator,
 ) -> dict[str, list[Any]]:
     """Values of every varied key, (condition,) each.
 
@@ -47,8 +50,16 @@ def fault_sizes(fault: Mapping[str, Any]) -> dict[str, float]:
     """The numbers of a fault by key; those of a compound one carry the place of their part."""
     if "parts" in fault:
         numbered = enumerate(fault["parts"])
-        return {f"parts.{place}.{key}": value for place, part in numbered for key, value in fault_sizes(part).items()}
-    numbers = {key: value for key, value in fault.items() if isinstance(value, int | float) and key != "tooth"}
+        return {
+            f"parts.{place}.{key}": value
+            for place, part in numbered
+            for key, value in fault_sizes(part).items()
+        }
+    numbers = {
+        key: value
+        for key, value in fault.items()
+        if isinstance(value, int | float) and key != "tooth"
+    }
     return {key: float(value) for key, value in numbers.items()}
 
 
@@ -64,17 +75,24 @@ def fault_specs(
             if key not in part or key == "vary":
                 raise ConfigError(f"fault.vary: '{key}' is no key of fault={part['kind']}")
             name = f"parts.{place}.{key}" if fault["kind"] == COMPOUND else key
-            specs[name] = read_distribution(f"fault.vary.{name}", _for_gear(config, part, key, spec))
+            specs[name] = read_distribution(
+                f"fault.vary.{name}", _for_gear(config, part, key, spec)
+            )
             places[name] = (place, key)
     return specs, places
 
 
 def draw_faults(
-    config: Configuration, fault: Mapping[str, Any], points: NDArray[np.int64], rng: np.random.Generator
+    config: Configuration,
+    fault: Mapping[str, Any],
+    points: NDArray[np.int64],
+    rng: np.random.Generator,
 ) -> list[dict[str, Any]]:
     """One complete fault a condition, its severity distribution drawn; one design for all parts of a compound fault."""
     specs, places = fault_specs(config, fault)
-    parts = [{key: value for key, value in part.items() if key != "vary"} for part in fault_parts(fault)]
+    parts = [
+        {key: value for key, value in part.items() if key != "vary"} for part in fault_parts(fault)
+    ]
     drawn = draw_values(config, specs, points, rng)
     faults: list[dict[str, Any]] = []
     for condition in range(len(points)):
@@ -82,7 +100,11 @@ def draw_faults(
         for name, values in drawn.items():
             place, key = places[name]
             own[place][key] = values[condition]
-        faults.append({"kind": fault["kind"], "parts": own} if fault["kind"] == COMPOUND else (own or [dict(fault)])[0])
+        faults.append(
+            {"kind": fault["kind"], "parts": own}
+            if fault["kind"] == COMPOUND
+            else (own or [dict(fault)])[0]
+        )
     return faults
 
 
@@ -93,7 +115,10 @@ def _gear_sizes(config: Configuration, gear: str) -> tuple[int, dict[str, float]
         sizes = {"normal_module": own.normal_module, "face_width": own.face_width}
         return own.n_teeth, {name: from_si("size_mm", value) for name, value in sizes.items()}
     values = config["gear"][gear]
-    sizes = {"normal_module": config["gear"]["normal_module_mm"], "face_width": values["face_width_mm"]}
+    sizes = {
+        "normal_module": config["gear"]["normal_module_mm"],
+        "face_width": values["face_width_mm"],
+    }
     return values["n_teeth"], sizes
 
 
@@ -127,10 +152,16 @@ def _for_gear(config: Configuration, part: Mapping[str, Any], key: str, spec: An
         return [scaled(one) for one in value] if isinstance(value, list) else value * size
 
     try:
-        drawn = {name: scaled(value) if name in SCALED else value for name, value in spec.items() if name not in OWN}
+        drawn = {
+            name: scaled(value) if name in SCALED else value
+            for name, value in spec.items()
+            if name not in OWN
+        }
         if CEILING in spec:
             ceiling = from_si(key, spec[CEILING] * _root_chord(config, gear))
             drawn["high"] = min(drawn["high"], ceiling)
         return drawn
     except TypeError:
-        raise ConfigError(f"fault.vary.{key}: {', '.join(SCALED)} must be numbers, or lists of them") from None
+        raise ConfigError(
+            f"fault.vary.{key}: {', '.join(SCALED)} must be numbers, or lists of them"
+        ) from None

@@ -71,7 +71,9 @@ def snapshots(config: Configuration) -> Iterator[Snapshot]:
     n_setpoints = len(points) // n_units
     speed, torque = _speed_and_torque(machine, points, n_units)
     faults = {
-        name: draw_faults(config, config["classes"][name], np.arange(n_units), stream(seed, Stream.FAULT, index))
+        name: draw_faults(
+            config, config["classes"][name], np.arange(n_units), stream(seed, Stream.FAULT, index)
+        )
         for index, name in enumerate(names)
     }
     gears = LifeGears(config, machine, (float(torque.min()), float(torque.max())))
@@ -184,7 +186,9 @@ def _checked_units(config: Configuration, options: LifeOptions) -> int:
                 f"plan.{key} = {plan[key]!r}: lives and their snapshots say how many records there are; leave it null"
             )
     if plan["n_repeats"] != 1 or plan["design"] == GRID:
-        raise ConfigError("a plan of lives has plan.n_repeats=1 and draws its set-points: plan.design is no grid")
+        raise ConfigError(
+            "a plan of lives has plan.n_repeats=1 and draws its set-points: plan.design is no grid"
+        )
     for name, fault in config["classes"].items():
         kinds = {part["kind"] for part in fault_parts(fault)}
         if kinds - set(options.laws) or len(fault_parts(fault)) > 1:
@@ -201,7 +205,9 @@ def _checked_units(config: Configuration, options: LifeOptions) -> int:
     for key in options.drift:
         config.with_values({key: 0.0})  # refuses keys that cannot drift
         if key in plan["vary"] or key in (SPEED, TORQUE):
-            raise ConfigError(f"life.drift: '{key}' is drawn for each set-point already; let one of the two go")
+            raise ConfigError(
+                f"life.drift: '{key}' is drawn for each set-point already; let one of the two go"
+            )
     return whole_number("plan.n_units", plan["n_units"], at_least=1)
 
 
@@ -217,7 +223,9 @@ def _setpoints(config: Configuration, options: LifeOptions, n_units: int) -> lis
     n_setpoints = options.n_setpoints if given is None else len(given.speed)
     points = np.arange(n_units * n_setpoints)
     drawn_values = draw_values(config, vary, points, stream(config.seed, Stream.CONDITION))
-    found = [{key: float(values[k]) for key, values in drawn_values.items()} for k in points.tolist()]
+    found = [
+        {key: float(values[k]) for key, values in drawn_values.items()} for k in points.tolist()
+    ]
     if given is not None:
         for k, values in enumerate(found):
             values[SPEED] = from_si("speed_rpm", float(given.speed[k % n_setpoints]))
@@ -240,10 +248,15 @@ def _speed_and_torque(
 
 def _drift_factors(options: LifeOptions, rng: np.random.Generator) -> dict[str, float]:
     """Factors of one unit on the rates of its drifts, by configuration key."""
-    return {key: float(np.exp(drift.scatter * rng.standard_normal())) for key, drift in options.drift.items()}
+    return {
+        key: float(np.exp(drift.scatter * rng.standard_normal()))
+        for key, drift in options.drift.items()
+    }
 
 
-def _history(options: LifeOptions, speed: Array, torque: Array, rng: np.random.Generator) -> History:
+def _history(
+    options: LifeOptions, speed: Array, torque: Array, rng: np.random.Generator
+) -> History:
     if options.blocks is not None:
         return given_history(options.blocks, options.horizon)
     return draw_history(options.drawn, speed, torque, options.horizon, rng)

@@ -106,7 +106,11 @@ def make_plan(config: Configuration) -> Plan:
             name = names[label]
             # The first sound record of a condition starts as the twin that sets the noise does: it is that twin.
             is_twin = name == sound and repeat == 0
-            start = stream(seed, Stream.TWIN, condition) if is_twin else stream(seed, Stream.START, len(rows))
+            start = (
+                stream(seed, Stream.TWIN, condition)
+                if is_twin
+                else stream(seed, Stream.START, len(rows))
+            )
             fault = _Fault(plain=faults[name][condition], is_sham=options.sham)
             rows.append(
                 {
@@ -174,7 +178,9 @@ def read_counts(config: Configuration) -> Counts:
     per_unit, n_faults = plan.conditions_per_unit, 1
     if plan.is_grid:
         if per_unit is not None:
-            raise ConfigError(f"plan.conditions_per_unit = {per_unit!r}: a grid's levels say how many; leave it null")
+            raise ConfigError(
+                f"plan.conditions_per_unit = {per_unit!r}: a grid's levels say how many; leave it null"
+            )
         per_unit, n_faults = _grid_size(config, plan)
     n_records = plan.n_records
     if per_unit is not None:
@@ -184,7 +190,9 @@ def read_counts(config: Configuration) -> Counts:
     elif n_records is not None:
         n_conditions = math.ceil(n_records / (n_classes * plan.n_repeats))
     else:
-        raise ConfigError("plan.n_records = null: give a number, plan.conditions_per_unit, or plan.design=grid")
+        raise ConfigError(
+            "plan.n_records = null: give a number, plan.conditions_per_unit, or plan.design=grid"
+        )
     points = np.arange(n_conditions) // plan.n_units
     return Counts(
         n_records=n_records,
@@ -237,10 +245,14 @@ def describe_design(config: Configuration) -> str:
 def _fitting(plan: PlanOptions, n_records: int, counts: tuple[int, ...]) -> int:
     """The number of records that follows from the others, if ``plan.n_records`` has nothing against it."""
     names = ("units", "conditions", "faults", "classes", "repeats")
-    product = " x ".join(f"{n:,} {name}" for n, name in zip((*counts, plan.n_repeats), names, strict=True) if n > 1)
+    product = " x ".join(
+        f"{n:,} {name}" for n, name in zip((*counts, plan.n_repeats), names, strict=True) if n > 1
+    )
     sum_of_all = f"{n_records:,} records ({product})" if product else "1 record"
     if plan.is_grid and n_records > MOST_IN_GRID:
-        raise ConfigError(f"the grid has {sum_of_all}, more than {MOST_IN_GRID:,}; take fewer levels, units or repeats")
+        raise ConfigError(
+            f"the grid has {sum_of_all}, more than {MOST_IN_GRID:,}; take fewer levels, units or repeats"
+        )
     if plan.n_records not in (None, n_records):
         raise ConfigError(
             f"plan.n_records = {plan.n_records}, but the plan has {sum_of_all}; plan.n_records=null takes them"
@@ -261,11 +273,15 @@ class _Fault:
     is_checked: bool = True
 
 
-def _row(machine: Machine, fault: _Fault, values: Mapping[str, float], start: np.random.Generator) -> dict[str, Any]:
+def _row(
+    machine: Machine, fault: _Fault, values: Mapping[str, float], start: np.random.Generator
+) -> dict[str, Any]:
     """Columns of one record that follow from its drawn values."""
     applied = read_faults(fault.plain)
     if fault.is_checked:
-        check_teeth(machine.pair, machine.material, machine.mesh, faulty_teeth(machine.pair, applied))
+        check_teeth(
+            machine.pair, machine.material, machine.mesh, faulty_teeth(machine.pair, applied)
+        )
     parts = fault_parts(fault.plain)
     tooth = int(start.integers(machine.pair.pinion.n_teeth))
     mate = int(start.integers(machine.pair.wheel.n_teeth))

@@ -24,7 +24,9 @@ def _units_left_out(config: Configuration, plan: Plan) -> str:
     classes = _count(len(config["plan"]["classes"]), "class", "es")
     repeats = _count(config["plan"]["n_repeats"], "repeat")
     records = _count(plan.n_records, "record")
-    return f"{records} are {conditions} of {classes} and {repeats}: {used} of {asked} units are used"
+    return (
+        f"{records} are {conditions} of {classes} and {repeats}: {used} of {asked} units are used"
+    )
 
 
 def _splits_left_out(plan: Plan, seed: int) -> str:
@@ -32,7 +34,9 @@ def _splits_left_out(plan: Plan, seed: int) -> str:
     reasons = why_left_out(plan, seed, tuple(BY_MACHINE))
     if "by_unit" in reasons:
         reasons = {"by_unit": reasons["by_unit"]}
-    return "; ".join(f"no split by {BY_MACHINE[name]} is possible ({reason})" for name, reason in reasons.items())
+    return "; ".join(
+        f"no split by {BY_MACHINE[name]} is possible ({reason})" for name, reason in reasons.items()
+    )
 
 
 def n_different(plan: Plan, column: str) -> int:

@@ -59,7 +59,10 @@ def read_request(overrides: Sequence[str], *, config_dir: str | Path | None = No
     faults = {name: selected for name in names}
     if listed and "fault" not in words.keys:
         options_of = {name: _fault_option(words, name, (), config_dir) for name in names}
-        faults = {name: _class_fault(words, name, option, config_dir) for name, option in options_of.items()}
+        faults = {
+            name: _class_fault(words, name, option, config_dir)
+            for name, option in options_of.items()
+        }
     _refuse_unused(words, [selected, *faults.values()])
     notes = []
     if listed and listed != names:
@@ -68,7 +71,9 @@ def read_request(overrides: Sequence[str], *, config_dir: str | Path | None = No
     pinned = dict.fromkeys(key for fault in (selected, *faults.values()) for key in fault.pinned)
     pinned |= dict.fromkeys(_pin_varied(words, base["plan"]))
     if pinned:
-        notes.append(f"pinned, no longer varied: {', '.join(f'{key} = {words.keys[key]}' for key in pinned)}")
+        notes.append(
+            f"pinned, no longer varied: {', '.join(f'{key} = {words.keys[key]}' for key in pinned)}"
+        )
     base["fault"] = copy.deepcopy(selected.option)
     base["classes"] = {name: copy.deepcopy(fault.option) for name, fault in faults.items()}
     _reset_derived(base["gear"], set(words.keys) | set(base["plan"]["vary"]))
@@ -102,7 +107,9 @@ class _Words:
 def _typed_words(overrides: Sequence[str]) -> _Words:
     keys = override_keys(overrides)
     plan_vary, fault_vary = (typed_mapping(overrides, key) for key in VARY_KEYS)
-    plain = [word for word in overrides if not word.startswith(tuple(f"{key}=" for key in VARY_KEYS))]
+    plain = [
+        word for word in overrides if not word.startswith(tuple(f"{key}=" for key in VARY_KEYS))
+    ]
     of_fault = [word for word in plain if word.lstrip("+").startswith("fault.")]
     return _Words(
         keys=keys,
@@ -136,7 +143,9 @@ class _ClassFault:
     pinned: tuple[str, ...]
 
 
-def _class_fault(words: _Words, name: str | None, option: dict[str, Any], config_dir: str | Path | None) -> _ClassFault:
+def _class_fault(
+    words: _Words, name: str | None, option: dict[str, Any], config_dir: str | Path | None
+) -> _ClassFault:
     """A fault option with the typed keys that it has; ``name`` None for that of the whole configuration."""
     typed = {key: word for key, word in words.fault_words.items() if key.split(".")[1] in option}
     typed.pop("fault.vary", None)
@@ -170,10 +179,14 @@ def _fault_option(
             pass
     others = [word for word in words.others if name is None or not word.startswith("fault=")]
     chosen = [] if name is None else [f"fault={name}"]
-    return compose(CONFIG_NAME, [*others, *chosen, *fault_words], config_dir=config_dir)["fault"].plain()
+    return compose(CONFIG_NAME, [*others, *chosen, *fault_words], config_dir=config_dir)[
+        "fault"
+    ].plain()
 
 
-def _option_alone(name: str, words: tuple[str, ...], config_dir: str | Path | None) -> dict[str, Any]:
+def _option_alone(
+    name: str, words: tuple[str, ...], config_dir: str | Path | None
+) -> dict[str, Any]:
     if config_dir is not None:
         return compose(f"fault/{name}", words, config_dir=config_dir)["fault"].plain()
     return _packaged_option(name, words)
@@ -184,14 +197,18 @@ def _packaged_option(name: str, words: tuple[str, ...]) -> dict[str, Any]:
     return compose(f"fault/{name}", words)["fault"].plain()
 
 
-def _with_whole_parts(fault: dict[str, Any], words: _Words, config_dir: str | Path | None) -> dict[str, Any]:
+def _with_whole_parts(
+    fault: dict[str, Any], words: _Words, config_dir: str | Path | None
+) -> dict[str, Any]:
     """A compound fault whose parts have every key: what a part leaves out is its kind's option, ``vary`` included."""
     if fault["kind"] != COMPOUND:
         return fault
     parts = []
     for part in fault_parts(fault):
         if part.get("kind") in (None, COMPOUND, "healthy"):
-            raise ConfigError(f"fault.parts: kind = {part.get('kind')!r}; give the kind of one single fault")
+            raise ConfigError(
+                f"fault.parts: kind = {part.get('kind')!r}; give the kind of one single fault"
+            )
         option = _fault_option(words, part["kind"], (), config_dir)
         vary = {key: spec for key, spec in (option.get("vary") or {}).items() if key not in part}
         parts.append({**option, "vary": vary, **part})
@@ -231,13 +248,17 @@ def _check_shape(composed: Mapping[str, Any]) -> None:
             )
     for key in composed:
         if key not in SECTIONS + OPTIONAL_SECTIONS + PLAIN_KEYS:
-            raise ConfigError(f"unknown key '{key}'; the configuration has {', '.join(SECTIONS + PLAIN_KEYS)}")
+            raise ConfigError(
+                f"unknown key '{key}'; the configuration has {', '.join(SECTIONS + PLAIN_KEYS)}"
+            )
 
 
 def _no_such_fault_key(key: str, selected: Mapping[str, Any]) -> str:
     leaf = key.removeprefix("fault.")
     known = [name for name in selected if name not in ("kind", "vary")]
-    close = difflib.get_close_matches(leaf, known, n=1, cutoff=0.8)  # a slip, not another fault's key
+    close = difflib.get_close_matches(
+        leaf, known, n=1, cutoff=0.8
+    )  # a slip, not another fault's key
     if close:
         return f"unknown key '{key}'; did you mean 'fault.{close[0]}'?"
     has = f"it has {', '.join(known)}" if known else "it has no keys"
@@ -247,7 +268,10 @@ def _no_such_fault_key(key: str, selected: Mapping[str, Any]) -> str:
 def _reset_derived(gear: dict[str, Any], touched: set[str]) -> None:
     """Derive mass and inertia anew where teeth, module or width are no longer those the source weighed."""
     for side in SIDES:
-        changed = sorted(touched & {"gear.normal_module_mm", f"gear.{side}.n_teeth", f"gear.{side}.face_width_mm"})
+        changed = sorted(
+            touched
+            & {"gear.normal_module_mm", f"gear.{side}.n_teeth", f"gear.{side}.face_width_mm"}
+        )
         lost = [
             key
             for key in ("mass_kg", "inertia_kg_m2")

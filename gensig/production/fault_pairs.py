@@ -99,13 +99,20 @@ class FaultPairs:
         n_samples = round(self.duration * self.sampling_rate)
         shape = (self.n_units, len(self.channel_names), n_samples)
         signals = {name: np.full(shape, np.nan) for name in ("residual", "sound", "faulty")}
-        angles = {name: np.full((self.n_units, n_samples), np.nan) for name in ("sound_angle", "faulty_angle")}
+        angles = {
+            name: np.full((self.n_units, n_samples), np.nan)
+            for name in ("sound_angle", "faulty_angle")
+        }
         power = np.full(shape[:2], np.nan)
         for unit, inputs in enumerate(faulty):
             without, with_fault = motions[unit], motions[self.n_units + unit]
             if isinstance(without, SimulationError) or isinstance(with_fault, SimulationError):
                 continue
-            power[unit] = _noise_power(inputs, without) if self.fixed_power is None else self.fixed_power[unit]
+            power[unit] = (
+                _noise_power(inputs, without)
+                if self.fixed_power is None
+                else self.fixed_power[unit]
+            )
             clean = []
             for name, motion in (("sound", without), ("faulty", with_fault)):
                 clean.append(inputs.clean(motion.acceleration))
@@ -113,7 +120,9 @@ class FaultPairs:
                 angles[f"{name}_angle"][unit] = motion.shaft_angle
             signals["residual"][unit] = clean[1] - clean[0]
         shape_of_noise = np.ones((1, 1, 1)) if self.noise_shape is None else self.noise_shape
-        return PairCell(**signals, **angles, noise_power=power, noise_density=power[:, :, None] * shape_of_noise)
+        return PairCell(
+            **signals, **angles, noise_power=power, noise_density=power[:, :, None] * shape_of_noise
+        )
 
 
 def make_pairs(
@@ -152,13 +161,19 @@ def make_pairs(
             "sensing.snr_db = null: without noise every fault is seen; give a signal-to-noise ratio in dB"
         )
     if sensing["snr_reference"] != "healthy_twin":
-        raise ConfigError("sensing.snr_reference: noise that follows the record tells the fault; use healthy_twin")
+        raise ConfigError(
+            "sensing.snr_reference: noise that follows the record tells the fault; use healthy_twin"
+        )
     whole_number("the number of units", n_units, at_least=FEWEST_UNITS)
     speeds = _levels("speeds in r/min", speeds_rpm, config["operating"]["speed_rpm"], SPEED_SHARES)
     torques = _levels("torques in N m", torques_nm, config["operating"]["torque_nm"], TORQUE_SHARES)
     if len(speeds) * len(torques) > MOST_CELLS:
-        raise ConfigError(f"{len(speeds)} speeds x {len(torques)} torques are more than {MOST_CELLS} cells; give fewer")
-    config = config.with_entries(fault=without_vary(fault), classes={fault["kind"]: without_vary(fault)})
+        raise ConfigError(
+            f"{len(speeds)} speeds x {len(torques)} torques are more than {MOST_CELLS} cells; give fewer"
+        )
+    config = config.with_entries(
+        fault=without_vary(fault), classes={fault["kind"]: without_vary(fault)}
+    )
     config = config.with_keys("dataset", store_mesh_state=False)
     planned, rows = _planned(config, speeds, torques, n_units)
     system = read_system(planned)
@@ -175,20 +190,30 @@ def make_pairs(
         usable_frequency=usable_band(system.sensing.sampling_rate)[1],
         duration=system.operating.duration,
         rows=tuple(rows),
-        noise_shape=None if system.sensing.has_white_noise else _noise_shape(planned, rows[:n_units]),
+        noise_shape=None
+        if system.sensing.has_white_noise
+        else _noise_shape(planned, rows[:n_units]),
         fixed_power=_power_at_set_point(config, n_units) if fixed_noise else None,
     )
 
 
-def _levels(what: str, given: Sequence[float] | None, set_point: float, shares: Sequence[float]) -> tuple[float, ...]:
+def _levels(
+    what: str, given: Sequence[float] | None, set_point: float, shares: Sequence[float]
+) -> tuple[float, ...]:
     """The values of one axis, rising."""
-    values = [share * set_point for share in shares] if given is None else [float(value) for value in given]
+    values = (
+        [share * set_point for share in shares]
+        if given is None
+        else [float(value) for value in given]
+    )
     if (
         not values
         or not all(math.isfinite(value) and value > 0.0 for value in values)
         or len(set(values)) < len(values)
     ):
-        raise ConfigError(f"{what}: {', '.join(f'{value:g}' for value in values)}; give positive numbers, each once")
+        raise ConfigError(
+            f"{what}: {', '.join(f'{value:g}' for value in values)}; give positive numbers, each once"
+        )
     return tuple(sorted(values))
 
 
@@ -216,10 +241,14 @@ def _planned(
     table = make_plan(config)
     rows = [table.record(index) for index in range(table.n_records)]
     gearboxes = [f"gearbox-{index % n_units % n_gearboxes:04d}" for index in range(len(rows))]
-    return config, [{**row, "gearbox_id": gearbox} for row, gearbox in zip(rows, gearboxes, strict=True)]
+    return config, [
+        {**row, "gearbox_id": gearbox} for row, gearbox in zip(rows, gearboxes, strict=True)
+    ]
 
 
-def _contrasts(config: Configuration, rows: Sequence[Row]) -> tuple[list[RecordInputs], list[RecordInputs]]:
+def _contrasts(
+    config: Configuration, rows: Sequence[Row]
+) -> tuple[list[RecordInputs], list[RecordInputs]]:
     """Each row without and with its fault, from the start of the healthy twin that sets the noise of a data set.
 
     Both are records: their nuisances and noise are those of the row.
@@ -259,10 +288,15 @@ def _noise_shape(config: Configuration, rows: Sequence[Row]) -> Array:
         sensing = inputs.machine.sensing
         n_samples = round(inputs.machine.operating.duration * sensing.sampling_rate)
         silent = np.zeros((len(sensing.channel_names), n_samples))
-        ideal = Instrument(sensing=replace(sensing, sensor=None), path=inputs.instrument.path, sensors=None)
+        ideal = Instrument(
+            sensing=replace(sensing, sensor=None), path=inputs.instrument.path, sensors=None
+        )
         children = stream(config.seed, Stream.NOISE, unit).spawn(NOISE_DRAWS)
         noises = (ideal.record(silent, np.ones(len(silent)), rng)[0] for rng in children)
-        density = np.mean([np.abs(np.fft.rfft(noise, axis=-1)) ** 2 for noise in noises], axis=0) / n_samples
+        density = (
+            np.mean([np.abs(np.fft.rfft(noise, axis=-1)) ** 2 for noise in noises], axis=0)
+            / n_samples
+        )
         densities.append([_smoothed(line) for line in density])
     return np.array(densities)
 
@@ -270,4 +304,6 @@ def _noise_shape(config: Configuration, rows: Sequence[Row]) -> Array:
 def _smoothed(density: Array) -> Array:
     """Running mean; at either end of the bins that there are."""
     window = np.ones(min(NOISE_BINS, len(density)))
-    return np.convolve(density, window, mode="same") / np.convolve(np.ones_like(density), window, mode="same")
+    return np.convolve(density, window, mode="same") / np.convolve(
+        np.ones_like(density), window, mode="same"
+    )

@@ -70,7 +70,9 @@ def begin_folder(config: Configuration, overrides: Sequence[str], out: Path) -> 
     """Plan a data set and make its folder, ready for ``run_folder``; nothing is touched if anything is wrong."""
     for key, allowed in (("compression", COMPRESSIONS), ("sample_type", SAMPLE_TYPES)):
         if config["dataset"][key] not in allowed:
-            raise ConfigError(f"dataset.{key} = {config['dataset'][key]!r}; allowed: {', '.join(allowed)}")
+            raise ConfigError(
+                f"dataset.{key} = {config['dataset'][key]!r}; allowed: {', '.join(allowed)}"
+            )
     dataset = read_dataset_options(config)
     creation_options(dataset.compression)  # refuses one whose package is missing
     plan = make_plan(config)
@@ -84,12 +86,18 @@ def begin_folder(config: Configuration, overrides: Sequence[str], out: Path) -> 
         seed=config.seed,
         generator_version=__version__,
     )
-    log(out, f"gensig {__version__}: {plan.n_records} records in {plan.n_shards} shards are planned")
+    log(
+        out, f"gensig {__version__}: {plan.n_records} records in {plan.n_shards} shards are planned"
+    )
     return plan
 
 
 def run_folder(
-    out: Path, *, executor: Executor, on_shard: Callable[[Progress], None], asked: Configuration | None = None
+    out: Path,
+    *,
+    executor: Executor,
+    on_shard: Callable[[Progress], None],
+    asked: Configuration | None = None,
 ) -> tuple[int, list[str]]:
     """Make the shards that a folder still lacks, then close it; a task of an array job makes its share only.
 
@@ -113,14 +121,18 @@ def run_folder(
     mine = executor.share(range(len(rows)))
     entries = {index: manifest.shards[index] for index in mine}
     if not executor.closes:
-        entries |= {index: entry for index in mine if (entry := read_receipt(out, index)) is not None}
+        entries |= {
+            index: entry for index in mine if (entry := read_receipt(out, index)) is not None
+        }
     missing = [index for index in mine if not _is_there(out, index, entries[index])]
     n_records = sum(rows[index] for index in mine)
     n_done = n_records - sum(rows[index] for index in missing)
     n_failed = sum(entries[index].n_failed for index in mine if index not in missing)
     problems: list[str] = []
     n_made, n_bytes = 0, 0
-    logged = executor.closes and not manifest.is_complete  # the log of a closed folder is closed too
+    logged = (
+        executor.closes and not manifest.is_complete
+    )  # the log of a closed folder is closed too
     if logged:
         log(out, f"gensig {__version__}, {executor}: {len(missing)} of {len(mine)} shards to make")
     try:
@@ -138,7 +150,10 @@ def run_folder(
                 if executor.closes:
                     record_shard(out, index, result.sha256, result.n_bytes, result.n_failed)
                     receipt_path(out, index).unlink(missing_ok=True)
-                    log(out, f"shard {index}: {rows[index]} records, {result.n_failed} failed, {result.n_bytes} bytes")
+                    log(
+                        out,
+                        f"shard {index}: {rows[index]} records, {result.n_failed} failed, {result.n_bytes} bytes",
+                    )
             on_shard(
                 Progress(
                     n_done=n_done,
@@ -161,7 +176,10 @@ def run_folder(
 def _close(out: Path) -> None:
     """Close the folder; the log is closed with it, and takes no line afterwards."""
     if reasons := failure_reasons(out):
-        log(out, f"{len(reasons)} of {read_manifest(out).n_records} records failed: {commonest(reasons)}")
+        log(
+            out,
+            f"{len(reasons)} of {read_manifest(out).n_records} records failed: {commonest(reasons)}",
+        )
     log(out, "every shard is done; closing")
     finalize(out)
 
@@ -186,7 +204,10 @@ def close_folder(out: Path) -> int:
     return read_manifest(out).n_failed
 
 
-MOST_BLOCK, BLOCK_BYTES = 64, 2**27  # records simulated and written at a time, and bytes of their samples
+MOST_BLOCK, BLOCK_BYTES = (
+    64,
+    2**27,
+)  # records simulated and written at a time, and bytes of their samples
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -228,19 +249,29 @@ def _folder_inputs(out: Path, _changed: int) -> tuple[Configuration, PlanRows, l
     return Configuration(config), PlanRows(out / PLAN), [entry.rows for entry in manifest.shards]
 
 
-def _check_places(out: Path, rows: Sequence[Mapping[str, Any]], shard_index: int, first: int) -> None:
+def _check_places(
+    out: Path, rows: Sequence[Mapping[str, Any]], shard_index: int, first: int
+) -> None:
     if any((row["shard"], row["row"]) != (shard_index, first + k) for k, row in enumerate(rows)):
-        raise DatasetError(f"{out / PLAN} and the manifest disagree on shard {shard_index}; restore both from a copy")
+        raise DatasetError(
+            f"{out / PLAN} and the manifest disagree on shard {shard_index}; restore both from a copy"
+        )
 
 
 def block_length(config: Configuration) -> int:
     """Records that are simulated at a time: enough for full speed, few enough for the memory."""
     system = read_machine(config)
-    n_bytes = 8 * len(system.sensing.channels) * round(system.operating.duration * system.sensing.sampling_rate)
+    n_bytes = (
+        8
+        * len(system.sensing.channels)
+        * round(system.operating.duration * system.sensing.sampling_rate)
+    )
     return max(records_together(system.solver), min(MOST_BLOCK, BLOCK_BYTES // n_bytes))
 
 
-def open_shard(path: Path, config: Configuration, n_records: int, params: Sequence[str]) -> ShardWriter:
+def open_shard(
+    path: Path, config: Configuration, n_records: int, params: Sequence[str]
+) -> ShardWriter:
     """Writer for records of one configuration."""
     system, dataset = read_machine(config), read_dataset_options(config)
     return ShardWriter(
@@ -262,7 +293,10 @@ def _shaft_sensors(dataset: DatasetOptions, system: Machine) -> dict[str, Any]:
     if dataset.store_tacho:
         attributes |= {"tacho_shaft": tacho.shaft, "tacho_pulses_per_turn": tacho.pulses_per_turn}
     if dataset.store_encoder:
-        attributes |= {"encoder_shaft": encoder.shaft, "encoder_lines_per_turn": encoder.lines_per_turn}
+        attributes |= {
+            "encoder_shaft": encoder.shaft,
+            "encoder_lines_per_turn": encoder.lines_per_turn,
+        }
     return attributes
 
 
@@ -289,5 +323,7 @@ def root_attributes(config: Configuration, system: Machine) -> dict[str, Any]:
         "center_distance_mm": from_si("center_distance_mm", pair.center_distance),
         "transverse_contact_ratio": pair.transverse_contact_ratio,
         "overlap_ratio": pair.overlap_ratio,
-        "config_json": json.dumps(config.with_entries(out=None, executor=None).plain(), sort_keys=True),
+        "config_json": json.dumps(
+            config.with_entries(out=None, executor=None).plain(), sort_keys=True
+        ),
     }

@@ -81,7 +81,9 @@ def predict(
 
 
 def _warn_of_failed(records: Sequence[Record]) -> None:
-    reasons = [str(one.values["status_reason"]) for one in records if one.values.get("status") == "failed"]
+    reasons = [
+        str(one.values["status_reason"]) for one in records if one.values.get("status") == "failed"
+    ]
     if reasons:
         warnings.warn(
             f"{len(reasons)} of {len(records)} records made to time the plan failed: {commonest(reasons)}",
@@ -92,7 +94,9 @@ def _warn_of_failed(records: Sequence[Record]) -> None:
 
 def _n_processes(config: Configuration) -> int:
     """Shards made at a time, also where the rest of ``executor`` is not known yet."""
-    return read_n_workers(config["executor"]["n_workers"]) * (config["executor"].get("shard_count") or 1)
+    return read_n_workers(config["executor"]["n_workers"]) * (
+        config["executor"].get("shard_count") or 1
+    )
 
 
 def _stored_bytes(config: Configuration, table: Plan, records: list[Record]) -> int:
@@ -109,5 +113,10 @@ def _stored_bytes(config: Configuration, table: Plan, records: list[Record]) -> 
     per_record = (many - one) / (len(records) - 1) if len(records) > 1 else one
     shards = table.n_shards * (one - per_record) + table.n_records * per_record
     n_classes = len(config["plan"]["classes"])
-    beside = BESIDE + BESIDE_A_SHARD * table.n_shards + BESIDE_A_RECORD * table.n_records + BESIDE_A_CLASS * n_classes
+    beside = (
+        BESIDE
+        + BESIDE_A_SHARD * table.n_shards
+        + BESIDE_A_RECORD * table.n_records
+        + BESIDE_A_CLASS * n_classes
+    )
     return round(shards + len(plan_text(table)) + beside)

@@ -25,7 +25,13 @@ from gensig.record.inputs import InputReader, simulate_motions
 from gensig.record.simulate import Record, simulate_record, simulate_records
 
 ACCEPTED = 1e-6  # of a record's RMS, where the processor or a library is another
-DECIDING = ("cpu_model", "python", "numpy", "scipy", "numba")  # facts of an environment that bits may depend on
+DECIDING = (
+    "cpu_model",
+    "python",
+    "numpy",
+    "scipy",
+    "numba",
+)  # facts of an environment that bits may depend on
 BLOCK = 16  # records simulated at a time
 
 
@@ -66,8 +72,14 @@ def reproduce(folder: Path, n_records: int) -> Reproduction:
     manifest, config, plan = _finished(folder)
     here = environment()
     recorded = {name: str(manifest.environment.get(name, "")) for name in DECIDING}
-    other = {name: (recorded[name], str(here[name])) for name in DECIDING if recorded[name] != str(here[name])}
-    chosen = np.unique(np.linspace(0, plan.n_records - 1, min(n_records, plan.n_records)).round().astype(int))
+    other = {
+        name: (recorded[name], str(here[name]))
+        for name in DECIDING
+        if recorded[name] != str(here[name])
+    }
+    chosen = np.unique(
+        np.linspace(0, plan.n_records - 1, min(n_records, plan.n_records)).round().astype(int)
+    )
     differences: dict[str, float] = {}
     refused, n_failed = 0, 0
     for start in range(0, len(chosen), BLOCK):
@@ -98,7 +110,9 @@ def recorded_row(folder: Path, record: str) -> tuple[Configuration, dict[str, An
         return config, plan.record(ids.index(record))
     if record.isdecimal() and int(record) < plan.n_records:
         return config, plan.record(int(record))
-    raise ConfigError(f"--record {record}: {folder} has records 0 to {plan.n_records - 1}, ids {ids[0]} to {ids[-1]}")
+    raise ConfigError(
+        f"--record {record}: {folder} has records 0 to {plan.n_records - 1}, ids {ids[0]} to {ids[-1]}"
+    )
 
 
 def simulate_twin(config: Configuration, row: Mapping[str, Any]) -> Record:
@@ -115,9 +129,16 @@ def simulate_twin(config: Configuration, row: Mapping[str, Any]) -> Record:
     twin = simulate_record(sham, row)
     for record in (original, twin):
         if record.values.get("status") == "failed":
-            raise SimulationError(f"record {row['record_id']} failed: {record.values['status_reason']}")
+            raise SimulationError(
+                f"record {row['record_id']} failed: {record.values['status_reason']}"
+            )
     signals = dict(twin.signals)
-    sound: dict[str, Any] = {"severity": 0.0, "faults_json": "[]", "fault_gear": "", "fault_tooth": -1}
+    sound: dict[str, Any] = {
+        "severity": 0.0,
+        "faults_json": "[]",
+        "fault_gear": "",
+        "fault_tooth": -1,
+    }
     if not np.array_equal(signals["noise_power"], original.signals["noise_power"]):
         # noise follows the record, so that the twin alone would have another
         inputs = InputReader(sham).inputs(row)
@@ -147,7 +168,10 @@ def _difference(folder: Path, row: Mapping[str, Any], record: Record) -> tuple[f
         if failed != (record.values.get("status") == "failed"):
             return np.inf, 0.0
         if failed:
-            reasons = [stored_reason(record.values["status_reason"]), str(read_rows(file["status_reason"])[place])]
+            reasons = [
+                stored_reason(record.values["status_reason"]),
+                str(read_rows(file["status_reason"])[place]),
+            ]
             return (0.0 if len(set(map(without_numbers, reasons))) == 1 else np.inf), 0.0
         for name, scale_name in SCALES.items():
             if name not in file:

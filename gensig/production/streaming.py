@@ -91,7 +91,9 @@ class RecordStream:
     def column(self, name: str) -> NDArray[Any]:
         """One value of the plan a record, (record,)."""
         if name not in self.plan.columns:
-            raise DatasetError(f"the plan has no column {name!r}; it has {', '.join(self.column_names)}")
+            raise DatasetError(
+                f"the plan has no column {name!r}; it has {', '.join(self.column_names)}"
+            )
         return self.plan.columns[name][self.numbers]
 
     @property
@@ -103,7 +105,9 @@ class RecordStream:
         """Subset -> list of (place in this part, start_fraction, stop_fraction), as the stored data set has it."""
         tables = make_splits(self.plan, self.seed)
         if protocol not in tables:
-            reason = why_left_out(self.plan, self.seed).get(protocol, f"the plan can have {', '.join(sorted(tables))}")
+            reason = why_left_out(self.plan, self.seed).get(
+                protocol, f"the plan can have {', '.join(sorted(tables))}"
+            )
             raise DatasetError(f"split {protocol!r} does not exist; {reason}")
         table = tables[protocol]
         places = {name: place for place, name in enumerate(self.column("record_id").tolist())}
@@ -117,7 +121,9 @@ class RecordStream:
     def take(self, places: ArrayLike) -> RecordStream:
         """Some records of this part: (record,) places in it, or True for each that is meant."""
         chosen = np.asarray(places)
-        return replace(self, numbers=self.numbers[chosen if chosen.dtype == bool else chosen.astype(np.int64)])
+        return replace(
+            self, numbers=self.numbers[chosen if chosen.dtype == bool else chosen.astype(np.int64)]
+        )
 
     def shard(self, index: int, count: int) -> RecordStream:
         """The part of worker ``index`` of ``count``; together they are the whole, and no record is in two of them.

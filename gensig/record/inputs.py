@@ -78,7 +78,9 @@ class RecordNumbers:
     @classmethod
     def of(cls, row: Row) -> RecordNumbers:
         """The numbers that the ids of a row end in, such as 3 of ``gearbox-0003`` and 7 of ``r000007``."""
-        return cls(**{name: _number(row[f"{name}_id"]) for name in (RECORD, CONDITION, GEARBOX, SPECIMEN)})
+        return cls(
+            **{name: _number(row[f"{name}_id"]) for name in (RECORD, CONDITION, GEARBOX, SPECIMEN)}
+        )
 
 
 def _number(identifier: Any) -> int:
@@ -123,7 +125,12 @@ class RecordInputs:
 
     def healthy_twin(self) -> RecordInputs:
         """The sound record that sets the noise of the condition; it starts as no row of the plan decides."""
-        run = replace(self.run, faults=(), tell_mesh=False, start=twin_start(self.machine, self.stream(Stream.TWIN)))
+        run = replace(
+            self.run,
+            faults=(),
+            tell_mesh=False,
+            start=twin_start(self.machine, self.stream(Stream.TWIN)),
+        )
         return replace(self, run=run, is_reference=True)
 
     def nuisance_streams(self) -> tuple[dict[str, np.random.Generator], np.random.Generator]:
@@ -133,7 +140,8 @@ class RecordInputs:
         they do not depend on which record asks for it first.
         """
         units = {
-            level: stream(self.seed, Stream.NUISANCE, getattr(self.numbers, level)) for level in (GEARBOX, SPECIMEN)
+            level: stream(self.seed, Stream.NUISANCE, getattr(self.numbers, level))
+            for level in (GEARBOX, SPECIMEN)
         }
         cause = Stream.TWIN if self.is_reference else Stream.NUISANCE_RECORD
         return units, self.stream(cause)
@@ -149,7 +157,11 @@ class RecordInputs:
         received, dropped = self.instrument.sent(noisy, self.stream(Stream.DROPPED))
         sensor = self.instrument.sensing.sensor
         too_many = int(sensor is not None and clipped > sensor.max_clipped_fraction)
-        return received, {"clipped_fraction": clipped, "clipped": too_many, "dropped_fraction": dropped}
+        return received, {
+            "clipped_fraction": clipped,
+            "clipped": too_many,
+            "dropped_fraction": dropped,
+        }
 
     def noisy_twin(self, clean: Array, noise_power: Array) -> Array:
         """Output of the sensors on the machine without faults, with drift, noise and losses of its own.
@@ -179,7 +191,9 @@ def simulate_motions(inputs: Sequence[RecordInputs]) -> list[CleanRecord | Simul
     return [_with_nuisances(each, results[id(each.run)]) for each in inputs]
 
 
-def _with_nuisances(inputs: RecordInputs, result: CleanRecord | SimulationError) -> CleanRecord | SimulationError:
+def _with_nuisances(
+    inputs: RecordInputs, result: CleanRecord | SimulationError
+) -> CleanRecord | SimulationError:
     if isinstance(result, SimulationError) or not inputs.machine.sensing.nuisances:
         return result
     return with_nuisances(inputs.run, result, *inputs.nuisance_streams())
@@ -212,14 +226,20 @@ class InputReader:
             system=machine,
             faults=() if self.plan.sham else tuple(row_faults(row)),
             start=start,
-            specimen=_specimen(seed, numbers.specimen, machine.pair.pinion, machine.pair.wheel, machine.quality),
+            specimen=_specimen(
+                seed, numbers.specimen, machine.pair.pinion, machine.pair.wheel, machine.quality
+            ),
             gearbox=_gearbox(seed, numbers.gearbox, machine),
             tell_mesh=self.dataset.store_mesh_state,
             discs=machine.draw_discs(stream(seed, Stream.TOOTHED_WHEEL, numbers.gearbox)),
         )
-        generators = (stream(seed, cause, numbers.gearbox) for cause in (Stream.PATH, Stream.SENSOR))
+        generators = (
+            stream(seed, cause, numbers.gearbox) for cause in (Stream.PATH, Stream.SENSOR)
+        )
         instrument = draw_instrument(machine.sensing, *generators)
-        return RecordInputs(seed=seed, numbers=numbers, run=run, instrument=instrument, dataset=self.dataset)
+        return RecordInputs(
+            seed=seed, numbers=numbers, run=run, instrument=instrument, dataset=self.dataset
+        )
 
     def machine(self, values: Mapping[str, float]) -> Machine:
         """The machine of the configuration with drawn values put in."""
@@ -240,7 +260,11 @@ def row_values(row: Row) -> dict[str, float]:
 
 def row_faults(row: Row) -> list[Fault]:
     """Faults of one row of a plan."""
-    return [fault for part in json.loads(str(row["faults_json"])) for fault in read_faults(part, "faults_json")]
+    return [
+        fault
+        for part in json.loads(str(row["faults_json"]))
+        for fault in read_faults(part, "faults_json")
+    ]
 
 
 def twin_start(machine: Machine, rng: np.random.Generator) -> Start:

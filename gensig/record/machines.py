@@ -16,7 +16,7 @@ def read_machine(config: Configuration) -> Machine:
     """
     if config.section("system").get("kind") != LINE:
         return read_system(config)
-    from gensig.driveline.machine import (
+    from gensig.driveline.reading import (
         read_line_machine,
     )
 

@@ -52,11 +52,15 @@ def simulate_records(config: Configuration, rows: Sequence[Row]) -> list[Record]
     twins = _missing_twins(inputs, keys)
     sound: dict[int, RecordInputs] = {}
     if reader.dataset.needs_sound_records:
-        sound = {index: each.without_faults() for index, each in enumerate(inputs) if each.run.faults}
+        sound = {
+            index: each.without_faults() for index, each in enumerate(inputs) if each.run.faults
+        }
     motions = simulate_motions([*inputs, *twins.values(), *sound.values()])
     of_records, others = motions[: len(inputs)], motions[len(inputs) :]
     of_sound = dict(zip(sound, others[len(twins) :], strict=True))
-    _keep_twins(keys, {key: (twins[key], motion) for key, motion in zip(twins, others, strict=False)})
+    _keep_twins(
+        keys, {key: (twins[key], motion) for key, motion in zip(twins, others, strict=False)}
+    )
     records = []
     for index, (row, each, motion) in enumerate(zip(rows, inputs, of_records, strict=True)):
         without_faults = of_sound.get(index, motion) if reader.dataset.needs_sound_records else None
@@ -85,7 +89,9 @@ class _Measured:
         sensing = instrument.sensing
         if sensing.snr is None:
             return np.zeros(len(signal))
-        reference = instrument.power(signal) if sensing.snr_reference != "healthy_twin" else self.twin_power
+        reference = (
+            instrument.power(signal) if sensing.snr_reference != "healthy_twin" else self.twin_power
+        )
         if isinstance(reference, SimulationError):
             raise reference
         assert reference is not None
@@ -163,11 +169,18 @@ def _failed(measured: _Measured, error: SimulationError) -> Record:
         "speed_rpm": MISSING,
         "mesh_frequency_hz": MISSING,
     }
-    return Record(signals=_samples(inputs, silent, silent, noise_power, source, twin), values=values)
+    return Record(
+        signals=_samples(inputs, silent, silent, noise_power, source, twin), values=values
+    )
 
 
 def _samples(
-    inputs: RecordInputs, noisy: Array, clean: Array, noise_power: Array, source: Array, twin: Array | None
+    inputs: RecordInputs,
+    noisy: Array,
+    clean: Array,
+    noise_power: Array,
+    source: Array,
+    twin: Array | None,
 ) -> Signals:
     """Signals of the sensors on the housing, in the types of a shard."""
     signals: Signals = {
@@ -240,7 +253,9 @@ def _twin_keys(config: Configuration, rows: Sequence[Row]) -> list[TwinKey]:
     return [(identity, str(row["condition_id"])) for row in rows]
 
 
-def _missing_twins(inputs: Sequence[RecordInputs], keys: Sequence[TwinKey]) -> dict[TwinKey, RecordInputs]:
+def _missing_twins(
+    inputs: Sequence[RecordInputs], keys: Sequence[TwinKey]
+) -> dict[TwinKey, RecordInputs]:
     """Inputs of the healthy twins that noise needs and that are not known yet.
 
     A plan lets the sound record of a group start as the twin does. Where that record is among the
@@ -260,7 +275,8 @@ def _missing_twins(inputs: Sequence[RecordInputs], keys: Sequence[TwinKey]) -> d
 
 
 def _keep_twins(
-    keys: Sequence[TwinKey], simulated: dict[TwinKey, tuple[RecordInputs, CleanRecord | SimulationError]]
+    keys: Sequence[TwinKey],
+    simulated: dict[TwinKey, tuple[RecordInputs, CleanRecord | SimulationError]],
 ) -> None:
     """Keep the twins of these records: those known before, and those simulated now."""
     known = {key: _TWINS[key] for key in keys if key in _TWINS}

@@ -101,7 +101,9 @@ class _Bench:
         return replace(self.sound, run=replace(self.sound.run, faults=tuple(faults)))
 
 
-def limited_by_vibration(case: WearCase, config: Configuration) -> tuple[WearCase, WornVibration | None]:
+def limited_by_vibration(
+    case: WearCase, config: Configuration
+) -> tuple[WearCase, WornVibration | None]:
     """A case whose threshold is the depth at which the machine of its configuration reaches a limit of vibration.
 
     The case as it was, and None, where ``wear`` sets no such limit; the case as it was where the life to its threshold
@@ -139,7 +141,11 @@ def limited_by_vibration(case: WearCase, config: Configuration) -> tuple[WearCas
     limit_depth = None
     for before, after in zip(turns[:-1].tolist(), turns[1:].tolist(), strict=True):
         if over(after) >= 0.0:
-            root = float(brentq(over, before, after, xtol=TOLERANCE * life.life, maxiter=MOST_STEPS, disp=False))
+            root = float(
+                brentq(
+                    over, before, after, xtol=TOLERANCE * life.life, maxiter=MOST_STEPS, disp=False
+                )
+            )
             limit_depth = case.judged(_worn(life, root))
             break
     ordered = sorted(told)

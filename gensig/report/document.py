@@ -46,7 +46,9 @@ MARKS = (
 )
 
 
-def write_report(folder: Path, out: Path | None = None, *, per_class: int | None = None) -> tuple[Path, str]:
+def write_report(
+    folder: Path, out: Path | None = None, *, per_class: int | None = None
+) -> tuple[Path, str]:
     """Write the page of a complete data set; returns its path and one line on what it shows.
 
     Parameters
@@ -144,21 +146,33 @@ def _content(
     return content
 
 
-def _signals(data: Dataset, chosen: Choice, rotation: Rotation, examples: list[dict[str, Any]]) -> Section:
+def _signals(
+    data: Dataset, chosen: Choice, rotation: Rotation, examples: list[dict[str, Any]]
+) -> Section:
     groups: dict[str, list[tuple[str, str]]] = {}
     for number, one in enumerate(examples):
         severity = "unknown" if one["severity"] is None else f"{one['severity']:.2f}"
         text = plain(f"{one['class']}, severity {severity}, {one['unit']}, {one['record']}")
         groups.setdefault(plain(one["class"]), []).append((str(number), text))
     last = groups[list(groups)[-1]]
-    first = groups["healthy"][0][0] if "healthy" in groups else last[-1 if has_lives(data) else len(last) // 2][0]
-    orders = [("hz", "Hz and ms")] + [(name, f"orders: {words}") for name, words in rotation.references]
+    first = (
+        groups["healthy"][0][0]
+        if "healthy" in groups
+        else last[-1 if has_lives(data) else len(last) // 2][0]
+    )
+    orders = [("hz", "Hz and ms")] + [
+        (name, f"orders: {words}") for name, words in rotation.references
+    ]
     zooms = [("all", "usable band")]
     if any(name == "mesh" for name, _ in orders):
         zooms += [(f"{k}", f"around mesh harmonic {k}") for k in (1, 2, 3)]
     low, high = envelope_band(data.sampling_rate)
     which = "of each class, those of one life from" if has_lives(data) else "of each class, from"
-    sound = "; sound ones at the conditions of the middle one of another class" if "healthy" in groups else ""
+    sound = (
+        "; sound ones at the conditions of the middle one of another class"
+        if "healthy" in groups
+        else ""
+    )
     lines = [
         f"{len(examples)} of {data.n_records} records: {which} the least to the greatest severity{sound}.",
         "Orders are multiples of the chosen shaft's mean speed. Amplitudes of spectra are rounded to 0.4 dB; waveform "
@@ -228,13 +242,18 @@ def _parameters(data: Dataset, table: dict[str, Any]) -> Section:
 
 def _further(signal: np.ndarray, sampling_rate: float) -> dict[str, np.ndarray]:
     """What is measured beside the condition indicators, by channel."""
-    return {**at_measured_rate(signal, sampling_rate), VELOCITY: velocity_rms(signal, sampling_rate)}
+    return {
+        **at_measured_rate(signal, sampling_rate),
+        VELOCITY: velocity_rms(signal, sampling_rate),
+    }
 
 
 def _indicators(
     data: Dataset, chosen: Choice, measured: Measured, table: dict[str, Any], units: Sequence[str]
 ) -> Section:
-    known = [(name, label) for name, label in INDICATORS if np.isfinite(measured.values[name]).any()]
+    known = [
+        (name, label) for name, label in INDICATORS if np.isfinite(measured.values[name]).any()
+    ]
     along = [(name, column_label(name)) for name in ALONG if name in table["columns"]]
     text = [f"{_of(len(measured.records), data)}. Averages over turns are taken at the mean speed; where it varies, "
             "FM4 and sideband ratios say less."]  # fmt: skip
@@ -269,7 +288,9 @@ def _lives(table: dict[str, Any]) -> Section:
     quantities = [("remaining_life_h", "remaining life, h"), ("severity", "severity")]
     return Section(
         title="Lives",
-        text=[f"{shown} of {table['n_lives']} lives, a line each, from new to failure or to the horizon (crosses)."],
+        text=[
+            f"{shown} of {table['n_lives']} lives, a line each, from new to failure or to the horizon (crosses)."
+        ],
         charts=Charts(
             name="lives",
             label="Choice of quantity",
@@ -284,10 +305,16 @@ def _beside(compared: Sequence[Comparison], units: Sequence[str]) -> Section:
     section = tables.measured_table(compared, units)
     if not compared:
         return section
-    charts = Charts(name="beside", label="Nothing to choose", plots=[("beside", "Measured ranges and this set")])
+    charts = Charts(
+        name="beside", label="Nothing to choose", plots=[("beside", "Measured ranges and this set")]
+    )
     return Section(title=section.title, text=section.text, table=section.table, charts=charts)
 
 
 def _of(n_rows: int, data: Dataset) -> str:
     n_usable = int(np.count_nonzero(data.usable))
-    return f"All {n_rows} records" if n_rows == n_usable else f"{n_rows} of {n_usable} records, evenly of all classes"
+    return (
+        f"All {n_rows} records"
+        if n_rows == n_usable
+        else f"{n_rows} of {n_usable} records, evenly of all classes"
+    )

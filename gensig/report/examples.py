@@ -23,7 +23,9 @@ RECORDS_PER_CLASS = 3
 SIGNALS_BY_DEFAULT = 48  # records times channels: about 3 MB
 SIGNALS_AT_MOST = 140  # about 9 MB, plotly.js 5 MB: the page stays below 15 MB
 WAVEFORM_SAMPLES = 8192
-SPECTRUM_SAMPLES = 2**20  # of longer records the spectra are those of the beginning: what is read stays small
+SPECTRUM_SAMPLES = (
+    2**20
+)  # of longer records the spectra are those of the beginning: what is read stays small
 SPECTRUM_BINS = 20_000
 ENVELOPE_BINS = 4000
 ENVELOPE_MESHES = 3.2  # the envelope spectrum ends above the third harmonic of the mesh
@@ -57,21 +59,30 @@ def choose(data: Dataset, per_class: int | None) -> Choice:
     label, usable = data.column("label_name"), data.usable
     classes = [name for name in data.class_names if np.any((label == name) & usable)]
     if not classes:
-        raise DatasetError(f"{data.folder} has no usable record to show; gensig inspect {data.folder} says why")
+        raise DatasetError(
+            f"{data.folder} has no usable record to show; gensig inspect {data.folder} says why"
+        )
     limit = SIGNALS_BY_DEFAULT if per_class is None else SIGNALS_AT_MOST
     wanted = RECORDS_PER_CLASS if per_class is None else per_class
     n_channels = min(len(data.channel_names), max(limit // len(classes), 1))
     n_shown = max(min(wanted, limit // (len(classes) * n_channels)), 1)
     faulty = {name: _spread(data, name, n_shown) for name in classes if name != "healthy"}
     chosen = {
-        name: faulty[name] if name in faulty else _sound(data, list(faulty.values())[::-1], n_shown) for name in classes
+        name: faulty[name] if name in faulty else _sound(data, list(faulty.values())[::-1], n_shown)
+        for name in classes
     }
     remarks = []
     if n_shown < wanted:
-        remarks.append(f"{n_shown} instead of {wanted} records a class, so that the page stays small")
+        remarks.append(
+            f"{n_shown} instead of {wanted} records a class, so that the page stays small"
+        )
     if n_channels < len(data.channel_names):
-        remarks.append(f"the first {n_channels} of {len(data.channel_names)} channels, so that the page stays small")
-    return Choice(records=chosen, channels=data.channel_names[:n_channels], remark="; ".join(remarks))
+        remarks.append(
+            f"the first {n_channels} of {len(data.channel_names)} channels, so that the page stays small"
+        )
+    return Choice(
+        records=chosen, channels=data.channel_names[:n_channels], remark="; ".join(remarks)
+    )
 
 
 def _spread(data: Dataset, name: str, n_shown: int) -> list[int]:
@@ -94,21 +105,33 @@ def _sound(data: Dataset, faulty: Sequence[Sequence[int]], n_shown: int) -> list
         same = sound[(condition[sound] == condition[middle]) & (unit[sound] == unit[middle])]
         found += [index for index in same[:1].tolist() if index not in found]
     found = found[:n_shown]
-    return found + [index for index in _spread(data, "healthy", n_shown) if index not in found][: n_shown - len(found)]
+    return (
+        found
+        + [index for index in _spread(data, "healthy", n_shown) if index not in found][
+            : n_shown - len(found)
+        ]
+    )
 
 
-def example(data: Dataset, index: int, channels: Sequence[str], rotation: Rotation) -> dict[str, Any]:
+def example(
+    data: Dataset, index: int, channels: Sequence[str], rotation: Rotation
+) -> dict[str, Any]:
     """What the page knows of a record: its labels, its frequencies, and of each channel four views.
 
     Raises
     ------
     DatasetError    for a record with values that are not finite
     """
-    values = {name: data.column(name)[index] for name in ("record_id", "label_name", "severity", "unit_id")}
+    values = {
+        name: data.column(name)[index]
+        for name in ("record_id", "label_name", "severity", "unit_id")
+    }
     n_read = min(data.n_samples, SPECTRUM_SAMPLES)
     signals = data.signals(index, stop=n_read, channels=list(channels)).astype(float)
     if not np.isfinite(signals).all():
-        raise DatasetError(f"record {values['record_id']} holds values that are not finite; run gensig verify")
+        raise DatasetError(
+            f"record {values['record_id']} holds values that are not finite; run gensig verify"
+        )
     return {
         "record": str(values["record_id"]),
         "class": str(values["label_name"]),
@@ -119,7 +142,8 @@ def example(data: Dataset, index: int, channels: Sequence[str], rotation: Rotati
         "frequencies": rotation.of(index),
         "fault": rotation.fault_gear(index),
         "views": [
-            _views(signal, data.sampling_rate, usable_top(data), rotation.of(index)["mesh"]) for signal in signals
+            _views(signal, data.sampling_rate, usable_top(data), rotation.of(index)["mesh"])
+            for signal in signals
         ],
     }
 
@@ -150,18 +174,30 @@ def _views(signal: FloatArray, rate: float, top: float, mesh: float | None) -> d
     if len(signal) > 100:  # the band-pass needs more samples than its ends
         frequency, amplitude = envelope_spectrum(signal, rate, envelope_band(rate))
         views["envelope"] = _lines(
-            frequency, amplitude, ENVELOPE_MESHES * mesh if mesh else top / 8.0, ENVELOPE_BINS, first=1
+            frequency,
+            amplitude,
+            ENVELOPE_MESHES * mesh if mesh else top / 8.0,
+            ENVELOPE_BINS,
+            first=1,
         )
     return views
 
 
-def _lines(frequency: FloatArray, amplitude: FloatArray, top: float, most: int, first: int = 0) -> dict[str, Any]:
+def _lines(
+    frequency: FloatArray, amplitude: FloatArray, top: float, most: int, first: int = 0
+) -> dict[str, Any]:
     """A spectrum from the bin `first` up to `top` Hz; of more bins than `most`, the largest of each few."""
-    amplitude = amplitude[first : max(int(np.searchsorted(frequency, top, side="right")), first + 2)]
+    amplitude = amplitude[
+        first : max(int(np.searchsorted(frequency, top, side="right")), first + 2)
+    ]
     each = -(-len(amplitude) // most)
     largest = np.maximum.reduceat(amplitude, np.arange(0, len(amplitude), each))
     step = float(frequency[1] - frequency[0])
-    return {**pack_amplitude(largest), "start": (first + (each - 1) / 2) * step, "step": each * step}
+    return {
+        **pack_amplitude(largest),
+        "start": (first + (each - 1) / 2) * step,
+        "step": each * step,
+    }
 
 
 def _spectrogram(signal: FloatArray, rate: float, top: float) -> dict[str, Any]:

@@ -17,7 +17,9 @@ FloatArray = NDArray[np.floating]
 
 VELOCITY = "velocity_rms"
 BAND = (10.0, 1000.0)  # Hz, of broad-band velocity in ISO 20816-1 and -3
-HARMFUL_VELOCITY = 11.0e-3  # m/s, zone boundary C/D of ISO 20816-3 for large machines on flexible supports
+HARMFUL_VELOCITY = (
+    11.0e-3  # m/s, zone boundary C/D of ISO 20816-3 for large machines on flexible supports
+)
 LOUD_ACCELERATION = 10.0 * STANDARD_GRAVITY  # assumed: published housings of sound gears stay below
 
 
@@ -34,17 +36,27 @@ def velocity_rms(signal: FloatArray, sampling_rate: float) -> FloatArray:
     return np.asarray(np.sqrt(power.sum(axis=-1) * frequency[1]))
 
 
-def level_table(data: Dataset, measured: Measured, channels: Sequence[str], units: Sequence[str]) -> Table | None:
+def level_table(
+    data: Dataset, measured: Measured, channels: Sequence[str], units: Sequence[str]
+) -> Table | None:
     """Medians of each class and accelerometer; None where there is no acceleration in m/s^2."""
     rows = [
-        (plain(name), plain(channel), f"{rms:.3g}", f"{rms / STANDARD_GRAVITY:.3g}", f"{1e3 * velocity:.3g}")
+        (
+            plain(name),
+            plain(channel),
+            f"{rms:.3g}",
+            f"{rms / STANDARD_GRAVITY:.3g}",
+            f"{1e3 * velocity:.3g}",
+        )
         for name, channel, rms, velocity in _medians(data, measured, channels, units)
     ]
     head = ("class", "channel", "RMS, m/s²", "RMS, g", "velocity RMS 10 to 1000 Hz, mm/s")
     return Table(head=head, rows=rows) if rows else None
 
 
-def loudness(data: Dataset, measured: Measured, channels: Sequence[str], units: Sequence[str]) -> list[str]:
+def loudness(
+    data: Dataset, measured: Measured, channels: Sequence[str], units: Sequence[str]
+) -> list[str]:
     """One sentence where a level is beyond what housings of machines in service show; empty elsewhere."""
     medians = _medians(data, measured, channels, units)
     loud = [row for row in medians if row[2] > LOUD_ACCELERATION or row[3] > HARMFUL_VELOCITY]
@@ -68,7 +80,12 @@ def _medians(
     if velocity is None:
         return []
     return [
-        (name, channel, float(np.nanmedian(rms[mine, place])), float(np.nanmedian(velocity[mine, place])))
+        (
+            name,
+            channel,
+            float(np.nanmedian(rms[mine, place])),
+            float(np.nanmedian(velocity[mine, place])),
+        )
         for name in data.class_names
         if (mine := label == name).any()
         for place, channel in enumerate(channels)

@@ -49,16 +49,24 @@ def beside_measurements(data: Dataset, measured: Measured, units: list[str]) -> 
             found[f"{name}.kurtosis", at] = values["kurtosis_5_khz"][mine]
     found |= _ratios(data, measured, values)
     ranges = read_ranges()
-    compared = [compare(ranges[place], of) for place, of in found.items() if place in ranges and np.isfinite(of).any()]
+    compared = [
+        compare(ranges[place], of)
+        for place, of in found.items()
+        if place in ranges and np.isfinite(of).any()
+    ]
     return [one for one in compared if one.low is not None or one.high is not None]
 
 
-def _ratios(data: Dataset, measured: Measured, values: dict[str, FloatArray]) -> dict[Place, FloatArray]:
+def _ratios(
+    data: Dataset, measured: Measured, values: dict[str, FloatArray]
+) -> dict[Place, FloatArray]:
     """Faulty record over sound one of another set of gears, in one gearbox at one set-point."""
     records = measured.records
     if "speed_set_rpm" not in data.column_names:
         return {}
-    keys = [data.column(name)[records].tolist() for name in ("gearbox_id", "speed_set_rpm", "torque_nm")]
+    keys = [
+        data.column(name)[records].tolist() for name in ("gearbox_id", "speed_set_rpm", "torque_nm")
+    ]
     place = list(zip(*keys, strict=True))
     specimen, label = data.column("specimen_id")[records], data.column("label_name")[records]
     sound: dict[tuple[object, ...], list[int]] = {}

@@ -14,7 +14,9 @@ COUNTS = 32767
 
 def packed(values: ArrayLike, dtype: str) -> str:
     """Values as base64 of the little-endian numpy type, flat."""
-    return base64.b64encode(np.ascontiguousarray(values, dtype=np.dtype(dtype).newbyteorder("<")).tobytes()).decode()
+    return base64.b64encode(
+        np.ascontiguousarray(values, dtype=np.dtype(dtype).newbyteorder("<")).tobytes()
+    ).decode()
 
 
 def pack_floats(values: ArrayLike) -> str:

@@ -38,7 +38,10 @@ class Rotation:
         """Frequencies of a record by name: mesh, drive and gears; None where unknown."""
         values = {"mesh": self.mesh[index], "drive": self.drive[index]}
         values |= {gear: self.mesh[index] / self.n_teeth[gear] for gear in self.n_teeth}
-        return {name: float(value) if np.isfinite(value) and value > 0.0 else None for name, value in values.items()}
+        return {
+            name: float(value) if np.isfinite(value) and value > 0.0 else None
+            for name, value in values.items()
+        }
 
     def fault_gear(self, index: int) -> str:
         """The gear once a turn of which the fault meshes, where its frequency is known; else ""."""

@@ -35,7 +35,10 @@ IN_WORDS = {
 def channel_units(data: Dataset) -> list[str]:
     """Unit of each channel, m/s^2 where the data set does not say."""
     units = data.attributes.get("channel_units", [])
-    return [str(dict(enumerate(units)).get(number, "m/s^2")) for number in range(len(data.channel_names))]
+    return [
+        str(dict(enumerate(units)).get(number, "m/s^2"))
+        for number in range(len(data.channel_names))
+    ]
 
 
 def contents(data: Dataset) -> list[Section]:
@@ -43,18 +46,33 @@ def contents(data: Dataset) -> list[Section]:
     n_failed = int(np.count_nonzero(~data.usable))
     channels = zip(data.channel_names, channel_units(data), strict=True)
     rows = [
-        ("records", f"{data.n_records}" + (f", of which {n_failed} failed and are left out here" if n_failed else "")),
+        (
+            "records",
+            f"{data.n_records}"
+            + (f", of which {n_failed} failed and are left out here" if n_failed else ""),
+        ),
         (
             "a record",
             f"{data.n_samples / data.sampling_rate:g} s, {data.n_samples} samples at {data.sampling_rate:g} Hz",
         ),
         ("channels", ", ".join(f"{plain(name)} ({plain(unit)})" for name, unit in channels)),
-        ("further signals", ", ".join(name for name in data.signal_names if name != "acceleration") or "none"),
+        (
+            "further signals",
+            ", ".join(name for name in data.signal_names if name != "acceleration") or "none",
+        ),
     ]
-    rows += [(IN_WORDS.get(name, name), _shown(data.attributes[name])) for name in GEOMETRY if name in data.attributes]
+    rows += [
+        (IN_WORDS.get(name, name), _shown(data.attributes[name]))
+        for name in GEOMETRY
+        if name in data.attributes
+    ]
     rows += [
         (name, f"{len(np.unique(data.column(column)))}")
-        for name, column in (("units", "unit_id"), ("sets of gears", "specimen_id"), ("gearboxes", "gearbox_id"))
+        for name, column in (
+            ("units", "unit_id"),
+            ("sets of gears", "specimen_id"),
+            ("gearboxes", "gearbox_id"),
+        )
     ]
     rows += [
         ("speed of the driving shaft", value_range(data.column("speed_rpm"), "r/min")),
@@ -63,7 +81,9 @@ def contents(data: Dataset) -> list[Section]:
     if "snr_db" in data.column_names:
         rows.append(("signal-to-noise ratio", value_range(data.column("snr_db"), "dB")))
     if "life_id" in data.column_names:
-        rows.append(("lives", f"{len(np.unique(data.column('life_id')))}, to failure or to the horizon"))
+        rows.append(
+            ("lives", f"{len(np.unique(data.column('life_id')))}, to failure or to the horizon")
+        )
     return [
         Section(title="What is in it", table=Table(head=("fact", "value"), rows=rows)),
         Section(title="Classes", table=_classes(data)),
@@ -71,14 +91,26 @@ def contents(data: Dataset) -> list[Section]:
 
 
 def _classes(data: Dataset) -> Table:
-    label, severity, unit = data.column("label_name"), data.column("severity"), data.column("unit_id")
+    label, severity, unit = (
+        data.column("label_name"),
+        data.column("severity"),
+        data.column("unit_id"),
+    )
     order = [*data.class_names, *sorted(set(label.tolist()) - set(data.class_names))]
     rows = []
     for name in order:
         mine = label == name
         values = severity[mine]
         middle = f"{np.nanmedian(values):.3g}" if np.isfinite(values).any() else "none"
-        rows.append((plain(name), f"{mine.sum()}", f"{len(np.unique(unit[mine]))}", value_range(values, ""), middle))
+        rows.append(
+            (
+                plain(name),
+                f"{mine.sum()}",
+                f"{len(np.unique(unit[mine]))}",
+                value_range(values, ""),
+                middle,
+            )
+        )
     return Table(head=("class", "records", "units", "severity", "its median"), rows=rows)
 
 
@@ -91,7 +123,8 @@ def splits(data: Dataset) -> Section:
         parts = data.split(protocol)
         units = {name: set(unit[[row[0] for row in part]].tolist()) for name, part in parts.items()}
         cells = [
-            f"{sum(stop - start for _, start, stop in part):.5g} ({len(units[name])})" for name, part in parts.items()
+            f"{sum(stop - start for _, start, stop in part):.5g} ({len(units[name])})"
+            for name, part in parts.items()
         ]
         apart = PROTOCOLS[protocol].apart if protocol in PROTOCOLS else ()
         if not apart:
@@ -119,7 +152,11 @@ def measured_table(found: Sequence[Comparison], units: Sequence[str]) -> Section
         'RMS and kurtosis are those of the band up to 2.5 kHz; "elsewhere" is not slow and light, here all records.'
     ]
     if not found:
-        reason = "no channel is an acceleration in m/s^2" if "m/s^2" not in units else "it has none of their quantities"
+        reason = (
+            "no channel is an acceleration in m/s^2"
+            if "m/s^2" not in units
+            else "it has none of their quantities"
+        )
         text.append(f"This set cannot be put beside them: {reason}.")
         return Section(title="Beside measurements", text=text)
     rows = [
@@ -139,8 +176,15 @@ def provenance(data: Dataset) -> list[Section]:
         ("seed", f"{manifest.seed}"),
         ("identity (sha256 of configuration, schema and version)", plain(manifest.identity)),
     ]
-    rows += [(plain(name).replace("_", " "), plain(value)) for name, value in manifest.environment.items() if value]
-    files = [(f"shards/{plain(one.name)}", f"{one.rows}", one.sha256) for one in manifest.shards[:MANY_SHARDS]]
+    rows += [
+        (plain(name).replace("_", " "), plain(value))
+        for name, value in manifest.environment.items()
+        if value
+    ]
+    files = [
+        (f"shards/{plain(one.name)}", f"{one.rows}", one.sha256)
+        for one in manifest.shards[:MANY_SHARDS]
+    ]
     files += [(plain(name), "", digest) for name, digest in manifest.files.items()]
     text = ["As the manifest has them; gensig verify compares them with the files."]
     if len(manifest.shards) > MANY_SHARDS:
@@ -149,7 +193,12 @@ def provenance(data: Dataset) -> list[Section]:
         Section(title="Where it is from", table=Table(head=("fact", "value"), rows=rows)),
         Section(title="Overrides as typed", code=_file(data.folder / OVERRIDES), folded=True),
         Section(title="Configuration", code=_file(data.folder / CONFIG), folded=True),
-        Section(title="Files", text=text, table=Table(head=("file", "records", "sha256"), rows=files), folded=True),
+        Section(
+            title="Files",
+            text=text,
+            table=Table(head=("file", "records", "sha256"), rows=files),
+            folded=True,
+        ),
     ]
 
 
@@ -167,9 +216,13 @@ def loading(data: Dataset) -> list[Section]:
         f"    mine = data.where(fault={name!r}, status='ok')  # by class, or by any column",
     ]
     if protocol:
-        code.append(f"    train = data.split({protocol!r})['train']  # [(record, start_fraction, stop_fraction), ...]")
+        code.append(
+            f"    train = data.split({protocol!r})['train']  # [(record, start_fraction, stop_fraction), ...]"
+        )
     text = ["Every shard is plain HDF5 too: h5py, MATLAB and Octave read it."]
-    caveats = [" ".join(line.replace("`", "").split()) for line in CAVEATS.removeprefix("- ").split("\n- ")]
+    caveats = [
+        " ".join(line.replace("`", "").split()) for line in CAVEATS.removeprefix("- ").split("\n- ")
+    ]
     return [
         Section(title="Load it", text=text, code="\n".join(code)),
         Section(title="What to mind", notes=[("", line) for line in caveats]),
@@ -177,12 +230,17 @@ def loading(data: Dataset) -> list[Section]:
 
 
 def _file(path: Path) -> str:
-    return "".join(c if c.isprintable() or c == "\n" else " " for c in read_text(path, limit=CONFIG_BYTES_LIMIT))
+    return "".join(
+        c if c.isprintable() or c == "\n" else " "
+        for c in read_text(path, limit=CONFIG_BYTES_LIMIT)
+    )
 
 
 def _shown(value: object) -> str:
     if isinstance(value, (list, tuple, np.ndarray)):
-        return " to ".join(f"{part:g}" if isinstance(part, (int, float)) else plain(part) for part in value)
+        return " to ".join(
+            f"{part:g}" if isinstance(part, (int, float)) else plain(part) for part in value
+        )
     return plain(rounded(value))
 
 

@@ -35,7 +35,14 @@ INDICATORS = (
 PLAIN = ("severity", "speed_rpm", "torque_nm", "snr_db", "start_phase", "start_tooth_pinion", "start_tooth_wheel",
          "mesh_frequency_hz", "contact_loss_fraction", "integration_error", "clipped_fraction", "dropped_fraction",
          "detectability", "life_time_h", "life_cycles", "remaining_life_h")  # fmt: skip
-ALONG = ("severity", "speed_rpm", "torque_nm", "snr_db", "life_time_h", "remaining_life_h")  # abscissae of indicators
+ALONG = (
+    "severity",
+    "speed_rpm",
+    "torque_nm",
+    "snr_db",
+    "life_time_h",
+    "remaining_life_h",
+)  # abscissae of indicators
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -67,7 +74,9 @@ def value_table(data: Dataset, records: NDArray[np.intp], names: list[str]) -> d
     """Columns of some records for the page: class numbers, and floats by name."""
     label = data.column("label")[records]
     if label.size and (label.min() < 0 or label.max() >= min(len(data.class_names), 255)):
-        raise DatasetError(f"{data.folder} has labels beyond its class names; run gensig verify {data.folder}")
+        raise DatasetError(
+            f"{data.folder} has labels beyond its class names; run gensig verify {data.folder}"
+        )
     values = {name: data.column(name)[records].astype(float) for name in names}
     return {
         "rows": int(records.size),
@@ -117,7 +126,11 @@ def measure(
     return Measured(
         records=records,
         values={name: np.array([row[name] for row in rows]) for name in names},
-        further={name: np.array([row[name] for row in rows]) for name in rows[0] if name not in names} if rows else {},
+        further={
+            name: np.array([row[name] for row in rows]) for name in rows[0] if name not in names
+        }
+        if rows
+        else {},
     )
 
 
@@ -130,7 +143,9 @@ def _rows(
 ) -> Iterator[dict[str, FloatArray]]:
     turns = {gear: rotation.turns(gear) for gear in rotation.n_teeth}
     for index in records.tolist():
-        x = data.signals(index, stop=min(data.n_samples, MOST_SAMPLES), channels=channels).astype(float)
+        x = data.signals(index, stop=min(data.n_samples, MOST_SAMPLES), channels=channels).astype(
+            float
+        )
         x = x - x.mean(axis=-1, keepdims=True)
         row = {"rms": rms(x), "kurtosis": kurtosis(x), "crest_factor": crest_factor(x)}
         for gear in ("pinion", "wheel"):
@@ -139,7 +154,12 @@ def _rows(
 
 
 def _of_turns(
-    x: FloatArray, rate: float, gear: str, turns: dict[str, FloatArray], n_teeth: dict[str, int], index: int
+    x: FloatArray,
+    rate: float,
+    gear: str,
+    turns: dict[str, FloatArray],
+    n_teeth: dict[str, int],
+    index: int,
 ) -> dict[str, FloatArray]:
     """Indicators of the average turn; NaN where the record holds no whole turn, or no speed is known."""
     names = (f"fm4_{gear}", f"sideband_ratio_{gear}")
@@ -170,6 +190,8 @@ def life_table(data: Dataset) -> dict[str, Any]:
     usable = np.flatnonzero(data.usable & np.isin(names, shown))
     order = np.array([number[name] for name in names[usable].tolist()], dtype=float)
     usable = usable[np.lexsort((data.column("life_time_h")[usable], order))]
-    found = value_table(data, usable, ["life_time_h", "remaining_life_h", "severity", "life_failed"])
+    found = value_table(
+        data, usable, ["life_time_h", "remaining_life_h", "severity", "life_failed"]
+    )
     found["columns"]["life"] = pack_floats([number[name] for name in names[usable].tolist()])
     return {**found, "names": [str(name) for name in shown], "n_lives": len(lives)}

@@ -46,7 +46,9 @@ class Accelerometer:
     def __post_init__(self) -> None:
         for key in ("sensitivity_tolerance", "transverse_sensitivity"):
             if not 0.0 <= getattr(self, key) <= 0.5:
-                raise ConfigError(f"sensing.sensor.{key} = {getattr(self, key):g} must lie in 0..0.5")
+                raise ConfigError(
+                    f"sensing.sensor.{key} = {getattr(self, key):g} must lie in 0..0.5"
+                )
         if self.mounted_resonance is not None and not 1e3 <= self.mounted_resonance <= 1e6:
             raise ConfigError(
                 f"sensing.sensor.mounted_resonance_hz = {self.mounted_resonance:g} must lie in 1e3..1e6, or be null"
@@ -60,15 +62,23 @@ class Accelerometer:
                 f"sensing.sensor.low_cutoff_hz = {self.low_cutoff:g} must lie in 0.01..100 Hz, or be null"
             )
         if not 0.0 <= self.dc_offset_m_per_s2 <= 1e6:
-            raise ConfigError(f"sensing.sensor.dc_offset_m_per_s2 = {self.dc_offset_m_per_s2:g} must not be negative")
+            raise ConfigError(
+                f"sensing.sensor.dc_offset_m_per_s2 = {self.dc_offset_m_per_s2:g} must not be negative"
+            )
         if (self.adc_range_m_per_s2 is None) != (self.adc_bits is None):
-            raise ConfigError("sensing.sensor: give both adc_range_m_per_s2 and adc_bits, or null for both")
+            raise ConfigError(
+                "sensing.sensor: give both adc_range_m_per_s2 and adc_bits, or null for both"
+            )
         if self.adc_range_m_per_s2 is not None and not self.adc_range_m_per_s2 > 0.0:
-            raise ConfigError(f"sensing.sensor.adc_range_m_per_s2 = {self.adc_range_m_per_s2:g} must be positive")
+            raise ConfigError(
+                f"sensing.sensor.adc_range_m_per_s2 = {self.adc_range_m_per_s2:g} must be positive"
+            )
         if self.adc_bits is not None and not 4 <= self.adc_bits <= 24:
             raise ConfigError(f"sensing.sensor.adc_bits = {self.adc_bits} must lie in 4..24")
         if not 0.0 <= self.max_clipped_fraction <= 1.0:
-            raise ConfigError(f"sensing.sensor.max_clipped_fraction = {self.max_clipped_fraction:g} must lie in 0..1")
+            raise ConfigError(
+                f"sensing.sensor.max_clipped_fraction = {self.max_clipped_fraction:g} must lie in 0..1"
+            )
         self._check_drift_and_loss()
 
     def _check_drift_and_loss(self) -> None:
@@ -81,7 +91,9 @@ class Accelerometer:
             if not low <= value <= high:
                 raise ConfigError(f"sensing.sensor.{key} = {value:g} must lie in {low:g}..{high:g}")
         if self.dropped_fill not in FILLS:
-            raise ConfigError(f"sensing.sensor.dropped_fill = {self.dropped_fill!r}; allowed: {', '.join(FILLS)}")
+            raise ConfigError(
+                f"sensing.sensor.dropped_fill = {self.dropped_fill!r}; allowed: {', '.join(FILLS)}"
+            )
 
     @property
     def is_ideal(self) -> bool:
@@ -117,12 +129,20 @@ class Accelerometer:
             from scipy.fft import irfft, next_fast_len, rfft, rfftfreq
 
             n_samples = signal.shape[1]
-            n_padded = next_fast_len(n_samples + math.ceil(self.memory_of_resonance * sampling_rate), real=True)
+            n_padded = next_fast_len(
+                n_samples + math.ceil(self.memory_of_resonance * sampling_rate), real=True
+            )
             ratio = rfftfreq(n_padded, 1.0 / sampling_rate) / self.mounted_resonance
             response = 1.0 / (1.0 - ratio**2 + 2j * self.resonance_damping_ratio * ratio)
-            signal = irfft(rfft(signal, n_padded, axis=1) * response, n_padded, axis=1)[:, :n_samples]
+            signal = irfft(rfft(signal, n_padded, axis=1) * response, n_padded, axis=1)[
+                :, :n_samples
+            ]
         if self.low_cutoff is not None:
-            signal = sosfilt(butter(1, self.low_cutoff, "highpass", fs=sampling_rate, output="sos"), signal, axis=1)
+            signal = sosfilt(
+                butter(1, self.low_cutoff, "highpass", fs=sampling_rate, output="sos"),
+                signal,
+                axis=1,
+            )
         return signal
 
     def digitised(self, signal: Array) -> tuple[Array, float]:

@@ -39,7 +39,9 @@ class Agreement:
     @property
     def agrees(self) -> NDArray[np.bool_]:
         """Whether both lie within their limits, (lane,)."""
-        return np.asarray((self.third_octave_db <= THIRD_OCTAVE_DB) & (self.indicators <= INDICATORS))
+        return np.asarray(
+            (self.third_octave_db <= THIRD_OCTAVE_DB) & (self.indicators <= INDICATORS)
+        )
 
 
 def agreement(found: Array, exact: Array, sampling_rate: float) -> Agreement:
@@ -63,11 +65,15 @@ def third_octave_bands(n_samples: int, sampling_rate: float) -> tuple[Array, Arr
     Source: IEC 61260-1:2014, mid-band frequencies 1000 G^(x/3) Hz, edges G^(+-1/6) from there, G = 10^0.3.
     """
     highest = usable_band(sampling_rate)[1]
-    lower = 1000.0 * 10.0 ** ((np.arange(LOWEST_BAND, math.log10(highest / 1000.0) * 10.0 + 1.0) - 0.5) / 10.0)
+    lower = 1000.0 * 10.0 ** (
+        (np.arange(LOWEST_BAND, math.log10(highest / 1000.0) * 10.0 + 1.0) - 0.5) / 10.0
+    )
     upper = np.minimum(10.0**0.1 * lower, highest)
     resolved = upper - lower >= LINES * sampling_rate / n_samples
     if not resolved.any():
-        raise ValueError(f"{n_samples} samples at {sampling_rate:g} Hz resolve no third-octave band")
+        raise ValueError(
+            f"{n_samples} samples at {sampling_rate:g} Hz resolve no third-octave band"
+        )
     return lower[resolved], upper[resolved]
 
 
@@ -79,7 +85,9 @@ def third_octave_power(signal: Array, sampling_rate: float) -> Array:
     """
     n_samples = signal.shape[-1]
     window = np.hanning(n_samples)
-    lines = np.abs(np.fft.rfft(signal * window, axis=-1)) ** 2 * (2.0 / (n_samples * np.sum(window**2)))
+    lines = np.abs(np.fft.rfft(signal * window, axis=-1)) ** 2 * (
+        2.0 / (n_samples * np.sum(window**2))
+    )
     below = np.cumsum(lines, axis=-1)
 
     def power_below(edge: Array) -> Array:
@@ -118,7 +126,8 @@ def indicator_difference(found: Array, exact: Array) -> Array:
     Channels that are zero in both agree.
     """
     values, expected = (
-        np.stack([indicator(signal) for indicator in (rms, kurtosis, crest_factor)]) for signal in (found, exact)
+        np.stack([indicator(signal) for indicator in (rms, kurtosis, crest_factor)])
+        for signal in (found, exact)
     )
     still = ~(found.any(axis=-1) | exact.any(axis=-1))
     with np.errstate(divide="ignore", invalid="ignore"):

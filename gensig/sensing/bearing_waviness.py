@@ -36,7 +36,11 @@ class BearingOrders:
 
 
 def bearing_orders(
-    n_balls: int, ball_diameter: float, pitch_diameter: float, contact_angle: float, slip: float = 0.0
+    n_balls: int,
+    ball_diameter: float,
+    pitch_diameter: float,
+    contact_angle: float,
+    slip: float = 0.0,
 ) -> BearingOrders:
     """Orders of a ball bearing whose cage lags by the share ``slip`` and whose balls roll on the outer race.
 
@@ -89,24 +93,45 @@ class Bearing(Nuisance):
         check_number("n_harmonics", self.n_harmonics, 1, MOST_HARMONICS)
         check_number("harmonic_exponent", self.harmonic_exponent, 0.0, 10.0)
 
-    def draw(self, unit_rng: np.random.Generator, record_rng: np.random.Generator, dynamics: PairDynamics) -> Tones:
+    def draw(
+        self, unit_rng: np.random.Generator, record_rng: np.random.Generator, dynamics: PairDynamics
+    ) -> Tones:
         """As ``Nuisance.draw``."""
         n, count = self.n_balls, self.n_harmonics
         outer, inner, ball, cage = (logarithmic(unit_rng, self.waviness) for _ in range(4))
         along = fixed(TURN * unit_rng.random())
         phases = TURN * unit_rng.random((5, MOST_HARMONICS))  # as many whatever n_harmonics is
-        slip, cage_angle, ball_angle = uniform(record_rng, self.slip), *(TURN * record_rng.random(2))
-        orders = bearing_orders(n, self.ball_diameter, self.pitch_diameter, self.contact_angle, slip)
+        slip, cage_angle, ball_angle = (
+            uniform(record_rng, self.slip),
+            *(TURN * record_rng.random(2)),
+        )
+        orders = bearing_orders(
+            n, self.ball_diameter, self.pitch_diameter, self.contact_angle, slip
+        )
         forward, backward = turning(self.gear), turning(self.gear).conj()
         multiples, forces = [(0, 1, 0)], [cage * np.exp(1j * phases[0, 0]) * forward]
         for k in range(1, count + 1):
             size = k**-self.harmonic_exponent * np.exp(1j * phases[:, k - 1])
-            multiples += [(0, k * n, 0), (k * n + 1, -k * n, 0), (k * n - 1, -k * n, 0), (0, 1, 2 * k), (0, -1, 2 * k)]
-            forces += [size[0] * outer * along, size[1] * inner * forward, size[2] * inner * backward]
+            multiples += [
+                (0, k * n, 0),
+                (k * n + 1, -k * n, 0),
+                (k * n - 1, -k * n, 0),
+                (0, 1, 2 * k),
+                (0, -1, 2 * k),
+            ]
+            forces += [
+                size[0] * outer * along,
+                size[1] * inner * forward,
+                size[2] * inner * backward,
+            ]
             forces += [size[3] * ball * forward, size[4] * ball * backward]
         begin = np.exp(1j * np.array(multiples) @ np.array([0.0, cage_angle, ball_angle]))
         support = getattr(dynamics, self.gear).support
         stiffness = np.array([support.stiffness_x, support.stiffness_y, 0.0])
         return make_tones(
-            self.gear, [1.0, orders.cage, orders.ball], multiples, begin[:, None] * forces * stiffness, "nothing"
+            self.gear,
+            [1.0, orders.cage, orders.ball],
+            multiples,
+            begin[:, None] * forces * stiffness,
+            "nothing",
         )

@@ -52,11 +52,17 @@ class Sensing:
 
     def __post_init__(self) -> None:
         if not 1000.0 <= self.sampling_rate <= 1e6:
-            raise ConfigError(f"sensing.sampling_rate_hz = {self.sampling_rate:g} must lie in 1000..1000000")
+            raise ConfigError(
+                f"sensing.sampling_rate_hz = {self.sampling_rate:g} must lie in 1000..1000000"
+            )
         if not self.channels or len(set(self.channels)) != len(self.channels):
-            raise ConfigError(f"sensing.channels = {list(self.channels)} must name at least one channel, each once")
+            raise ConfigError(
+                f"sensing.channels = {list(self.channels)} must name at least one channel, each once"
+            )
         if self.snr_reference not in SNR_REFERENCES:
-            raise ConfigError(f"sensing.snr_reference = {self.snr_reference!r}; allowed: {', '.join(SNR_REFERENCES)}")
+            raise ConfigError(
+                f"sensing.snr_reference = {self.snr_reference!r}; allowed: {', '.join(SNR_REFERENCES)}"
+            )
         if not 0.0 <= self.gain_scatter < 0.5:
             raise ConfigError(f"sensing.gain_scatter = {self.gain_scatter:g} must lie in 0..0.5")
         self._check_path()
@@ -68,12 +74,16 @@ class Sensing:
                     f"sensing.sampling_rate_hz = {self.sampling_rate:g}; give "
                     f"'sensing.noise.band_hz=[{self.noise.band[0]:g},{0.5 * self.sampling_rate:g}]' or a higher rate"
                 )
-            if self.noise.offsets is not None and len(self.noise.offsets) != len(self.channel_names):
+            if self.noise.offsets is not None and len(self.noise.offsets) != len(
+                self.channel_names
+            ):
                 raise ConfigError(
                     f"sensing.noise.offsets_db has {len(self.noise.offsets)} values for {len(self.channel_names)} "
                     "sensors; give one a sensor, or null"
                 )
-            if self.path is None and any(isinstance(part, ThroughPath) for part in self.noise.parts):
+            if self.path is None and any(
+                isinstance(part, ThroughPath) for part in self.noise.parts
+            ):
                 raise ConfigError(
                     "sensing.noise: kind path needs a transfer path; sensing.path.kind = identity has none"
                 )
@@ -106,7 +116,9 @@ class Sensing:
 
     def place(self, n_samples: int) -> Place:
         """Where noise is heard."""
-        return Place(sensors=self.channel_names, n_samples=n_samples, sampling_rate=self.sampling_rate)
+        return Place(
+            sensors=self.channel_names, n_samples=n_samples, sampling_rate=self.sampling_rate
+        )
 
     def check(self, duration: float) -> None:
         """Read what users gave as files; ConfigError where they do not fit."""
@@ -127,12 +139,18 @@ class Sensing:
         if (self.path is None) != (self.sensors is None):
             raise ConfigError(
                 "sensing.sensors names the places that a transfer path leads to: "
-                + ("leave it null with sensing.path.kind = identity" if self.path is None else "give at least one")
+                + (
+                    "leave it null with sensing.path.kind = identity"
+                    if self.path is None
+                    else "give at least one"
+                )
             )
         if self.sensors is None:
             return
         if not self.sensors or len(set(self.sensors)) != len(self.sensors):
-            raise ConfigError(f"sensing.sensors = {list(self.sensors)} must name at least one sensor, each once")
+            raise ConfigError(
+                f"sensing.sensors = {list(self.sensors)} must name at least one sensor, each once"
+            )
         for name in self.sensors:
             if not SENSOR_NAME.fullmatch(name) or is_turning(name):
                 raise ConfigError(
@@ -140,14 +158,20 @@ class Sensing:
                     f"{', '.join(map(repr, TURNING))}"
                 )
         if turning := [name for name in self.channels if is_turning(name)]:
-            raise ConfigError(f"sensing.channels: {turning[0]} is no bearing; a transfer path takes bearing channels")
+            raise ConfigError(
+                f"sensing.channels: {turning[0]} is no bearing; a transfer path takes bearing channels"
+            )
         highest = usable_band(self.sampling_rate)[1]
         lowest = self.path.natural_frequency[0] if isinstance(self.path, ModalPath) else 0.0
         if isinstance(self.path, ModalPath) and self.path.natural_frequency[1] > highest:
             raise ConfigError(
                 f"sensing.path.natural_frequency_hz reaches {self.path.natural_frequency[1]:g} Hz, above the usable "
                 f"band of {highest:g} Hz at sensing.sampling_rate_hz = {self.sampling_rate:g}; give "
-                + (f"'sensing.path.natural_frequency_hz=[{lowest:g},{highest:g}]' or " if lowest < highest else "")
+                + (
+                    f"'sensing.path.natural_frequency_hz=[{lowest:g},{highest:g}]' or "
+                    if lowest < highest
+                    else ""
+                )
                 + f"a rate of at least {math.ceil(self.path.natural_frequency[1] / usable_band(1.0)[1])} Hz"
             )
 
@@ -203,7 +227,9 @@ def detectability(residual: Array, noise_power: Array) -> float:
 def add_noise(clean: Array, noise_power: Array, rng: np.random.Generator) -> Array:
     """Add white Gaussian noise of the given power to each channel, (channel, sample)."""
     noisy = np.empty_like(clean)
-    for own, signal, power_of_noise in zip(noisy, clean, noise_power, strict=True):  # a channel stays in the cache
+    for own, signal, power_of_noise in zip(
+        noisy, clean, noise_power, strict=True
+    ):  # a channel stays in the cache
         rng.standard_normal(out=own)
         own *= math.sqrt(power_of_noise)
         own += signal

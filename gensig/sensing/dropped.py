@@ -10,7 +10,9 @@ Array = NDArray[np.float64]
 FILLS = ("hold", "zero")
 
 
-def draw_dropped(rng: np.random.Generator, share: float, n_run: int, n_samples: int) -> NDArray[np.bool_]:
+def draw_dropped(
+    rng: np.random.Generator, share: float, n_run: int, n_samples: int
+) -> NDArray[np.bool_]:
     """Which samples are lost, (sample,).
 
     Samples travel in packets of ``n_run``; each is lost with probability ``share``, whatever befalls the others. The

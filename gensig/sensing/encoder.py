@@ -16,7 +16,9 @@ Array = NDArray[np.float64]
 
 MOST_LINES = 100_000
 MOST_ECCENTRICITY = math.radians(5.0)
-MOST_LINE_SHARE = 0.1  # standard deviation of a line's place over the spacing; with WIDEST no line passes another
+MOST_LINE_SHARE = (
+    0.1  # standard deviation of a line's place over the spacing; with WIDEST no line passes another
+)
 WIDEST = 4.0  # standard deviations
 
 
@@ -37,7 +39,9 @@ class Encoder:
     def __post_init__(self) -> None:
         check_shaft("encoder", self.shaft)
         if not 4 <= self.lines_per_turn <= MOST_LINES:
-            raise ConfigError(f"sensing.encoder.lines_per_turn = {self.lines_per_turn} must lie in 4..{MOST_LINES}")
+            raise ConfigError(
+                f"sensing.encoder.lines_per_turn = {self.lines_per_turn} must lie in 4..{MOST_LINES}"
+            )
         for key, value, most, why in (
             ("eccentricity_error_deg", self.eccentricity_error, MOST_ECCENTRICITY, ""),
             (
@@ -49,7 +53,9 @@ class Encoder:
         ):
             if not 0.0 <= value <= most * (1.0 + 1e-9):
                 given, allowed = (from_si(key, one) for one in (value, most))
-                raise ConfigError(f"sensing.encoder.{key} = {given:g} must lie in 0..{allowed:g}{why}")
+                raise ConfigError(
+                    f"sensing.encoder.{key} = {given:g} must lie in 0..{allowed:g}{why}"
+                )
 
     @property
     def spacing(self) -> float:
@@ -85,7 +91,9 @@ def draw_disc(rng: np.random.Generator, encoder: Encoder) -> Disc:
     return draw_lines(rng, encoder.lines_per_turn, encoder.eccentricity_error, encoder.line_error)
 
 
-def draw_lines(rng: np.random.Generator, n_lines: int, eccentricity_error: float, line_error: float) -> Disc:
+def draw_lines(
+    rng: np.random.Generator, n_lines: int, eccentricity_error: float, line_error: float
+) -> Disc:
     """A disc with its errors: index and eccentricity in any direction, the latter of any size up to the largest.
 
     A disc whose center is off the shaft's by e is misread by e / R sin(angle + direction) at a reading radius R.
@@ -94,4 +102,7 @@ def draw_lines(rng: np.random.Generator, n_lines: int, eccentricity_error: float
     amplitude = eccentricity_error * float(rng.random())
     nominal = 2.0 * math.pi / n_lines * np.arange(n_lines)
     own = np.clip(rng.standard_normal(n_lines), -WIDEST, WIDEST)
-    return Disc(index=float(index), places=nominal + amplitude * np.sin(nominal + direction) + line_error * own)
+    return Disc(
+        index=float(index),
+        places=nominal + amplitude * np.sin(nominal + direction) + line_error * own,
+    )

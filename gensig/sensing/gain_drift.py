@@ -9,11 +9,18 @@ from numpy.typing import NDArray
 
 Array = NDArray[np.float64]
 
-POINTS_PER_TIME = 20  # in a correlation time; between them the logarithm is straight: 2.4 % less variance midway
+POINTS_PER_TIME = (
+    20  # in a correlation time; between them the logarithm is straight: 2.4 % less variance midway
+)
 
 
 def draw_drift(
-    rng: np.random.Generator, scatter: float, correlation_time: float, n_sensors: int, n_samples: int, rate: float
+    rng: np.random.Generator,
+    scatter: float,
+    correlation_time: float,
+    n_sensors: int,
+    n_samples: int,
+    rate: float,
 ) -> Array:
     """Factor of each sensor at every sample, (sensor, sample): the exponential of a mean-reverting walk.
 

@@ -32,7 +32,9 @@ def cumulative_pitch_limit(gear: Gear, grade: float) -> float:
     Source: ISO 1328-1:2013, F_pT = (0.002 d + 0.55 sqrt(d) + 0.7 m + 12) sqrt(2)^(A - 5), units as above.
     """
     diameter = _diameter(gear)
-    return _limit(gear, grade, 0.002 * diameter + 0.55 * math.sqrt(diameter) + 0.7 * _module(gear) + 12.0)
+    return _limit(
+        gear, grade, 0.002 * diameter + 0.55 * math.sqrt(diameter) + 0.7 * _module(gear) + 12.0
+    )
 
 
 def profile_slope_limit(gear: Gear, grade: float) -> float:
@@ -76,7 +78,9 @@ def check_covered(gear: Gear) -> None:
 def _limit(gear: Gear, grade: float, micrometers: float) -> float:
     check_covered(gear)
     if not LOWEST_GRADE <= grade <= HIGHEST_GRADE:
-        raise ConfigError(f"ISO 1328-1:2013 has the grades {LOWEST_GRADE} to {HIGHEST_GRADE}, not {grade:g}")
+        raise ConfigError(
+            f"ISO 1328-1:2013 has the grades {LOWEST_GRADE} to {HIGHEST_GRADE}, not {grade:g}"
+        )
     return 1e-6 * micrometers * math.sqrt(2.0) ** (grade - 5.0)
 
 

@@ -50,7 +50,9 @@ class Instrument:
         if filters and sensor is not None and self.sensors is not None:
             if sensor.transverse_sensitivity:
                 signal = signal + self.sensors.transverse[:, None] * lines[n_sensors:]
-            signal = sensor.filtered(self.sensors.gain[:, None] * signal, self.sensing.sampling_rate)
+            signal = sensor.filtered(
+                self.sensors.gain[:, None] * signal, self.sensing.sampling_rate
+            )
         return np.ascontiguousarray(signal[:, self.sensing.n_lead :])
 
     def drift(self, n_samples: int, rng: np.random.Generator) -> Array:
@@ -64,9 +66,15 @@ class Instrument:
     def power(self, signal: Array) -> Array:
         """Mean square without the mean in the band of the signal-to-noise ratio, (sensor,) (m/s2)^2."""
         noise = self.sensing.noise
-        return power(signal) if noise is None else band_power(signal, self.sensing.sampling_rate, noise.band)
+        return (
+            power(signal)
+            if noise is None
+            else band_power(signal, self.sensing.sampling_rate, noise.band)
+        )
 
-    def record(self, clean: Array, noise_power: Array, rng: np.random.Generator) -> tuple[Array, float]:
+    def record(
+        self, clean: Array, noise_power: Array, rng: np.random.Generator
+    ) -> tuple[Array, float]:
         """Noise of the given power in the band added, offset and converter applied; and the share that clips."""
         noise, sensor = self.sensing.noise, self.sensing.sensor
         if noise is None or noise.is_white:
@@ -89,7 +97,9 @@ class Instrument:
         sensor = self.sensing.sensor
         if sensor is None or not sensor.dropped_fraction:
             return signal, 0.0
-        dropped = draw_dropped(rng, sensor.dropped_fraction, sensor.dropped_run_samples, signal.shape[1])
+        dropped = draw_dropped(
+            rng, sensor.dropped_fraction, sensor.dropped_run_samples, signal.shape[1]
+        )
         return filled(signal, dropped, sensor.dropped_fill), float(np.mean(dropped))
 
     def _at_sensors(self, source: Array) -> Array:
@@ -99,7 +109,9 @@ class Instrument:
         sensor, names = self.sensing.sensor, self.sensing.channels
         if sensor is None or not sensor.transverse_sensitivity:
             return source
-        return np.concatenate([source, source[[names.index(transverse_channel(name)) for name in names]]])
+        return np.concatenate(
+            [source, source[[names.index(transverse_channel(name)) for name in names]]]
+        )
 
     def _coloured(self, rng: np.random.Generator, n_samples: int) -> Array:
         if self.path is None:
@@ -110,13 +122,19 @@ class Instrument:
         return lines[: len(self.sensing.channel_names), n_lead:]
 
 
-def draw_instrument(sensing: Sensing, path_rng: np.random.Generator, sensor_rng: np.random.Generator) -> Instrument:
+def draw_instrument(
+    sensing: Sensing, path_rng: np.random.Generator, sensor_rng: np.random.Generator
+) -> Instrument:
     """Transfer path and sensors of one gearbox, each from its own random numbers."""
     n_sensors = len(sensing.channel_names)
     path: Housing | ImpulseResponses | None = None
     if isinstance(sensing.path, ModalPath):
         path = draw_housing(path_rng, sensing.path, len(sensing.channels), n_sensors)
     elif sensing.path is not None:
-        path = read_responses(sensing.path, sensing.channels, sensing.channel_names, sensing.sampling_rate)
-    sensors = None if sensing.sensor is None else draw_sensors(sensor_rng, sensing.sensor, n_sensors)
+        path = read_responses(
+            sensing.path, sensing.channels, sensing.channel_names, sensing.sampling_rate
+        )
+    sensors = (
+        None if sensing.sensor is None else draw_sensors(sensor_rng, sensing.sensor, n_sensors)
+    )
     return Instrument(sensing=sensing, path=path, sensors=sensors)

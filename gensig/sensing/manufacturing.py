@@ -26,9 +26,13 @@ from gensig.units import from_si, unit
 
 Array = NDArray[np.float64]
 
-FORM_WAVES = 3  # most waves of the form deviation from end to end; whole ones have no slope of their own
+FORM_WAVES = (
+    3  # most waves of the form deviation from end to end; whole ones have no slope of their own
+)
 SUPPORT_SCATTERS = ("support_stiffness_scatter", "support_damping_scatter")
-RUNOUT_STEPS = 20  # in which the eccentricity is made smaller until the index deviation fits its limit
+RUNOUT_STEPS = (
+    20  # in which the eccentricity is made smaller until the index deviation fits its limit
+)
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -59,21 +63,32 @@ class Quality:
     support_damping_ratio_high: float | None = None
 
     def __post_init__(self) -> None:
-        if self.iso1328_grade is not None and not LOWEST_GRADE <= self.iso1328_grade <= HIGHEST_GRADE:
+        if (
+            self.iso1328_grade is not None
+            and not LOWEST_GRADE <= self.iso1328_grade <= HIGHEST_GRADE
+        ):
             grades = f"{LOWEST_GRADE}..{HIGHEST_GRADE}"
-            raise ConfigError(f"quality.iso1328_grade = {self.iso1328_grade:g} must lie in {grades}, or be null")
+            raise ConfigError(
+                f"quality.iso1328_grade = {self.iso1328_grade:g} must lie in {grades}, or be null"
+            )
         if not 0.0 <= self.used_share_low <= self.used_share_high <= 1.0:
-            raise ConfigError("quality.used_share_low and used_share_high must be ordered and lie in 0..1")
+            raise ConfigError(
+                "quality.used_share_low and used_share_high must be ordered and lie in 0..1"
+            )
         for key in ("tooth_share", "undulation_share", "backlash_scatter", *SUPPORT_SCATTERS):
             if not 0.0 <= getattr(self, key) <= 1.0:
                 raise ConfigError(f"quality.{key} = {getattr(self, key):g} must lie in 0..1")
         if not 1 <= self.undulation_waves <= 50:
-            raise ConfigError(f"quality.undulation_waves = {self.undulation_waves} must lie in 1..50")
+            raise ConfigError(
+                f"quality.undulation_waves = {self.undulation_waves} must lie in 1..50"
+            )
         if self.misalignment < 0.0:
             value = from_si("misalignment_um", self.misalignment)
             raise ConfigError(f"quality.misalignment_um = {value:g} must not be negative")
         low, high = self.support_damping_ratio_low, self.support_damping_ratio_high
-        if (low is None) != (high is None) or (low is not None and high is not None and not 0.0 < low <= high <= 1.0):
+        if (low is None) != (high is None) or (
+            low is not None and high is not None and not 0.0 < low <= high <= 1.0
+        ):
             raise ConfigError(
                 f"quality.support_damping_ratio_low = {low} and support_damping_ratio_high = {high} must be ordered, "
                 "above 0 and at most 1, or both null"
@@ -125,7 +140,9 @@ class Gearbox:
     damping_ratio: Array | None = None
 
 
-def draw_specimen(rng: np.random.Generator, pinion: Gear, wheel: Gear, quality: Quality) -> Specimen:
+def draw_specimen(
+    rng: np.random.Generator, pinion: Gear, wheel: Gear, quality: Quality
+) -> Specimen:
     """Draw a set of gears within its grade.
 
     What is drawn does not depend on what is switched on, so that one key leaves the other deviations alone.
@@ -140,19 +157,28 @@ def draw_specimen(rng: np.random.Generator, pinion: Gear, wheel: Gear, quality: 
         return perfect_specimen(pinion, wheel)
     (pinion_error, pinion_tilt, pinion_forms), (wheel_error, wheel_tilt, wheel_forms) = drawn
     misalignment = Misalignment(
-        gear=pinion.name, tooth=ALL, misalignment=tilted * quality.misalignment, limit=max(quality.misalignment, 1e-6)
+        gear=pinion.name,
+        tooth=ALL,
+        misalignment=tilted * quality.misalignment,
+        limit=max(quality.misalignment, 1e-6),
     )
     return Specimen(
         pinion_error=pinion_error,
         wheel_error=wheel_error,
         pinion_tilt=pinion_tilt,
         wheel_tilt=wheel_tilt,
-        forms=(*pinion_forms, *wheel_forms, *((misalignment,) if misalignment.misalignment else ())),
+        forms=(
+            *pinion_forms,
+            *wheel_forms,
+            *((misalignment,) if misalignment.misalignment else ()),
+        ),
         backlash_factor=1.0 + play * quality.backlash_scatter,
     )
 
 
-def _draw_gear(rng: np.random.Generator, gear: Gear, quality: Quality) -> tuple[Array, Array, tuple[FlankForm, ...]]:
+def _draw_gear(
+    rng: np.random.Generator, gear: Gear, quality: Quality
+) -> tuple[Array, Array, tuple[FlankForm, ...]]:
     """Errors (tooth,) m, tilts (tooth,) m/m and the common form of the flanks of one gear."""
     share = rng.uniform(quality.used_share_low, quality.used_share_high)
     runout_share, angle = rng.random(), rng.uniform(0.0, 2.0 * math.pi)
@@ -160,7 +186,9 @@ def _draw_gear(rng: np.random.Generator, gear: Gear, quality: Quality) -> tuple[
     sign, waves = rng.choice((-1.0, 1.0)), int(rng.integers(1, FORM_WAVES + 1))
     if quality.iso1328_grade is None:
         return np.zeros(gear.n_teeth), np.zeros(gear.n_teeth), ()
-    eccentricity, pitch_error = _scaled_index(gear, quality.iso1328_grade, share, runout_share, angle, shape)
+    eccentricity, pitch_error = _scaled_index(
+        gear, quality.iso1328_grade, share, runout_share, angle, shape
+    )
     turn = 2.0 * math.pi / gear.n_teeth * np.arange(gear.n_teeth) - angle
     # the same turning point of an eccentric gear for all teeth in contact: its teeth do not step, see the theory
     error = eccentricity * np.cos(turn) + pitch_error
@@ -173,7 +201,11 @@ def _draw_gear(rng: np.random.Generator, gear: Gear, quality: Quality) -> tuple[
     towards_tip = 1.0 if gear.name == "pinion" else -1.0  # as the contact runs along the path
     tilt = tilt + towards_tip * quality.tooth_share * slope / involute * of_teeth
     parts = (
-        (sign * (1.0 - quality.tooth_share) * slope, (1.0 - quality.undulation_share) * form, waves),
+        (
+            sign * (1.0 - quality.tooth_share) * slope,
+            (1.0 - quality.undulation_share) * form,
+            waves,
+        ),
         (0.0, quality.undulation_share * form, quality.undulation_waves),
     )
     forms = tuple(
@@ -208,13 +240,19 @@ def _scaled_index(
     arc = share * math.cos(gear.transverse_pressure_angle)
     step, total = arc * single_pitch_limit(gear, grade), arc * cumulative_pitch_limit(gear, grade)
     steps, steps_once = (np.diff(part, append=part[0]) for part in (random, once))
-    tried = np.linspace(0.5 * runout_share * share * runout_limit(gear, grade), 0.0, RUNOUT_STEPS + 1)
+    tried = np.linspace(
+        0.5 * runout_share * share * runout_limit(gear, grade), 0.0, RUNOUT_STEPS + 1
+    )
     # the largest random part at which no step of the sum is above its limit
     room = np.where(
-        np.abs(steps_once) * tried[:, None] <= step, step - np.sign(steps) * tried[:, None] * steps_once, 0.0
+        np.abs(steps_once) * tried[:, None] <= step,
+        step - np.sign(steps) * tried[:, None] * steps_once,
+        0.0,
     )
     height = (room / np.maximum(np.abs(steps), 1e-300)).min(axis=1)
-    fits = (np.ptp(tried[:, None] * once + height[:, None] * random, axis=1) <= total) & (height > 0.0)
+    fits = (np.ptp(tried[:, None] * once + height[:, None] * random, axis=1) <= total) & (
+        height > 0.0
+    )
     if fits.any():
         first = int(fits.argmax())
         return float(tried[first]), height[first] * random
@@ -231,7 +269,9 @@ def perfect_specimen(pinion: Gear, wheel: Gear) -> Specimen:
     )
 
 
-def draw_gearbox(rng: np.random.Generator, n_channels: int, quality: Quality, gain_scatter: float) -> Gearbox:
+def draw_gearbox(
+    rng: np.random.Generator, n_channels: int, quality: Quality, gain_scatter: float
+) -> Gearbox:
     """Log-normal factors, so that none can turn negative."""
     return Gearbox(
         stiffness_factor=np.exp(quality.support_stiffness_scatter * rng.standard_normal(4)),

@@ -49,8 +49,12 @@ class ImpulseResponses:
         from scipy.signal import oaconvolve
 
         if sampling_rate != self.sampling_rate:
-            raise ValueError(f"responses at {self.sampling_rate:g} Hz, signal at {sampling_rate:g} Hz")
-        out: Array = oaconvolve(source[None], self.taps, axes=2)[:, :, : source.shape[1]].sum(axis=1)
+            raise ValueError(
+                f"responses at {self.sampling_rate:g} Hz, signal at {sampling_rate:g} Hz"
+            )
+        out: Array = oaconvolve(source[None], self.taps, axes=2)[:, :, : source.shape[1]].sum(
+            axis=1
+        )
         return out
 
 
@@ -75,11 +79,17 @@ def read_responses(
         check_columns(KEY, path.file, names, ["frequency_hz", *parts])
         columns = values[[names.index(part) for part in parts]]
         frequency = values[names.index("frequency_hz")]
-        taps = _impulse_responses(path.file, frequency, columns[::2] + 1j * columns[1::2], sampling_rate)
-    return ImpulseResponses(taps=taps.reshape(len(sensors), len(channels), -1), sampling_rate=sampling_rate)
+        taps = _impulse_responses(
+            path.file, frequency, columns[::2] + 1j * columns[1::2], sampling_rate
+        )
+    return ImpulseResponses(
+        taps=taps.reshape(len(sensors), len(channels), -1), sampling_rate=sampling_rate
+    )
 
 
-def _impulse_responses(file: str, frequency: Array, response: NDArray[np.complex128], sampling_rate: float) -> Array:
+def _impulse_responses(
+    file: str, frequency: Array, response: NDArray[np.complex128], sampling_rate: float
+) -> Array:
     """Causal impulse responses of frequency responses, (pair, line) to (pair, sample).
 
     The response goes straight between the lines given and is held beyond them: records have nothing above the usable
@@ -100,11 +110,16 @@ def _impulse_responses(file: str, frequency: Array, response: NDArray[np.complex
         raise ConfigError(f"{where}: lines {step.min():g} Hz apart are too narrow; thin them out")
     grid = np.fft.rfftfreq(n_taps, 1.0 / sampling_rate)
     even = np.stack(
-        [np.interp(grid, frequency, row.real) + 1j * np.interp(grid, frequency, row.imag) for row in response]
+        [
+            np.interp(grid, frequency, row.real) + 1j * np.interp(grid, frequency, row.imag)
+            for row in response
+        ]
     )
     taps = np.fft.irfft(even, n_taps, axis=1)
     half = n_taps // 2
-    early = float(np.max(np.sum(taps[:, half:] ** 2, axis=1) / np.maximum(np.sum(taps**2, axis=1), 1e-300)))
+    early = float(
+        np.max(np.sum(taps[:, half:] ** 2, axis=1) / np.maximum(np.sum(taps**2, axis=1), 1e-300))
+    )
     if early > NON_CAUSAL:
         raise ConfigError(
             f"{where}: {100.0 * early:.0f} % of a response's energy comes before time 0; shift it to be causal"

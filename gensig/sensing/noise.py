@@ -80,7 +80,9 @@ class Pink(Part):
         """As ``Part.make``."""
         frequency = np.fft.rfftfreq(place.n_samples, 1.0 / place.sampling_rate)
         spectrum = np.fft.rfft(rng.standard_normal(place.shape), axis=1)
-        return np.fft.irfft(spectrum / np.sqrt(np.maximum(frequency, self.lowest)), place.n_samples, axis=1)
+        return np.fft.irfft(
+            spectrum / np.sqrt(np.maximum(frequency, self.lowest)), place.n_samples, axis=1
+        )
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -136,7 +138,9 @@ class Impulsive(Part):
         for instant in rng.integers(0, force.shape[1], n_knocks).tolist():
             force[:, instant] += rng.standard_normal(len(force))
         force[:, before + rng.integers(place.n_samples)] += rng.standard_normal(len(force))
-        return np.asarray(sosfilt(mode_section(self.ring, self.damping_ratio, rate), force, axis=1)[:, before:])
+        return np.asarray(
+            sosfilt(mode_section(self.ring, self.damping_ratio, rate), force, axis=1)[:, before:]
+        )
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -208,11 +212,15 @@ class Background(Part):
             starts = rng.integers(0, last, len(place.sensors), endpoint=True)
             return np.stack([values[0, start : start + place.n_samples] for start in starts])
         start = int(rng.integers(0, last, endpoint=True))
-        return np.stack([values[names.index(name), start : start + place.n_samples] for name in place.sensors])
+        return np.stack(
+            [values[names.index(name), start : start + place.n_samples] for name in place.sensors]
+        )
 
 
 @lru_cache(maxsize=4)
-def _background(file: str, sensors: tuple[str, ...], n_samples: int, sampling_rate: float) -> tuple[list[str], Array]:
+def _background(
+    file: str, sensors: tuple[str, ...], n_samples: int, sampling_rate: float
+) -> tuple[list[str], Array]:
     key = "sensing.noise: file"
     names, values = read_table(key, file, least_rows=max(2, n_samples))
     wanted = ["background"] if "background" in names else list(sensors)
@@ -220,7 +228,9 @@ def _background(file: str, sensors: tuple[str, ...], n_samples: int, sampling_ra
     check_rate(key, file, values[names.index("time_s")], sampling_rate)
     columns = np.stack([values[names.index(name)] for name in wanted])
     if not np.all(np.ptp(columns, axis=1) > 0.0):
-        raise ConfigError(f"{key} = {file}: a column holds one value throughout; give what a sensor heard")
+        raise ConfigError(
+            f"{key} = {file}: a column holds one value throughout; give what a sensor heard"
+        )
     return wanted, columns
 
 
@@ -243,7 +253,9 @@ class Spectrum(Part):
         frequency, density = self.density(place)
         grid = np.fft.rfftfreq(place.n_samples, 1.0 / place.sampling_rate)
         size = np.sqrt([np.interp(grid, frequency, row) for row in density])
-        return np.fft.irfft(size * np.fft.rfft(rng.standard_normal(place.shape), axis=1), place.n_samples, axis=1)
+        return np.fft.irfft(
+            size * np.fft.rfft(rng.standard_normal(place.shape), axis=1), place.n_samples, axis=1
+        )
 
 
 @lru_cache(maxsize=4)
@@ -255,7 +267,9 @@ def _spectrum(file: str, sensors: tuple[str, ...]) -> tuple[Array, Array]:
     frequency = values[names.index("frequency_hz")]
     density = values[[names.index(name) for name in wanted]]
     if frequency[0] < 0.0 or not np.all(np.diff(frequency) > 0.0):
-        raise ConfigError(f"{key} = {file}: frequency_hz must rise from line to line and not be negative")
+        raise ConfigError(
+            f"{key} = {file}: frequency_hz must rise from line to line and not be negative"
+        )
     if density.min() < 0.0 or not np.all(density.max(axis=1) > 0.0):
         raise ConfigError(f"{key} = {file}: a power density must not be negative, nor 0 throughout")
     return frequency, density
@@ -286,11 +300,19 @@ class Noise:
 
     def __post_init__(self) -> None:
         if not self.parts:
-            raise ConfigError("sensing.noise.parts = [] has no part; give one, or sensing.snr_db=null for no noise")
-        if self.band is not None and (len(self.band) != 2 or not 0.0 <= self.band[0] < self.band[1]):
-            raise ConfigError(f"sensing.noise.band_hz = {list(self.band)} must be [low, high], ordered, or null")
+            raise ConfigError(
+                "sensing.noise.parts = [] has no part; give one, or sensing.snr_db=null for no noise"
+            )
+        if self.band is not None and (
+            len(self.band) != 2 or not 0.0 <= self.band[0] < self.band[1]
+        ):
+            raise ConfigError(
+                f"sensing.noise.band_hz = {list(self.band)} must be [low, high], ordered, or null"
+            )
         if self.band is not None and not any(part.is_broad for part in self.parts):
-            raise ConfigError("sensing.noise.band_hz: tones alone may miss the band; add a part such as white, or null")
+            raise ConfigError(
+                "sensing.noise.band_hz: tones alone may miss the band; add a part such as white, or null"
+            )
 
     @property
     def is_white(self) -> bool:
@@ -316,9 +338,13 @@ def read_noise(values: Any) -> Noise:
     """
     where = "sensing.noise"
     if not isinstance(values, Mapping) or set(values) - {"offsets_db"} != {"parts", "band_hz"}:
-        raise ConfigError(f"{where} must be a group of the keys parts and band_hz, and may have offsets_db")
+        raise ConfigError(
+            f"{where} must be a group of the keys parts and band_hz, and may have offsets_db"
+        )
     if not isinstance(values["parts"], list | tuple):
-        raise ConfigError(f"{where}.parts = {values['parts']!r} must be a list, such as [{{kind: white, share: 1}}]")
+        raise ConfigError(
+            f"{where}.parts = {values['parts']!r} must be a list, such as [{{kind: white, share: 1}}]"
+        )
     parts = []
     for number, part in enumerate(values["parts"]):
         place = f"{where}.parts[{number}]"
@@ -326,12 +352,18 @@ def read_noise(values: Any) -> Noise:
         if kind not in PARTS:
             raise ConfigError(f"{place}: kind = {kind!r}; allowed: {', '.join(PARTS)}")
         try:
-            parts.append(read(PARTS[kind], {key: value for key, value in part.items() if key != "kind"}, place))
+            parts.append(
+                read(
+                    PARTS[kind], {key: value for key, value in part.items() if key != "kind"}, place
+                )
+            )
         except ConfigError as error:
             text = str(error)
             raise ConfigError(text if text.startswith(place) else f"{place}.{text}") from None
     band = _numbers(f"{where}.band_hz", values["band_hz"], "[low, high] in Hz")
-    offsets = _numbers(f"{where}.offsets_db", values.get("offsets_db"), "a list of numbers, one a sensor")
+    offsets = _numbers(
+        f"{where}.offsets_db", values.get("offsets_db"), "a list of numbers, one a sensor"
+    )
     return Noise(parts=tuple(parts), band=band, offsets=offsets)
 
 
@@ -339,7 +371,8 @@ def _numbers(key: str, value: Any, what: str) -> tuple[float, ...] | None:
     if value is None:
         return None
     if not isinstance(value, list | tuple) or not all(
-        isinstance(one, int | float) and not isinstance(one, bool) and math.isfinite(one) for one in value
+        isinstance(one, int | float) and not isinstance(one, bool) and math.isfinite(one)
+        for one in value
     ):
         raise ConfigError(f"{key} = {value!r} must be {what}, or null")
     return tuple(float(one) for one in value)
@@ -353,7 +386,9 @@ def tones(rng: np.random.Generator, place: Place, frequency: Array, amplitude: A
     for number, (one, size) in enumerate(zip(frequency, amplitude, strict=True)):
         step = 2j * np.pi * one / place.sampling_rate
         # e^(i w t) as a product: two short tables in place of as many functions as samples
-        turning = (np.exp(step * blocks) * np.exp(step * np.arange(BLOCK))).ravel()[: place.n_samples]
+        turning = (np.exp(step * blocks) * np.exp(step * np.arange(BLOCK))).ravel()[
+            : place.n_samples
+        ]
         phase = phases[:, number, None]
         out += size * (np.cos(phase) * turning.real - np.sin(phase) * turning.imag)
     return out

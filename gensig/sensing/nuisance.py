@@ -50,14 +50,26 @@ class Unbalance(Nuisance):
         Nuisance.__post_init__(self)
         check_number("iso21940_grade", self.iso21940_grade, 0.1, 4000.0)
         check_range("used_share", self.used_share, 0.0, 1.0)
-        check_number("rated_speed_rpm", self.rated_speed, to_si("rated_speed_rpm", 1.0), to_si("rated_speed_rpm", 1e6))
+        check_number(
+            "rated_speed_rpm",
+            self.rated_speed,
+            to_si("rated_speed_rpm", 1.0),
+            to_si("rated_speed_rpm", 1e6),
+        )
         if self.rotor_mass is not None:
             check_number("rotor_mass_kg", self.rotor_mass, 1e-3, 1e5)
 
-    def draw(self, unit_rng: np.random.Generator, record_rng: np.random.Generator, dynamics: PairDynamics) -> Tones:
+    def draw(
+        self, unit_rng: np.random.Generator, record_rng: np.random.Generator, dynamics: PairDynamics
+    ) -> Tones:
         """As ``Nuisance.draw``."""
         share, angle = uniform(unit_rng, self.used_share), TURN * unit_rng.random()
-        eccentricity = share * 1e-3 * self.iso21940_grade / (self.rated_speed * shaft(dynamics, self.gear).speed_ratio)
+        eccentricity = (
+            share
+            * 1e-3
+            * self.iso21940_grade
+            / (self.rated_speed * shaft(dynamics, self.gear).speed_ratio)
+        )
         mass = getattr(dynamics, self.gear).mass if self.rotor_mass is None else self.rotor_mass
         force = mass * eccentricity * shaft(dynamics, self.gear).speed ** 2
         rotating = np.exp(1j * angle) * force * turning(self.gear)
@@ -87,14 +99,19 @@ class CouplingMisalignment(Nuisance):
         for share in self.order_shares:
             check_number("order_shares", share, 0.0, 100.0)
 
-    def draw(self, unit_rng: np.random.Generator, record_rng: np.random.Generator, dynamics: PairDynamics) -> Tones:
+    def draw(
+        self, unit_rng: np.random.Generator, record_rng: np.random.Generator, dynamics: PairDynamics
+    ) -> Tones:
         """As ``Nuisance.draw``."""
         radial = logarithmic(unit_rng, self.force_share) * dynamics.mesh_force
         torque = uniform(unit_rng, self.torque_share) * shaft(dynamics, self.gear).torque
         along, twist = fixed(TURN * unit_rng.random()), np.array([0.0, 0.0, 1.0])
         twisting = torque * np.exp(1j * TURN * unit_rng.random()) * twist
         phases = np.exp(1j * TURN * unit_rng.random(len(self.order_shares)))
-        forces = [radial * share * phase * along for share, phase in zip(self.order_shares, phases, strict=True)]
+        forces = [
+            radial * share * phase * along
+            for share, phase in zip(self.order_shares, phases, strict=True)
+        ]
         orders = [[k + 1] for k in range(len(forces))]
         return make_tones(self.gear, [1.0], [[2], *orders], [twisting, *forces], "torque")
 
@@ -122,16 +139,23 @@ class Looseness(Nuisance):
         check_number("n_orders", self.n_orders, 1, MOST_HARMONICS)
         check_number("harmonic_exponent", self.harmonic_exponent, 0.0, 10.0)
 
-    def draw(self, unit_rng: np.random.Generator, record_rng: np.random.Generator, dynamics: PairDynamics) -> Tones:
+    def draw(
+        self, unit_rng: np.random.Generator, record_rng: np.random.Generator, dynamics: PairDynamics
+    ) -> Tones:
         """As ``Nuisance.draw``."""
         level = logarithmic(unit_rng, self.force_share) * dynamics.mesh_force
         half_share, along = uniform(unit_rng, self.half_share), fixed(TURN * unit_rng.random())
         halves = np.arange(1, 2 * self.n_orders + 1)
         is_half = halves % 2 == 1
-        size = np.where(is_half, half_share, 1.0) * np.maximum(0.5 * halves, 1.0) ** -self.harmonic_exponent
+        size = (
+            np.where(is_half, half_share, 1.0)
+            * np.maximum(0.5 * halves, 1.0) ** -self.harmonic_exponent
+        )
         second_turn = math.pi * halves * int(record_rng.integers(2))
         phase = np.exp(1j * (TURN * unit_rng.random(len(halves)) + second_turn))
-        return make_tones(self.gear, [0.5], halves[:, None], level * (size * phase)[:, None] * along, "torque")
+        return make_tones(
+            self.gear, [0.5], halves[:, None], level * (size * phase)[:, None] * along, "torque"
+        )
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -164,10 +188,19 @@ class NeighbourMesh(Nuisance):
         check_number("harmonic_exponent", self.harmonic_exponent, 0.0, 10.0)
         check_range("sideband_share", self.sideband_share, 0.0, 1.0)
 
-    def draw(self, unit_rng: np.random.Generator, record_rng: np.random.Generator, dynamics: PairDynamics) -> Tones:
+    def draw(
+        self, unit_rng: np.random.Generator, record_rng: np.random.Generator, dynamics: PairDynamics
+    ) -> Tones:
         """As ``Nuisance.draw``."""
-        level = logarithmic(unit_rng, self.dynamic_share) * shaft(dynamics, self.gear).torque / self.base_radius
-        sideband, phases = uniform(unit_rng, self.sideband_share), TURN * unit_rng.random((5, MOST_HARMONICS))
+        level = (
+            logarithmic(unit_rng, self.dynamic_share)
+            * shaft(dynamics, self.gear).torque
+            / self.base_radius
+        )
+        sideband, phases = (
+            uniform(unit_rng, self.sideband_share),
+            TURN * unit_rng.random((5, MOST_HARMONICS)),
+        )
         mate_angle = TURN * record_rng.random()
         along = fixed(self.line_of_action)
         # the next stage's force holds the wheel's shaft back, that of the stage before drives the pinion's
@@ -175,12 +208,16 @@ class NeighbourMesh(Nuisance):
         offsets = np.array([(0, 0), (1, 0), (-1, 0), (0, 1), (0, -1)])
         weight = np.array([1.0, sideband, sideband, sideband, sideband])
         harmonic = np.arange(1, self.n_harmonics + 1)
-        multiples = offsets[:, None] + harmonic[:, None] * np.array([self.n_teeth, 0])  # (offset, harmonic, base)
+        multiples = offsets[:, None] + harmonic[:, None] * np.array(
+            [self.n_teeth, 0]
+        )  # (offset, harmonic, base)
         size = weight[:, None] * harmonic**-self.harmonic_exponent
         phase = phases[:, : self.n_harmonics] + offsets[:, 1, None] * mate_angle
         force = level * (size * np.exp(1j * phase))[:, :, None] * along
         orders = [1.0, self.n_teeth / self.n_teeth_mate]
-        return make_tones(self.gear, orders, multiples.reshape(-1, 2), force.reshape(-1, 3), "torque")
+        return make_tones(
+            self.gear, orders, multiples.reshape(-1, 2), force.reshape(-1, 3), "torque"
+        )
 
 
 KINDS: dict[str, type[Nuisance]] = {
@@ -201,7 +238,9 @@ def read_nuisances(values: Any) -> tuple[Nuisance, ...]:
     """
     where = "sensing.nuisances"
     if not isinstance(values, list | tuple):
-        raise ConfigError(f"{where} = {values!r} must be a list of parts, [] for none; see sensing=machine")
+        raise ConfigError(
+            f"{where} = {values!r} must be a list of parts, [] for none; see sensing=machine"
+        )
     parts = []
     for number, part in enumerate(values):
         place = f"{where}[{number}]"
@@ -209,7 +248,11 @@ def read_nuisances(values: Any) -> tuple[Nuisance, ...]:
         if kind not in KINDS:
             raise ConfigError(f"{place}: kind = {kind!r}; allowed: {', '.join(KINDS)}")
         try:
-            parts.append(read(KINDS[kind], {key: value for key, value in part.items() if key != "kind"}, place))
+            parts.append(
+                read(
+                    KINDS[kind], {key: value for key, value in part.items() if key != "kind"}, place
+                )
+            )
         except ConfigError as error:
             text = str(error)
             raise ConfigError(text if text.startswith(place) else f"{place}.{text}") from None
@@ -229,4 +272,7 @@ def draw_tones(
     count = len(nuisances)
     own = {level: rng.spawn(count) for level, rng in units.items()}
     phases = record_rng.spawn(count)
-    return [part.draw(own[part.level][place], phases[place], dynamics) for place, part in enumerate(nuisances)]
+    return [
+        part.draw(own[part.level][place], phases[place], dynamics)
+        for place, part in enumerate(nuisances)
+    ]

@@ -18,7 +18,10 @@ from gensig.sensing.transfer_path import ModalPath
 from gensig.units import read
 
 IDENTITY = "identity"
-PATHS: dict[str, type[ModalPath] | type[MeasuredPath]] = {"modal": ModalPath, "measured": MeasuredPath}
+PATHS: dict[str, type[ModalPath] | type[MeasuredPath]] = {
+    "modal": ModalPath,
+    "measured": MeasuredPath,
+}
 NESTED = ("path", "sensor", "noise", "nuisances", "tacho", "encoder")
 
 
@@ -47,7 +50,11 @@ def read_sensing(values: Section) -> Sensing:
 
 def _read_path(values: Any) -> ModalPath | MeasuredPath | None:
     kind = values.get("kind") if isinstance(values, Mapping) else None
-    own = {key: value for key, value in values.items() if key != "kind"} if isinstance(values, Mapping) else {}
+    own = (
+        {key: value for key, value in values.items() if key != "kind"}
+        if isinstance(values, Mapping)
+        else {}
+    )
     if kind == IDENTITY:
         if own:
             raise ConfigError(

@@ -15,7 +15,9 @@ Array = NDArray[np.float64]
 
 SHAFTS = ("pinion", "wheel")
 MOST_PULSES = 1000  # a turn
-JITTERS_IN_A_WIDTH = 8.0  # standard deviations that fit into a pulse or a gap, so that no edge overtakes another
+JITTERS_IN_A_WIDTH = (
+    8.0  # standard deviations that fit into a pulse or a gap, so that no edge overtakes another
+)
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -39,8 +41,14 @@ class Tachometer:
                 "sensing.encoder has more lines"
             )
         if not 1e-3 <= self.pulse_width_share <= 0.999:
-            raise ConfigError(f"sensing.tacho.pulse_width_share = {self.pulse_width_share:g} must lie in 0.001..0.999")
-        most = self.spacing * min(self.pulse_width_share, 1.0 - self.pulse_width_share) / JITTERS_IN_A_WIDTH
+            raise ConfigError(
+                f"sensing.tacho.pulse_width_share = {self.pulse_width_share:g} must lie in 0.001..0.999"
+            )
+        most = (
+            self.spacing
+            * min(self.pulse_width_share, 1.0 - self.pulse_width_share)
+            / JITTERS_IN_A_WIDTH
+        )
         if not 0.0 <= self.jitter <= most:
             given, allowed = (from_si("jitter_deg", value) for value in (self.jitter, most))
             raise ConfigError(
@@ -65,7 +73,9 @@ def draw_mark(rng: np.random.Generator) -> float:
     return float(rng.uniform(0.0, 2.0 * math.pi))
 
 
-def pulse_train(tacho: Tachometer, mark: float, angle: Array, sampling_rate: float, rng: np.random.Generator) -> Array:
+def pulse_train(
+    tacho: Tachometer, mark: float, angle: Array, sampling_rate: float, rng: np.random.Generator
+) -> Array:
     """What the tachometer puts out, (sample,): 1 in a pulse, 0 between, at an edge the share that is high.
 
     A sample is the mean over one sampling interval around its instant, as a converter integrates. So an edge has its
@@ -84,6 +94,8 @@ def pulse_train(tacho: Tachometer, mark: float, angle: Array, sampling_rate: flo
     number = np.arange(first, last + 1)
     begins = mark + tacho.spacing * number + tacho.jitter * rng.standard_normal(len(number))
     edges = np.column_stack([begins, begins + tacho.pulse_width_share * tacho.spacing]).ravel()
-    at = np.interp(edges, np.maximum.accumulate(turned), np.arange(-1.0, n_samples + 1.0))  # in samples
+    at = np.interp(
+        edges, np.maximum.accumulate(turned), np.arange(-1.0, n_samples + 1.0)
+    )  # in samples
     high = np.concatenate([[0.0], np.cumsum(np.diff(at) * (np.arange(len(at) - 1) % 2 == 0))])
     return np.diff(np.interp(np.arange(n_samples + 1) - 0.5, at, high))

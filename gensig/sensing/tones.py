@@ -60,7 +60,9 @@ class Nuisance(ABC):
             raise ConfigError(f"gear = {self.gear!r}; allowed: {', '.join(SENSE)}")
 
     @abstractmethod
-    def draw(self, unit_rng: np.random.Generator, record_rng: np.random.Generator, dynamics: PairDynamics) -> Tones:
+    def draw(
+        self, unit_rng: np.random.Generator, record_rng: np.random.Generator, dynamics: PairDynamics
+    ) -> Tones:
         """The forces of one unit, and what differs from one of its records to the next: angles that no tooth tells."""
 
 

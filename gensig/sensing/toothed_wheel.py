@@ -88,7 +88,9 @@ def passage_times(wheel: ToothedWheel, disc: Disc, angle: Array, sampling_rate: 
     return np.floor(times * wheel.clock_frequency) / wheel.clock_frequency
 
 
-def instantaneous_speed(wheel: ToothedWheel, disc: Disc, angle: Array, sampling_rate: float) -> Array:
+def instantaneous_speed(
+    wheel: ToothedWheel, disc: Disc, angle: Array, sampling_rate: float
+) -> Array:
     """Speed that the wheel shows, (sample,) rad/s.
 
     Notes

@@ -36,7 +36,9 @@ class ModalPath:
         _check_range("natural_frequency_hz", self.natural_frequency, 1.0, 1e6)
         _check_range("damping_ratio", self.damping_ratio, 1e-4, 0.5)
         if not 0.0 < self.transmissibility <= 1e3:
-            raise ConfigError(f"sensing.path.transmissibility = {self.transmissibility:g} must lie in 0..1000")
+            raise ConfigError(
+                f"sensing.path.transmissibility = {self.transmissibility:g} must lie in 0..1000"
+            )
 
     @property
     def memory(self) -> float:
@@ -78,9 +80,13 @@ class Housing:
         from scipy.signal import sosfilt
 
         out = np.zeros((len(self.to_sensors), source.shape[1]))
-        for mode, (frequency, damping) in enumerate(zip(self.natural_frequency, self.damping_ratio, strict=True)):
+        for mode, (frequency, damping) in enumerate(
+            zip(self.natural_frequency, self.damping_ratio, strict=True)
+        ):
             section = mode_section(float(frequency), float(damping), sampling_rate)
-            out += self.to_sensors[:, mode, None] * sosfilt(section, self.from_bearings[mode] @ source)
+            out += self.to_sensors[:, mode, None] * sosfilt(
+                section, self.from_bearings[mode] @ source
+            )
         return out
 
 
@@ -98,14 +104,19 @@ def mode_section(natural_frequency: float, damping_ratio: float, sampling_rate: 
     return np.concatenate([np.ravel(numerator), denominator])[None]
 
 
-def draw_housing(rng: np.random.Generator, path: ModalPath, n_channels: int, n_sensors: int) -> Housing:
+def draw_housing(
+    rng: np.random.Generator, path: ModalPath, n_channels: int, n_sensors: int
+) -> Housing:
     """The modes of one gearbox; modes are sorted by frequency, signs and sizes of participations are normal."""
     n_modes = int(rng.integers(path.n_modes[0], path.n_modes[1], endpoint=True))
 
     def logarithmic(ends: tuple[float, ...]) -> Array:
         return np.exp(rng.uniform(math.log(ends[0]), math.log(ends[1]), n_modes))
 
-    frequency, damping = np.sort(logarithmic(path.natural_frequency)), logarithmic(path.damping_ratio)
+    frequency, damping = (
+        np.sort(logarithmic(path.natural_frequency)),
+        logarithmic(path.damping_ratio),
+    )
     scale = path.transmissibility / math.sqrt(n_modes)
     return Housing(
         natural_frequency=frequency,

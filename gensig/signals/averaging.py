@@ -29,7 +29,10 @@ def samples_per_turn_for(sampling_rate: float, rotation_frequency: float) -> int
 
 
 def resample_to_angle(
-    signal: ArrayLike, sampling_rate: float, rotation_frequency: float, samples_per_turn: int | None = None
+    signal: ArrayLike,
+    sampling_rate: float,
+    rotation_frequency: float,
+    samples_per_turn: int | None = None,
 ) -> FloatArray:
     """Cut a signal into whole turns, sampled uniformly in shaft angle.
 
@@ -62,7 +65,9 @@ def resample_to_angle(
     samples_in_a_turn = sampling_rate / rotation_frequency
     n_turns = math.floor((n_samples + 1e-6) / samples_in_a_turn)
     if n_turns < 1:
-        raise ValueError(f"{n_samples} samples hold no whole turn of {samples_in_a_turn:.1f} samples")
+        raise ValueError(
+            f"{n_samples} samples hold no whole turn of {samples_in_a_turn:.1f} samples"
+        )
     per_turn = samples_per_turn or samples_per_turn_for(sampling_rate, rotation_frequency)
     position = np.arange(n_turns * per_turn) * (samples_in_a_turn / per_turn)
     return interpolate(x, position.reshape(n_turns, per_turn))
@@ -85,7 +90,8 @@ def interpolate(x: FloatArray, position: FloatArray) -> FloatArray:
     u = position - index
     coefficients = spline_filter1d(x, order=3, axis=-1, mode="mirror")
     padded = np.concatenate(
-        [coefficients[..., 1:2], coefficients, coefficients[..., -2:-1], coefficients[..., -3:-2]], axis=-1
+        [coefficients[..., 1:2], coefficients, coefficients[..., -2:-1], coefficients[..., -3:-2]],
+        axis=-1,
     )
     squared = u * u
     cubed = squared * u
@@ -182,7 +188,9 @@ def residual_signal(average: ArrayLike, n_teeth: int, *, n_shaft_orders: int = 2
 
     Source: residual signal of Zakrajsek, Townsend & Decker (1993), NASA TM-105950, sidebands kept.
     """
-    return remove_orders(average, _mesh_orders(average, n_teeth, 0).union(range(n_shaft_orders + 1)))
+    return remove_orders(
+        average, _mesh_orders(average, n_teeth, 0).union(range(n_shaft_orders + 1))
+    )
 
 
 def difference_signal(average: ArrayLike, n_teeth: int, *, n_shaft_orders: int = 2) -> FloatArray:
@@ -192,7 +200,9 @@ def difference_signal(average: ArrayLike, n_teeth: int, *, n_shaft_orders: int =
 
     Source: difference signal of Zakrajsek, Townsend & Decker (1993), NASA TM-105950, after R. M. Stewart (1977).
     """
-    return remove_orders(average, _mesh_orders(average, n_teeth, 1).union(range(n_shaft_orders + 1)))
+    return remove_orders(
+        average, _mesh_orders(average, n_teeth, 1).union(range(n_shaft_orders + 1))
+    )
 
 
 def _mesh_orders(average: ArrayLike, n_teeth: int, n_sidebands: int) -> set[int]:

@@ -14,7 +14,9 @@ from gensig.signals.spectrum import amplitude_spectrum
 FloatArray = NDArray[np.floating]
 
 
-def band_pass(signal: ArrayLike, sampling_rate: float, band: tuple[float, float], *, order: int = 4) -> FloatArray:
+def band_pass(
+    signal: ArrayLike, sampling_rate: float, band: tuple[float, float], *, order: int = 4
+) -> FloatArray:
     """Butterworth band-pass run forwards and backwards: no phase shift, twice the order in attenuation.
 
     Parameters
@@ -31,12 +33,16 @@ def band_pass(signal: ArrayLike, sampling_rate: float, band: tuple[float, float]
 
     low, high = band
     if not 0 < low < high < sampling_rate / 2:
-        raise ValueError(f"band {low:g}-{high:g} Hz must lie inside 0-{sampling_rate / 2:g} Hz, low before high")
+        raise ValueError(
+            f"band {low:g}-{high:g} Hz must lie inside 0-{sampling_rate / 2:g} Hz, low before high"
+        )
     sections = butter(order, [low, high], btype="bandpass", fs=sampling_rate, output="sos")
     return sosfiltfilt(sections, np.asarray(signal, dtype=float), axis=-1)
 
 
-def envelope(signal: ArrayLike, sampling_rate: float, band: tuple[float, float] | None = None) -> FloatArray:
+def envelope(
+    signal: ArrayLike, sampling_rate: float, band: tuple[float, float] | None = None
+) -> FloatArray:
     """Magnitude of the analytic signal, of the band if one is given and otherwise of the signal less its mean.
 
     Parameters
@@ -56,7 +62,9 @@ def envelope(signal: ArrayLike, sampling_rate: float, band: tuple[float, float] 
     return np.abs(hilbert(x, axis=-1))
 
 
-def mesh_envelope(average: ArrayLike, n_teeth: int, *, harmonic: int = 1, n_sidebands: int | None = None) -> FloatArray:
+def mesh_envelope(
+    average: ArrayLike, n_teeth: int, *, harmonic: int = 1, n_sidebands: int | None = None
+) -> FloatArray:
     """Amplitude of one mesh harmonic over a turn, from the band of its sidebands: amplitude demodulation.
 
     Parameters
@@ -83,7 +91,9 @@ def mesh_envelope(average: ArrayLike, n_teeth: int, *, harmonic: int = 1, n_side
     reach = (n_teeth - 1) // 2 if n_sidebands is None else n_sidebands
     low, high = harmonic * n_teeth - reach, harmonic * n_teeth + reach
     if not 0 < low <= high < n_samples / 2:
-        raise ValueError(f"{n_samples} samples a turn cannot hold the band of mesh orders {low} to {high}")
+        raise ValueError(
+            f"{n_samples} samples a turn cannot hold the band of mesh orders {low} to {high}"
+        )
     spectrum = np.fft.fft(turn, axis=-1)
     one_sided = np.zeros_like(spectrum)
     one_sided[..., low : high + 1] = 2.0 * spectrum[..., low : high + 1]
@@ -91,7 +101,11 @@ def mesh_envelope(average: ArrayLike, n_teeth: int, *, harmonic: int = 1, n_side
 
 
 def envelope_spectrum(
-    signal: ArrayLike, sampling_rate: float, band: tuple[float, float] | None = None, *, window: str = "hann"
+    signal: ArrayLike,
+    sampling_rate: float,
+    band: tuple[float, float] | None = None,
+    *,
+    window: str = "hann",
 ) -> tuple[FloatArray, FloatArray]:
     """Amplitude spectrum of the envelope less its mean.
 
@@ -108,4 +122,6 @@ def envelope_spectrum(
     amplitude : (..., bin) m/s^2
     """
     magnitude = envelope(signal, sampling_rate, band)
-    return amplitude_spectrum(magnitude - magnitude.mean(axis=-1, keepdims=True), sampling_rate, window=window)
+    return amplitude_spectrum(
+        magnitude - magnitude.mean(axis=-1, keepdims=True), sampling_rate, window=window
+    )

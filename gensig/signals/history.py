@@ -40,7 +40,9 @@ def na4(averages: ArrayLike, n_teeth: int) -> FloatArray:
     return _over_mean_variance(residual_signal(x, n_teeth), rms(x))
 
 
-def nb4(averages: ArrayLike, n_teeth: int, *, harmonic: int = 1, n_sidebands: int | None = None) -> FloatArray:
+def nb4(
+    averages: ArrayLike, n_teeth: int, *, harmonic: int = 1, n_sidebands: int | None = None
+) -> FloatArray:
     """As `na4`, of the envelope of one mesh harmonic: teeth under load that share it differently modulate the mesh.
 
     Parameters
@@ -61,7 +63,9 @@ def nb4(averages: ArrayLike, n_teeth: int, *, harmonic: int = 1, n_sidebands: in
     Source: NB4 of NASA TM-106467 (1994).
     """
     x = np.asarray(averages, dtype=float)
-    return _over_mean_variance(mesh_envelope(x, n_teeth, harmonic=harmonic, n_sidebands=n_sidebands), rms(x))
+    return _over_mean_variance(
+        mesh_envelope(x, n_teeth, harmonic=harmonic, n_sidebands=n_sidebands), rms(x)
+    )
 
 
 def _over_mean_variance(signal: FloatArray, level: FloatArray) -> FloatArray:
@@ -80,4 +84,6 @@ def _over_mean_variance(signal: FloatArray, level: FloatArray) -> FloatArray:
     mean_variance = total / np.maximum(np.cumsum(known, axis=-1), 1)
     moment = np.where(above, np.mean(np.square(squared), axis=-1), 0.0)
     indicator = np.full(variance.shape, np.nan)
-    return np.divide(moment, np.square(mean_variance), out=indicator, where=known & (mean_variance > 0.0))
+    return np.divide(
+        moment, np.square(mean_variance), out=indicator, where=known & (mean_variance > 0.0)
+    )

@@ -15,7 +15,9 @@ from gensig.signals.indicators import rms
 
 FloatArray = NDArray[np.floating]
 
-RAYLEIGH_MEDIAN = math.sqrt(2.0 * math.log(2.0))  # median of the envelope of Gaussian noise of deviation 1
+RAYLEIGH_MEDIAN = math.sqrt(
+    2.0 * math.log(2.0)
+)  # median of the envelope of Gaussian noise of deviation 1
 
 
 def impacts_per_turn(turns: ArrayLike, n_teeth: int, *, threshold: float = 5.0) -> FloatArray:
@@ -85,7 +87,9 @@ def impact_decay(turns: ArrayLike, turn_duration: float) -> FloatArray:
     """
     x = np.asarray(turns, dtype=float)
     per_turn = x.shape[-1]
-    power = np.mean(np.square(envelope(x.reshape(*x.shape[:-2], -1), 1.0)).reshape(x.shape), axis=-2)
+    power = np.mean(
+        np.square(envelope(x.reshape(*x.shape[:-2], -1), 1.0)).reshape(x.shape), axis=-2
+    )
     floor = np.median(power, axis=-1, keepdims=True)
     rows, floors = power.reshape(-1, per_turn), floor.reshape(-1)
     found = [_fall(row, level) for row, level in zip(rows, floors, strict=True)]

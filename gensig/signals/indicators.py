@@ -13,7 +13,9 @@ from gensig.signals.synchronous import mesh_harmonics
 
 FloatArray = NDArray[np.floating]
 
-ROUNDING = 1e-12  # of the average's RMS: what is left of a transform forth and back where nothing is
+ROUNDING = (
+    1e-12  # of the average's RMS: what is left of a transform forth and back where nothing is
+)
 
 
 def rms(signal: ArrayLike) -> FloatArray:
@@ -145,7 +147,9 @@ def energy_ratio(average: ArrayLike, n_teeth: int) -> FloatArray:
     return _ratio(rms(_difference(turn, n_teeth)), np.where(mesh > ROUNDING * rms(turn), mesh, 0.0))
 
 
-def sideband_ratio(average: ArrayLike, n_teeth: int, *, n_harmonics: int = 3, n_sidebands: int = 6) -> FloatArray:
+def sideband_ratio(
+    average: ArrayLike, n_teeth: int, *, n_harmonics: int = 3, n_sidebands: int = 6
+) -> FloatArray:
     """Sum of sideband amplitudes over the sum of mesh-harmonic amplitudes.
 
     Parameters
@@ -170,7 +174,9 @@ def sideband_ratio(average: ArrayLike, n_teeth: int, *, n_harmonics: int = 3, n_
     centers = np.arange(1, n_harmonics + 1) * n_teeth
     centers = centers[centers + reach < amplitude.shape[-1]]
     if centers.size == 0:
-        raise ValueError(f"{np.shape(average)[-1]} samples a turn cannot hold mesh order {n_teeth} and its sidebands")
+        raise ValueError(
+            f"{np.shape(average)[-1]} samples a turn cannot hold mesh order {n_teeth} and its sidebands"
+        )
     steps = np.arange(1, reach + 1)
     sidebands = (centers[:, None] + np.concatenate([-steps, steps])).ravel()
     return _ratio(amplitude[..., sidebands].sum(axis=-1), amplitude[..., centers].sum(axis=-1))

@@ -126,7 +126,9 @@ def _least_line_db(turns: float) -> float:
     return max(LEAST_LINE_DB, 10.0 * math.log10(by_chance))
 
 
-def _search(recording: Recording, teeth: Teeth, nominal: float, highest: float) -> tuple[float, Array]:
+def _search(
+    recording: Recording, teeth: Teeth, nominal: float, highest: float
+) -> tuple[float, Array]:
     """Mesh frequency to a fraction of a line, and how far its harmonics stand out, (harmonic,) dB."""
     from scipy.ndimage import median_filter
     from scipy.signal import welch
@@ -134,7 +136,9 @@ def _search(recording: Recording, teeth: Teeth, nominal: float, highest: float) 
     rate, signal = recording.sampling_rate, recording.acceleration
     length = min(signal.shape[1], round(TURNS_A_SEGMENT * teeth.most / nominal * rate))
     padded = 8 * length
-    frequency, density = welch(signal, rate, nperseg=length, noverlap=length // 2, nfft=padded, axis=1)
+    frequency, density = welch(
+        signal, rate, nperseg=length, noverlap=length // 2, nfft=padded, axis=1
+    )
     floor = median_filter(density, size=(1, 8 * 4 * TURNS_A_SEGMENT + 1), mode="nearest")
     standing = np.max(density / np.maximum(floor, 1e-300), axis=0)
     n_harmonics = max(1, min(MOST_HARMONICS, int(highest / (nominal * (1.0 + SEARCH)))))
@@ -145,7 +149,9 @@ def _search(recording: Recording, teeth: Teeth, nominal: float, highest: float) 
     return float(candidates[best]), 10.0 * np.log10(np.maximum(at_lines[:, best], 1e-300))
 
 
-def _follow(recording: Recording, teeth: Teeth, mesh: float, heard: NDArray[np.intp], line_db: Array) -> Motion:
+def _follow(
+    recording: Recording, teeth: Teeth, mesh: float, heard: NDArray[np.intp], line_db: Array
+) -> Motion:
     """Phase of the harmonics that are heard, in rounds; then what they agree on beyond their noise."""
     rate, n_samples = recording.sampling_rate, recording.acceleration.shape[1]
     cycles: Array = mesh * np.arange(n_samples, dtype=np.float64) / rate
@@ -192,12 +198,21 @@ def _deviation(signal: Array, cycles: Array, used: list[int], width: float, rate
     parts.sort(key=lambda part: -float(part[1].mean()))
     groups = [parts, parts[::2], parts[1::2]] if len(parts) > 1 else [parts]
     return np.stack(
-        [sum(top for top, _ in some) / sum(bottom for _, bottom in some) / (2.0 * np.pi) for some in groups]
+        [
+            sum(top for top, _ in some) / sum(bottom for _, bottom in some) / (2.0 * np.pi)
+            for some in groups
+        ]
     )
 
 
 def _told(
-    deviation: Array, noise: Array | None, mean: float, cycles: Array, rate: float, slow: float, line_db: Array
+    deviation: Array,
+    noise: Array | None,
+    mean: float,
+    cycles: Array,
+    rate: float,
+    slow: float,
+    line_db: Array,
 ) -> Motion:
     """Drift where it is above the noise of the lines; its correlation time is where the correlation falls to 1/e."""
     variance = float(np.var(deviation))
@@ -207,7 +222,9 @@ def _told(
         scatter = math.sqrt(variance - limit**2)
         step = max(1, int(rate / (20.0 * slow)))
         coarse = deviation[::step] - deviation.mean()
-        lags = np.correlate(coarse, coarse, "full")[len(coarse) - 1 :] / np.arange(len(coarse), 0, -1)
+        lags = np.correlate(coarse, coarse, "full")[len(coarse) - 1 :] / np.arange(
+            len(coarse), 0, -1
+        )
         below = np.flatnonzero(lags[: len(coarse) // 2] < lags[0] / math.e)
         correlation = float(below[0] if len(below) else len(coarse) // 2) * step / rate
     return Motion(

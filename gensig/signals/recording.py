@@ -11,7 +11,14 @@ import numpy as np
 from numpy.typing import NDArray
 
 from gensig.errors import ConfigError
-from gensig.signals.recording_files import Content, read_hdf5, read_mat, read_npy, read_npz, read_wav
+from gensig.signals.recording_files import (
+    Content,
+    read_hdf5,
+    read_mat,
+    read_npy,
+    read_npz,
+    read_wav,
+)
 from gensig.text.user_file import check_rate, read_table
 
 Array = NDArray[np.float64]
@@ -19,7 +26,19 @@ Array = NDArray[np.float64]
 STANDARD_GRAVITY = 9.80665  # m/s2
 UNITS = {"m/s2": 1.0, "g": STANDARD_GRAVITY}
 SUFFIXES = {"_m_per_s2": 1.0, "_g": STANDARD_GRAVITY}
-WRONG_SUFFIXES = ("_rad_per_s2", "_rad_per_s", "_rad", "_mm_per_s", "_um", "_mm", "_v", "_mv", "_rpm", "_nm", "_deg")
+WRONG_SUFFIXES = (
+    "_rad_per_s2",
+    "_rad_per_s",
+    "_rad",
+    "_mm_per_s",
+    "_um",
+    "_mm",
+    "_v",
+    "_mv",
+    "_rpm",
+    "_nm",
+    "_deg",
+)
 READERS: dict[str, Callable[[str, str | None], Content]] = {
     ".npy": read_npy,
     ".npz": read_npz,
@@ -94,13 +113,20 @@ def read_file(
     _check_range(rate, f"{rate_option} {rate:g}" if rate is not None else "")
     suffix = Path(file).suffix.lower()
     if suffix not in TYPES:
-        raise ConfigError(f"{file}: the name must end in {', '.join(TYPES)}; write the recording as one of these")
+        raise ConfigError(
+            f"{file}: the name must end in {', '.join(TYPES)}; write the recording as one of these"
+        )
     if suffix == ".csv":
         if array is not None:
             raise ConfigError(f"{file}: --array is for .npz, .h5, .hdf5 and .mat; leave it out")
         names, values, rate = _read_csv(file, rate, rate_option)
         return RecordingFile(
-            file=file, channels=tuple(names), named=True, values=values, sampling_rate=rate, has_level=True
+            file=file,
+            channels=tuple(names),
+            named=True,
+            values=values,
+            sampling_rate=rate,
+            has_level=True,
         )
     try:
         Path(file).expanduser().open("rb").close()
@@ -110,7 +136,9 @@ def read_file(
     found = content.sampling_rate
     _check_range(found, f"{file}: {content.rate_from} has {found} samples a second, which")
     if found is None and rate is None:
-        raise ConfigError(f"{file}: an array tells no rate; give the samples a second with {rate_option}")
+        raise ConfigError(
+            f"{file}: an array tells no rate; give the samples a second with {rate_option}"
+        )
     if found is not None and rate is not None and not math.isclose(found, rate, rel_tol=1e-3):
         raise ConfigError(_disagree(file, content.rate_from, found, rate_option, rate))
     return RecordingFile(
@@ -124,7 +152,11 @@ def read_file(
 
 
 def recording_of(
-    source: RecordingFile, *, unit: str = "m/s2", channels: Sequence[str] | None = None, needs_level: bool = True
+    source: RecordingFile,
+    *,
+    unit: str = "m/s2",
+    channels: Sequence[str] | None = None,
+    needs_level: bool = True,
 ) -> Recording:
     """Some channels of a file as accelerations.
 
@@ -143,20 +175,30 @@ def recording_of(
     if unit not in UNITS:
         raise ConfigError(f"--unit {unit}: allowed: {', '.join(UNITS)}")
     if needs_level and not source.has_level:
-        raise ConfigError(f"{file} holds whole numbers, which have no level in m/s2; write it with float samples")
+        raise ConfigError(
+            f"{file} holds whole numbers, which have no level in m/s2; write it with float samples"
+        )
     if missing := [name for name in channels or () if name not in names]:
         raise ConfigError(f"{file}: no channel {missing[0]}; it has {', '.join(names)}")
     if channels is not None and (not channels or len(set(channels)) < len(channels)):
         raise ConfigError("--channels: name at least one channel, each once")
     chosen = list(channels or names)
-    rows = np.stack([source.values[names.index(name)] * _factor(file, name, unit) for name in chosen])
+    rows = np.stack(
+        [source.values[names.index(name)] * _factor(file, name, unit) for name in chosen]
+    )
     if rows.shape[1] < LEAST_SAMPLES:
-        raise ConfigError(f"{file} is too short: {rows.shape[1]} samples, at least {LEAST_SAMPLES} are needed")
+        raise ConfigError(
+            f"{file} is too short: {rows.shape[1]} samples, at least {LEAST_SAMPLES} are needed"
+        )
     for name, row in zip(chosen, rows, strict=True):
         if not np.all(np.isfinite(row)):
-            raise ConfigError(f"{file}: sample {int(np.argmin(np.isfinite(row)))} of {name} is no finite number")
+            raise ConfigError(
+                f"{file}: sample {int(np.argmin(np.isfinite(row)))} of {name} is no finite number"
+            )
         if not np.ptp(row) > 0.0:
-            raise ConfigError(f"{file}: {name} holds one value throughout; leave it out with --channels")
+            raise ConfigError(
+                f"{file}: {name} holds one value throughout; leave it out with --channels"
+            )
     return Recording(
         sensors=tuple(without_unit(name) for name in chosen),
         acceleration=rows - rows.mean(axis=1, keepdims=True),
@@ -173,7 +215,9 @@ def _read_csv(file: str, rate: float | None, rate_option: str) -> tuple[list[str
     names, values = read_table("recording", file, least_rows=LEAST_SAMPLES)
     if "time_s" not in names:
         if rate is None:
-            raise ConfigError(f"{file}: it has no column time_s; give the samples a second with {rate_option}")
+            raise ConfigError(
+                f"{file}: it has no column time_s; give the samples a second with {rate_option}"
+            )
         return names, values, rate
     time = values[names.index("time_s")]
     found = (len(time) - 1) / float(time[-1] - time[0]) if time[-1] > time[0] else math.nan
@@ -205,4 +249,6 @@ def _factor(file: str, name: str, unit: str) -> float:
         raise ConfigError(
             f"{file}: {name} ends in {wrong[0]}, which is no acceleration; choose others with --channels, or rename it"
         )
-    return next((factor for suffix, factor in SUFFIXES.items() if lower.endswith(suffix)), UNITS[unit])
+    return next(
+        (factor for suffix, factor in SUFFIXES.items() if lower.endswith(suffix)), UNITS[unit]
+    )

@@ -49,7 +49,12 @@ def read_wav(file: str, array: str | None) -> Content:
         warnings.simplefilter("ignore", wavfile.WavFileWarning)  # chunks that are no samples
         rate, samples = wavfile.read(Path(file).expanduser())
     rows = np.atleast_2d(np.asarray(samples).T).astype(np.float64)
-    return Content(values=rows, sampling_rate=float(rate), rate_from="its header", has_level=samples.dtype.kind == "f")
+    return Content(
+        values=rows,
+        sampling_rate=float(rate),
+        rate_from="its header",
+        has_level=samples.dtype.kind == "f",
+    )
 
 
 def read_npy(file: str, array: str | None) -> Content:
@@ -81,16 +86,22 @@ def read_hdf5(file: str, array: str | None, *, from_matlab: bool = False) -> Con
     with _one_line(file, "it is no HDF5 file"), h5py.File(Path(file).expanduser(), "r") as content:
         found: dict[str, Any] = {}
         # visits what the file itself holds: neither soft nor external links
-        content.visititems(lambda name, item: found.update({name: item}) if _is_plain(item) else None)
+        content.visititems(
+            lambda name, item: found.update({name: item}) if _is_plain(item) else None
+        )
         chosen = found[_chosen(file, array, found)]
         if 8 * chosen.size > MOST_BYTES:
-            raise ConfigError(f"{file}: {chosen.name} is larger than {MOST_BYTES // 1_000_000} MB; cut it")
+            raise ConfigError(
+                f"{file}: {chosen.name} is larger than {MOST_BYTES // 1_000_000} MB; cut it"
+            )
         values = chosen[()]
         rates: list[Mapping[str, Any]] = [chosen.attrs, content.attrs]
         rate = next((place[RATE_KEY] for place in rates if RATE_KEY in place), None)
         if rate is None and RATE_KEY in found:
             rate = found[RATE_KEY][()]
-    return Content(values=_rows(file, values, from_matlab=from_matlab), sampling_rate=_rate(file, rate))
+    return Content(
+        values=_rows(file, values, from_matlab=from_matlab), sampling_rate=_rate(file, rate)
+    )
 
 
 def read_mat(file: str, array: str | None) -> Content:
@@ -105,7 +116,8 @@ def read_mat(file: str, array: str | None) -> Content:
         name = _chosen(file, array, [row[0] for row in io.whosmat(path)])
         content = io.loadmat(path, variable_names=[name, RATE_KEY])
     return Content(
-        values=_rows(file, content[name], from_matlab=True), sampling_rate=_rate(file, content.get(RATE_KEY))
+        values=_rows(file, content[name], from_matlab=True),
+        sampling_rate=_rate(file, content.get(RATE_KEY)),
     )
 
 
@@ -119,8 +131,12 @@ def _one_line(file: str, what: str) -> Iterator[None]:
     except zipfile.BadZipFile:
         raise ConfigError(f"{file} cannot be read: {what}") from None
     except OSError as error:
-        raise ConfigError(f"{file} cannot be read: {(error.errno and error.strerror) or what}") from None
-    except Exception:  # the parsers of scipy and h5py raise nearly any on bytes that were made to mislead them
+        raise ConfigError(
+            f"{file} cannot be read: {(error.errno and error.strerror) or what}"
+        ) from None
+    except (
+        Exception
+    ):  # the parsers of scipy and h5py raise nearly any on bytes that were made to mislead them
         raise ConfigError(f"{file} cannot be read: {what}") from None
 
 
@@ -128,7 +144,12 @@ def _is_plain(item: Any) -> bool:
     """A data set whose numbers lie in the file itself."""
     import h5py
 
-    return isinstance(item, h5py.Dataset) and item.dtype.kind in "fiu" and not item.is_virtual and not item.external
+    return (
+        isinstance(item, h5py.Dataset)
+        and item.dtype.kind in "fiu"
+        and not item.is_virtual
+        and not item.external
+    )
 
 
 def _chosen(file: str, array: str | None, names: Any) -> str:
@@ -147,12 +168,18 @@ def _no_array_name(file: str, array: str | None) -> None:
 
 def _rows(file: str, content: Any, *, from_matlab: bool = False) -> Array:
     """(channel, sample) of an array; those of MATLAB may stand either way."""
-    if not isinstance(content, np.ndarray) or content.dtype.kind not in "fiu" or content.ndim not in (1, 2):
+    if (
+        not isinstance(content, np.ndarray)
+        or content.dtype.kind not in "fiu"
+        or content.ndim not in (1, 2)
+    ):
         raise ConfigError(f"{file}: give one array of real numbers, (sample,) or (sensor, sample)")
     rows = np.atleast_2d(content).astype(np.float64)
     if rows.shape[0] > rows.shape[1]:
         if not from_matlab:
-            raise ConfigError(f"{file} has the shape {content.shape}; give (sensor, sample): transpose it")
+            raise ConfigError(
+                f"{file} has the shape {content.shape}; give (sensor, sample): transpose it"
+            )
         rows = np.ascontiguousarray(rows.T)
     return rows
 

@@ -58,7 +58,9 @@ class RateChange:
         samples = resample_poly(x, self.up, self.down, axis=-1, window=self._taps())
         return samples[..., : self.n_samples(x.shape[-1])]
 
-    def apply_to_part(self, read: Callable[[int, int], FloatArray], n_found: int, start: int, stop: int) -> FloatArray:
+    def apply_to_part(
+        self, read: Callable[[int, int], FloatArray], n_found: int, start: int, stop: int
+    ) -> FloatArray:
         """Samples from start to stop of `apply`, read and computed from what they need of the signal.
 
         Parameters

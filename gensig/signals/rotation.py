@@ -20,7 +20,9 @@ PADDING = 8  # bins of the searched spectrum for one of the record's
 FADED = 0.2  # of the median amplitude; band-limited noise is below it for 3 % of the time
 
 
-def resample_by_angle(signal: ArrayLike, angle: ArrayLike, samples_per_turn: int | None = None) -> FloatArray:
+def resample_by_angle(
+    signal: ArrayLike, angle: ArrayLike, samples_per_turn: int | None = None
+) -> FloatArray:
     """Cut a signal into whole turns of a shaft, sampled uniformly in its angle.
 
     Parameters
@@ -44,11 +46,15 @@ def resample_by_angle(signal: ArrayLike, angle: ArrayLike, samples_per_turn: int
     """
     x, turned = np.asarray(signal, dtype=float), np.asarray(angle, dtype=float)
     if turned.shape != x.shape[-1:] or not np.all(np.diff(turned) > 0.0):
-        raise ValueError("the angle must rise from sample to sample, and have a value for every sample of the signal")
+        raise ValueError(
+            "the angle must rise from sample to sample, and have a value for every sample of the signal"
+        )
     turned = (turned - turned[0]) / (2.0 * math.pi)
     n_turns = math.floor(turned[-1] + 1e-9)
     if n_turns < 1:
-        raise ValueError(f"{turned.size} samples hold {turned[-1]:.3g} turns of the shaft, less than a whole one")
+        raise ValueError(
+            f"{turned.size} samples hold {turned[-1]:.3g} turns of the shaft, less than a whole one"
+        )
     samples = np.arange(turned.size)
     longest = float(np.max(np.diff(np.interp(np.arange(n_turns + 1), turned, samples))))
     per_turn = samples_per_turn or samples_per_turn_for(longest, 1.0)
@@ -95,9 +101,13 @@ def find_mesh_frequency(
     x = (x - x.mean(axis=-1, keepdims=True)).reshape(-1, x.shape[-1])
     expected = n_teeth * rotation_frequency
     if share * n_teeth >= 0.5:
-        raise ValueError(f"a search over {share:g} of the mesh frequency reaches sidebands of {n_teeth} teeth")
+        raise ValueError(
+            f"a search over {share:g} of the mesh frequency reaches sidebands of {n_teeth} teeth"
+        )
     if (1.0 + share) * expected >= 0.5 * sampling_rate:
-        raise ValueError(f"the mesh frequency {expected:g} Hz lies above half the sampling rate {sampling_rate:g} Hz")
+        raise ValueError(
+            f"the mesh frequency {expected:g} Hz lies above half the sampling rate {sampling_rate:g} Hz"
+        )
     n_bins = PADDING * x.shape[-1]
     spectrum = np.abs(np.fft.rfft(x * np.hanning(x.shape[-1]), n=n_bins, axis=-1))
     amplitude = np.sqrt(np.mean(np.square(spectrum), axis=0))
@@ -108,14 +118,21 @@ def find_mesh_frequency(
         for harmonic in range(1, n_harmonics + 1)
         if harmonic * searched[-1] < 0.5 * sampling_rate
     ]
-    over = np.array([line / floor for line in lines if (floor := np.median(line)) > 0.0]).reshape(-1, searched.size)
+    over = np.array([line / floor for line in lines if (floor := np.median(line)) > 0.0]).reshape(
+        -1, searched.size
+    )
     coarse = searched[np.argmax(np.sum(np.log(np.maximum(over, 1.0)), axis=0))]
     near = np.abs(searched - coarse) <= PADDING * spacing
     return float(searched[near][np.argmax(np.sum(np.square(over), axis=0)[near])])
 
 
 def mesh_phase_angle(
-    signal: ArrayLike, sampling_rate: float, n_teeth: int, mesh_frequency: float, *, harmonic: int = 1
+    signal: ArrayLike,
+    sampling_rate: float,
+    n_teeth: int,
+    mesh_frequency: float,
+    *,
+    harmonic: int = 1,
 ) -> FloatArray:
     """Angle of a shaft by the phase of one mesh harmonic, for recordings without a tachometer.
 

@@ -71,12 +71,18 @@ def separate_gears(
     in_a_passage = sampling_rate / mesh_frequency
     n_passages = math.floor((x.shape[-1] + 1e-6) / in_a_passage)
     if n_passages < n_teeth[0]:
-        raise ValueError(f"{x.shape[-1]} samples hold {n_passages} passages of a tooth, less than {n_teeth[0]}: a turn")
-    fine = samples_per_tooth * max(math.ceil(in_a_passage / samples_per_tooth), 1)  # nothing aliases
+        raise ValueError(
+            f"{x.shape[-1]} samples hold {n_passages} passages of a tooth, less than {n_teeth[0]}: a turn"
+        )
+    fine = samples_per_tooth * max(
+        math.ceil(in_a_passage / samples_per_tooth), 1
+    )  # nothing aliases
     position = np.arange(n_passages * fine).reshape(n_passages, fine) * (in_a_passage / fine)
     passages = np.moveaxis(interpolate(x, position), -2, 0)
     mesh = passages.mean(axis=0)
-    teeth = _tooth_parts((passages - mesh).reshape(n_passages, -1), n_teeth).reshape(-1, *mesh.shape)
+    teeth = _tooth_parts((passages - mesh).reshape(n_passages, -1), n_teeth).reshape(
+        -1, *mesh.shape
+    )
     for first, last in ((0, n_teeth[0]), (n_teeth[0], min(sum(n_teeth), n_teeth[0] + n_passages))):
         common = teeth[first:last].mean(axis=0)  # of the teeth that pass: it belongs to no tooth
         teeth[first:last] -= common
@@ -86,7 +92,9 @@ def separate_gears(
         whole = np.moveaxis(of_teeth, 0, -2).reshape(*x.shape[:-1], -1)
         return _fewer_samples(whole, whole.shape[-1] // fine * samples_per_tooth)
 
-    return GearTurns(driving=turn(teeth[: n_teeth[0]]), driven=turn(teeth[n_teeth[0] :]), mesh=turn(mesh[None]))
+    return GearTurns(
+        driving=turn(teeth[: n_teeth[0]]), driven=turn(teeth[n_teeth[0] :]), mesh=turn(mesh[None])
+    )
 
 
 def _tooth_parts(passages: FloatArray, n_teeth: tuple[int, int]) -> FloatArray:

@@ -14,7 +14,9 @@ FloatArray = NDArray[np.floating]
 MAIN_LOBE = 2  # lines from the middle of a Hann window's main lobe to its first zero
 
 
-def spectral_kurtosis(signal: ArrayLike, sampling_rate: float, window_samples: int) -> tuple[FloatArray, FloatArray]:
+def spectral_kurtosis(
+    signal: ArrayLike, sampling_rate: float, window_samples: int
+) -> tuple[FloatArray, FloatArray]:
     """Kurtosis over time of the short-time spectrum, by frequency: 0 for noise, -1 for a tone, more for bursts.
 
     Parameters
@@ -40,7 +42,9 @@ def spectral_kurtosis(signal: ArrayLike, sampling_rate: float, window_samples: i
     side in the signal, it scatters by 1.2 / sqrt(n) and lies 1 / n to 2 / n below 0 (measured). A mesh that is there
     all the time pulls a line towards -1, so take residual turns where bursts are to be found under it.
     """
-    from scipy.signal import stft  # all windows at once; ShortTimeFFT, one by one, takes up to seven times as long
+    from scipy.signal import (
+        stft,
+    )  # all windows at once; ShortTimeFFT, one by one, takes up to seven times as long
 
     x = np.asarray(signal, dtype=float)
     if window_samples < 8 or x.shape[-1] < 2 * window_samples:

@@ -41,7 +41,11 @@ def amplitude_spectrum(
 
 
 def order_spectrum(
-    signal: ArrayLike, sampling_rate: float, rotation_frequency: float, *, samples_per_turn: int | None = None
+    signal: ArrayLike,
+    sampling_rate: float,
+    rotation_frequency: float,
+    *,
+    samples_per_turn: int | None = None,
 ) -> tuple[FloatArray, FloatArray]:
     """Amplitude spectrum over the orders of a shaft, over the whole turns that the signal holds.
 
@@ -60,7 +64,9 @@ def order_spectrum(
     ------
     ValueError    if the signal holds no whole turn
     """
-    return spectrum_of_turns(resample_to_angle(signal, sampling_rate, rotation_frequency, samples_per_turn))
+    return spectrum_of_turns(
+        resample_to_angle(signal, sampling_rate, rotation_frequency, samples_per_turn)
+    )
 
 
 def spectrum_of_turns(turns: ArrayLike) -> tuple[FloatArray, FloatArray]:

@@ -25,11 +25,19 @@ LEAST_LINE_DB = 18.0  # of the strongest of the first harmonics,
 LEAST_MEAN_DB = 10.0  # or of all of them on the average
 FIRST_HARMONICS = 5
 FINE = 0.25  # candidates lie this share of a bin apart at the highest harmonic
-STEP_SHARE = 0.003  # assumed: standard deviation of the relative change of speed from one frame to the next
+STEP_SHARE = (
+    0.003  # assumed: standard deviation of the relative change of speed from one frame to the next
+)
 
 
 def wandering_mesh_cycles(
-    recording: Recording, teeth: Teeth, speed_rpm: float, *, highest: float, options: str, longer: str
+    recording: Recording,
+    teeth: Teeth,
+    speed_rpm: float,
+    *,
+    highest: float,
+    options: str,
+    longer: str,
 ) -> FloatArray:
     """Mesh cycles since the first sample, (sample,), where the speed stays near a stated one but wanders.
 
@@ -51,7 +59,9 @@ def wandering_mesh_cycles(
     mesh = speed_rpm / 60.0 * teeth.driving
     fewest = min(teeth.driving, teeth.driven)
     if mesh * (1.0 + SEARCH) > highest:
-        raise ConfigError(f"the mesh frequency of {mesh:.5g} Hz lies above {highest:.5g} Hz; check {options}")
+        raise ConfigError(
+            f"the mesh frequency of {mesh:.5g} Hz lies above {highest:.5g} Hz; check {options}"
+        )
     if SEARCH * fewest >= 1.0:
         raise ConfigError(
             f"{fewest} teeth: within {100 * SEARCH:g} % of the speed sidebands look like the mesh; give a tachometer"
@@ -62,7 +72,9 @@ def wandering_mesh_cycles(
             f"too short: {recording.duration:.3g} s are {turns:.1f} turns of the slower gear, at least {LEAST_TURNS} "
             f"are needed; {longer}{in_hertz(speed_rpm)}"
         )
-    time, course = mesh_frequency_course(recording.acceleration, rate, fewest, mesh, search=SEARCH, highest=highest)
+    time, course = mesh_frequency_course(
+        recording.acceleration, rate, fewest, mesh, search=SEARCH, highest=highest
+    )
     samples = np.arange(n_samples)
     frequency = np.interp(samples / rate, time, course)
     coarse = np.concatenate([[0.0], np.cumsum(0.5 * (frequency[1:] + frequency[:-1]))]) / rate
@@ -88,7 +100,13 @@ def wandering_mesh_cycles(
 
 
 def mesh_frequency_course(
-    signal: ArrayLike, sampling_rate: float, n_teeth: int, mesh_frequency: float, *, search: float, highest: float
+    signal: ArrayLike,
+    sampling_rate: float,
+    n_teeth: int,
+    mesh_frequency: float,
+    *,
+    search: float,
+    highest: float,
 ) -> tuple[FloatArray, FloatArray]:
     """Mesh frequency over time, near a stated one.
 
@@ -121,7 +139,9 @@ def mesh_frequency_course(
     length = round(TURNS_A_FRAME * n_teeth / mesh_frequency * sampling_rate)
     n_harmonics = min(MOST_HARMONICS, math.floor(highest / ((1.0 + search) * mesh_frequency)))
     if search * n_teeth >= 1.0 or n_harmonics < 1 or length > x.shape[-1]:
-        raise ValueError(f"no course: {n_harmonics} harmonics, frames of {length} samples, search {search:g}")
+        raise ValueError(
+            f"no course: {n_harmonics} harmonics, frames of {length} samples, search {search:g}"
+        )
     hop = max(1, length // FRAMES_A_FRAME)
     frequency, time, spectrum = stft(
         x,
@@ -139,7 +159,9 @@ def mesh_frequency_course(
     candidates = np.arange(-search, search + 0.5 * step, step)
     harmonic = np.arange(1, n_harmonics + 1)[:, None]
     place = harmonic * (1.0 + candidates) * mesh_frequency / frequency[1]
-    likelihood = np.stack([np.interp(place, np.arange(frequency.size), row).sum(axis=0) for row in standing.T])
+    likelihood = np.stack(
+        [np.interp(place, np.arange(frequency.size), row).sum(axis=0) for row in standing.T]
+    )
     return time, (1.0 + candidates[_most_probable(likelihood, candidates)]) * mesh_frequency
 
 

@@ -58,7 +58,9 @@ def nonsynchronous_share(turns: ArrayLike) -> FloatArray:
     whole = np.mean(np.square(x), axis=(-2, -1))
     averaged = np.mean(np.square(x.mean(axis=-2)), axis=-1)
     share = np.full(np.shape(whole), np.nan)
-    return np.divide((whole - averaged) * n_turns / (n_turns - 1), whole, out=share, where=whole > 0.0)
+    return np.divide(
+        (whole - averaged) * n_turns / (n_turns - 1), whole, out=share, where=whole > 0.0
+    )
 
 
 def residual_turns(turns: ArrayLike, n_teeth: int, *, n_shaft_orders: int = 2) -> FloatArray:

@@ -163,7 +163,9 @@ class Machine(ABC):
         gearbox: Gearbox | None = None,
     ) -> CleanRecord:
         """Simulate one record; what is not given is perfect, nominal, and starts with teeth 0 at A."""
-        run = Run(system=self, faults=tuple(faults), start=start, specimen=specimen, gearbox=gearbox)
+        run = Run(
+            system=self, faults=tuple(faults), start=start, specimen=specimen, gearbox=gearbox
+        )
         (record,) = self.simulate_runs([run])
         if isinstance(record, SimulationError):
             raise record

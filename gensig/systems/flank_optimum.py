@@ -18,9 +18,14 @@ Array = NDArray[np.float64]
 
 # of the search, in normal modules: depth and height as the paper on transmission error takes them, section 2
 LARGEST_DEPTH, LARGEST_HEIGHT = 0.02, 0.65
-N_VARIABLES = 9  # tip and root relief, each with depth and height, of both gears; crowning of the pair
+N_VARIABLES = (
+    9  # tip and root relief, each with depth and height, of both gears; crowning of the pair
+)
 N_PHASES, N_SLICES = 32, 28  # of the search; what it finds is judged with the pair's own
-POPULATION, GENERATIONS = 8, 60  # of differential evolution; the population counts for each variable
+POPULATION, GENERATIONS = (
+    8,
+    60,
+)  # of differential evolution; the population counts for each variable
 BETWEEN = 0.5  # of these generations where a search starts from the front of those before
 REFUSED = 1e3  # times the unmodified value, for flanks that overlap or lose contact
 
@@ -48,14 +53,18 @@ class Optimum:
     line_load: float
 
 
-def judge(system: SlicedPair, modification: PairModification, cases: Cases, *, n_phases: int = 64) -> Optimum:
+def judge(
+    system: SlicedPair, modification: PairModification, cases: Cases, *, n_phases: int = 64
+) -> Optimum:
     """Worst ripple and worst line load over the cases; the modification's own misalignment is added to theirs."""
     ripple, line_load = 0.0, 0.0
     for misalignment in cases.misalignments:
         askew = replace(modification, misalignment=modification.misalignment + misalignment)
         mesh = replace(system, modification=askew).sliced_mesh()
         for torque in cases.torques:
-            contact = loaded_contact(mesh, system.phases(n_phases), torque / system.pair.pinion.base_radius)
+            contact = loaded_contact(
+                mesh, system.phases(n_phases), torque / system.pair.pinion.base_radius
+            )
             ripple = max(ripple, float(np.ptp(contact.approach)))
             line_load = max(line_load, float(contact.line_load.max()))
     return Optimum(modification=modification, ripple=ripple, line_load=line_load)
@@ -86,7 +95,9 @@ def optimise(
 
     Source: differential evolution of Storn & Price (1997) as ``scipy.optimize.differential_evolution`` has it.
     """
-    search = replace(system, slices=replace(system.slices, n_slices=min(N_SLICES, system.slices.n_slices)))
+    search = replace(
+        system, slices=replace(system.slices, n_slices=min(N_SLICES, system.slices.n_slices))
+    )
     plain = judge(search, _plain(), cases, n_phases=N_PHASES)
     seen: dict[bytes, tuple[float, float]] = {}
 
@@ -101,14 +112,18 @@ def optimise(
                 seen[key] = REFUSED, REFUSED
         return seen[key]
 
-    def run(objective: Callable[[Array], float], start: Sequence[Array], number: int, n_generations: int) -> Array:
+    def run(
+        objective: Callable[[Array], float], start: Sequence[Array], number: int, n_generations: int
+    ) -> Array:
         point = _minimum(objective, start, seed=seed + number, generations=n_generations)
         on_done(number + 1, n_front)
         return point
 
     points = [run(lambda point: values(point)[0], [np.zeros(N_VARIABLES)], 0, generations)]
     if n_front > 1:
-        points.append(run(lambda point: values(point)[1], [np.zeros(N_VARIABLES), points[0]], 1, generations))
+        points.append(
+            run(lambda point: values(point)[1], [np.zeros(N_VARIABLES), points[0]], 1, generations)
+        )
         most, least = values(points[0])[1], values(points[1])[1]
         for number, bound in enumerate(np.linspace(most, least, n_front)[1:-1], start=2):
 
@@ -116,7 +131,12 @@ def optimise(
                 ripple, load = values(point)
                 return ripple + 100.0 * max(load / bound - 1.0, 0.0)
 
-            run(bounded, _spread(seen, POPULATION * N_VARIABLES // 2), number, math.ceil(BETWEEN * generations))
+            run(
+                bounded,
+                _spread(seen, POPULATION * N_VARIABLES // 2),
+                number,
+                math.ceil(BETWEEN * generations),
+            )
         points = _spread(seen, n_front)
     found = [judge(system, unpacked(point, system), cases) for point in points]
     return _not_beaten(found)
@@ -137,12 +157,16 @@ def _spread(seen: Mapping[bytes, tuple[float, float]], n_points: int) -> list[Ar
     return [np.frombuffer(front[place]) for place in chosen.tolist()]
 
 
-def _minimum(objective: Callable[[Array], float], start: Sequence[Array], *, seed: int, generations: int) -> Array:
+def _minimum(
+    objective: Callable[[Array], float], start: Sequence[Array], *, seed: int, generations: int
+) -> Array:
     """Best point of the unit box, (variable,), from a random population that holds the given ones."""
     from scipy.optimize import differential_evolution
     from scipy.stats import qmc
 
-    population = qmc.LatinHypercube(N_VARIABLES, rng=np.random.default_rng(seed)).random(POPULATION * N_VARIABLES)
+    population = qmc.LatinHypercube(N_VARIABLES, rng=np.random.default_rng(seed)).random(
+        POPULATION * N_VARIABLES
+    )
     population[: len(start)] = start
     result = differential_evolution(
         objective,
@@ -190,4 +214,6 @@ def _not_beaten(found: Sequence[Optimum]) -> list[Optimum]:
             for other in found
         )
     ]
-    return sorted({(one.ripple, one.line_load): one for one in kept}.values(), key=lambda one: one.ripple)
+    return sorted(
+        {(one.ripple, one.line_load): one for one in kept}.values(), key=lambda one: one.ripple
+    )

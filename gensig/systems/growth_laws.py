@@ -25,7 +25,9 @@ Array = NDArray[np.float64]
 N_TORQUES = 3  # how slices share the load hangs little on the torque
 
 
-def crack_law(machine: Machine, crack: Crack, options: CrackGrowthOptions, torques: tuple[float, float]) -> CrackGrowth:
+def crack_law(
+    machine: Machine, crack: Crack, options: CrackGrowthOptions, torques: tuple[float, float]
+) -> CrackGrowth:
     """The law of a crack like ``crack``; ``torques`` in N m are the least and the greatest that it meets."""
     if not isinstance(machine, HelicalPair):
         return _spur_crack_law(machine.pair, machine.material, crack, options)

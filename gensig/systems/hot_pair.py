@@ -26,7 +26,13 @@ from gensig.systems.sliced_pair import SlicedPair
 
 Array = NDArray[np.float64]
 
-COLD, TRUE, CONTACT_RATIO, APPARENT, SOFTENED = "cold", "true", "contact_ratio", "apparent", "softened"
+COLD, TRUE, CONTACT_RATIO, APPARENT, SOFTENED = (
+    "cold",
+    "true",
+    "contact_ratio",
+    "apparent",
+    "softened",
+)
 N_FLASH_POSITIONS = 60
 
 
@@ -40,7 +46,9 @@ class Duty:
 
     def __post_init__(self) -> None:
         if not self.speed > 0.0:
-            raise ConfigError(f"operating.speed_rpm = {self.speed * 30.0 / math.pi:g} must be positive to heat gears")
+            raise ConfigError(
+                f"operating.speed_rpm = {self.speed * 30.0 / math.pi:g} must be positive to heat gears"
+            )
 
     @property
     def friction(self) -> float:
@@ -107,8 +115,20 @@ def hot_state(duty: Duty) -> HotState:
         force=system.mesh_force, friction=duty.friction, speed=duty.speed,
     )  # fmt: skip
     share, cooling = heat.pinion_heat_share, heat.at_speed(duty.speed)
-    pinion = _body(system.pair.pinion, share * loss, cooling, heat.pinion_temperature, heat.pinion_bore_temperature)
-    wheel = _body(system.pair.wheel, (1.0 - share) * loss, cooling, heat.wheel_temperature, heat.wheel_bore_temperature)
+    pinion = _body(
+        system.pair.pinion,
+        share * loss,
+        cooling,
+        heat.pinion_temperature,
+        heat.pinion_bore_temperature,
+    )
+    wheel = _body(
+        system.pair.wheel,
+        (1.0 - share) * loss,
+        cooling,
+        heat.wheel_temperature,
+        heat.wheel_bore_temperature,
+    )
     position, flash = _flash_along_path(duty, contact)
     return HotState(
         contact=contact,
@@ -121,7 +141,9 @@ def hot_state(duty: Duty) -> HotState:
     )
 
 
-def heated(duty: Duty, state: HotState, *, growth: bool, center_distance: bool, softening: bool) -> SlicedPair:
+def heated(
+    duty: Duty, state: HotState, *, growth: bool, center_distance: bool, softening: bool
+) -> SlicedPair:
     """The pair with the effects of heat that are asked for.
 
     growth : the pair grows as a whole by the strain of its base pitches, housing and shafts alike; what its gears
@@ -136,7 +158,9 @@ def heated(duty: Duty, state: HotState, *, growth: bool, center_distance: bool, 
     system = duty.system
     if growth or center_distance:
         strain = state.growth.strain(system.pair)
-        housing = duty.heat.expansion * (duty.heat.housing_temperature - duty.heat.reference_temperature)
+        housing = duty.heat.expansion * (
+            duty.heat.housing_temperature - duty.heat.reference_temperature
+        )
         pair = _grown(system.pair, state.growth, strain) if growth else system.pair
         if center_distance:
             pair = _in_housing(system.pair, pair, state.growth, strain, housing)
@@ -172,9 +196,13 @@ def stiffness_variants(duty: Duty, state: HotState) -> dict[str, Variant]:
     heat = duty.heat
     found = {COLD: _variant(duty.system)}
     if heat.growth:
-        found[TRUE] = _variant(heated(duty, state, growth=True, center_distance=False, softening=False))
+        found[TRUE] = _variant(
+            heated(duty, state, growth=True, center_distance=False, softening=False)
+        )
     if heat.center_distance:
-        found[CONTACT_RATIO] = _variant(heated(duty, state, growth=heat.growth, center_distance=True, softening=False))
+        found[CONTACT_RATIO] = _variant(
+            heated(duty, state, growth=heat.growth, center_distance=True, softening=False)
+        )
     if heat.growth:
         cold, thermal = found[COLD], state.growth.teeth_alone(duty.system.pair)
         if thermal < float(cold.approach.min()):
@@ -184,7 +212,9 @@ def stiffness_variants(duty: Duty, state: HotState) -> dict[str, Variant]:
                 cold, approach=left, mesh=duty.system.mesh_force / left, single=cold.single * factor
             )
     if heat.softening:
-        found[SOFTENED] = _variant(heated(duty, state, growth=heat.growth, center_distance=False, softening=True))
+        found[SOFTENED] = _variant(
+            heated(duty, state, growth=heat.growth, center_distance=False, softening=True)
+        )
     return found
 
 
@@ -221,17 +251,25 @@ def flash_skin_growth(duty: Duty, state: HotState) -> float:
     hottest = state.flash_position[[int(np.argmax(state.flash))]]
     width = 2.0 * float(contact_half_width(pair, hottest, load, material)[0])
     slowest = min(float(one[0]) for one in rolling_speeds(pair, hottest, duty.speed))
-    depth = math.sqrt(heat.conductivity * width / (slowest * material.density_kg_per_m3 * heat.specific_heat))
+    depth = math.sqrt(
+        heat.conductivity * width / (slowest * material.density_kg_per_m3 * heat.specific_heat)
+    )
     held = (1.0 + material.poisson_ratio) / (1.0 - material.poisson_ratio)
     return held * heat.expansion * float(state.flash.max()) * depth
 
 
-def _body(gear: Gear, input_heat: float, heat: Heat, known: float | None, bore: float | None) -> BodyHeat:
+def _body(
+    gear: Gear, input_heat: float, heat: Heat, known: float | None, bore: float | None
+) -> BodyHeat:
     body = (
-        uniform_body(gear, known) if known is not None else solved_body(gear, input_heat, heat, bore_temperature=bore)
+        uniform_body(gear, known)
+        if known is not None
+        else solved_body(gear, input_heat, heat, bore_temperature=bore)
     )
     for temperature in (body.tooth, float(body.temperature[0])):
-        heat.require_known(temperature, f"{gear.name}: a temperature of {temperature:.4g} degrees Celsius")
+        heat.require_known(
+            temperature, f"{gear.name}: a temperature of {temperature:.4g} degrees Celsius"
+        )
     return body
 
 
@@ -268,10 +306,14 @@ def _grown(pair: GearPair, growth: PairGrowth, strain: float) -> GearPair:
         )
         for gear, own in ((pair.pinion, growth.pinion), (pair.wheel, growth.wheel))
     )
-    return replace(pair, pinion=pinion, wheel=wheel, center_distance_change=pair.center_distance_change)
+    return replace(
+        pair, pinion=pinion, wheel=wheel, center_distance_change=pair.center_distance_change
+    )
 
 
-def _in_housing(cold: GearPair, pair: GearPair, growth: PairGrowth, strain: float, housing: float) -> GearPair:
+def _in_housing(
+    cold: GearPair, pair: GearPair, growth: PairGrowth, strain: float, housing: float
+) -> GearPair:
     """The pair at the shafts' distance in a housing with its own strain."""
     closing = growth.closing(cold, housing)
     if closing > cold.backlash:

@@ -19,7 +19,9 @@ def mesh_signals(mesh: MeshState | None, n_samples: int, n_pairs: int) -> dict[s
     ConfigError    for a machine that does not know the loads of its teeth: no pairs
     """
     if n_pairs == 0:
-        raise ConfigError("dataset.store_mesh_state: a drive line does not tell the loads of its teeth; take false")
+        raise ConfigError(
+            "dataset.store_mesh_state: a drive line does not tell the loads of its teeth; take false"
+        )
     if mesh is None:
         nobody = np.full((n_pairs, n_samples), NO_TOOTH, dtype=np.int16)
         return {

@@ -27,7 +27,10 @@ BLOCK = 2048  # samples over which amplitudes go straight: 40 ms at 51.2 kHz
 
 
 def with_nuisances(
-    run: PairRun, record: CleanRecord, units: Mapping[str, np.random.Generator], record_rng: np.random.Generator
+    run: PairRun,
+    record: CleanRecord,
+    units: Mapping[str, np.random.Generator],
+    record_rng: np.random.Generator,
 ) -> CleanRecord:
     """A record whose bearings also feel what ``sensing.nuisances`` lists; without any, the record itself.
 
@@ -44,7 +47,9 @@ def with_nuisances(
     return replace(record, acceleration=record.acceleration + gain * heard)
 
 
-def nuisance_acceleration(run: PairRun, dynamics: PairDynamics, tones: Sequence[Tones], shaft_angle: Array) -> Array:
+def nuisance_acceleration(
+    run: PairRun, dynamics: PairDynamics, tones: Sequence[Tones], shaft_angle: Array
+) -> Array:
     """Accelerations of a run's channels under some tones, ``n_lead`` samples before the record too.
 
     Parameters
@@ -74,8 +79,13 @@ def nuisance_acceleration(run: PairRun, dynamics: PairDynamics, tones: Sequence[
     n_samples = len(turned)
     edges = np.arange(0, n_samples + BLOCK, BLOCK)
     nominal = operating.nominal((edges - n_lead) / rate)
-    answers = [_answers(dynamics, part, nominal, TURN * usable_band(rate)[1])[:, :, channels] for part in tones]
-    factors = np.concatenate([part for one in answers for part in (one.real, -one.imag)], axis=1)  # on cosines, sines
+    answers = [
+        _answers(dynamics, part, nominal, TURN * usable_band(rate)[1])[:, :, channels]
+        for part in tones
+    ]
+    factors = np.concatenate(
+        [part for one in answers for part in (one.real, -one.imag)], axis=1
+    )  # on cosines, sines
     fastest = max(
         float(np.max(np.abs(_frequencies(dynamics, part, nominal.speed)) * one.any(axis=2)))
         for part, one in zip(tones, answers, strict=True)
@@ -93,7 +103,9 @@ def nuisance_acceleration(run: PairRun, dynamics: PairDynamics, tones: Sequence[
         coarse[:, start:stop] = np.einsum("tc,ts->cs", factors[block], waves)
         change = factors[block + 1] - factors[block]
         if change.any():
-            coarse[:, start:stop] += (own - edges[block]) / BLOCK * np.einsum("tc,ts->cs", change, waves)
+            coarse[:, start:stop] += (
+                (own - edges[block]) / BLOCK * np.einsum("tc,ts->cs", change, waves)
+            )
     if every == 1 or len(made) < 4:
         return coarse
     return np.asarray(CubicSpline(made, coarse, axis=1)(np.arange(n_samples)))
@@ -115,7 +127,9 @@ def _answers(dynamics: PairDynamics, tones: Tones, nominal: Nominal, highest: fl
     force = np.zeros((*frequency.shape, len(dynamics.dofs)), dtype=np.complex128)
     places = [dynamics.dofs.index(f"{tones.gear}_{axis}") for axis in ("x", "y", "rotation")]
     force[:, :, places] = growth[tones.follows][:, None, None] * tones.force
-    answer = accelerations(dynamics, frequency.ravel(), force.reshape(-1, force.shape[2])).reshape(force.shape)
+    answer = accelerations(dynamics, frequency.ravel(), force.reshape(-1, force.shape[2])).reshape(
+        force.shape
+    )
     return answer * (np.abs(frequency) <= highest)[:, :, None]
 
 

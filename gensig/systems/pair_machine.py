@@ -140,7 +140,9 @@ def severity(faults: Sequence[Fault], pair: GearPair) -> float:
     gears = pair.gears
     value = max((fault.severity(gears[fault.gear]) for fault in faults), default=0.0)
     if value > 1.0:
-        raise FaultError(f"the fault's severity is {value:.3g}, above 1: it is larger than its tooth")
+        raise FaultError(
+            f"the fault's severity is {value:.3g}, above 1: it is larger than its tooth"
+        )
     return value
 
 
@@ -173,7 +175,13 @@ def _kind(run: PairRun) -> tuple[object, ...]:
     system = run.system
     operating = system.operating
     sensing = (system.sensing.sampling_rate, system.sensing.channels, operating.duration)
-    machine = (type(system), system.motor is None, system.load is None, operating.is_steady, run.tell_mesh)
+    machine = (
+        type(system),
+        system.motor is None,
+        system.load is None,
+        operating.is_steady,
+        run.tell_mesh,
+    )
     return (*sensing, *machine, system.solver, system.mesh.law, system.mesh.roll_torque)
 
 
@@ -203,11 +211,15 @@ def simulate_pairs(runs: Sequence[PairRun]) -> list[CleanRecord | SimulationErro
         else:
             kinds.setdefault(_kind(run), []).append(place)
     for places in kinds.values():
-        records = _side_by_side([runs[place] for place in places], [machines[place] for place in places])
+        records = _side_by_side(
+            [runs[place] for place in places], [machines[place] for place in places]
+        )
         found.update(zip(places, records, strict=True))
     coarse = [place for place, record in found.items() if _is_too_coarse(runs[place], record)]
     if coarse:
-        found.update(zip(coarse, simulate_pairs([_finer(runs[place]) for place in coarse]), strict=True))
+        found.update(
+            zip(coarse, simulate_pairs([_finer(runs[place]) for place in coarse]), strict=True)
+        )
     return [found[place] for place in range(len(runs))]
 
 
@@ -228,14 +240,20 @@ def _checks(motions: Motions, solver: Solver, sampling_rate: float) -> tuple[Arr
     errors[kept] = in_band_error(found[kept], exact[kept], sampling_rate)
     checks = ["error" if error <= solver.max_error else "unresolved" for error in errors]
     for index, check in enumerate(checks):
-        if check == "unresolved" and kept[index] and motions.contact_loss_fraction[index] > BOUNCING:
+        if (
+            check == "unresolved"
+            and kept[index]
+            and motions.contact_loss_fraction[index] > BOUNCING
+        ):
             one = slice(index, index + 1)
             if agreement(found[one], exact[one], sampling_rate).agrees[0]:
                 checks[index] = "levels"
     return errors, checks
 
 
-def _side_by_side(runs: Sequence[PairRun], machines: Sequence[PairDynamics]) -> list[CleanRecord | SimulationError]:
+def _side_by_side(
+    runs: Sequence[PairRun], machines: Sequence[PairDynamics]
+) -> list[CleanRecord | SimulationError]:
     system = runs[0].system
     motions = integrate(
         machines,
@@ -259,7 +277,9 @@ def _side_by_side(runs: Sequence[PairRun], machines: Sequence[PairDynamics]) -> 
                     contact_loss_fraction=float(motions.contact_loss_fraction[index]),
                     integration_error=float(errors[index]),
                     integration_check=checks[index],
-                    mesh=_mesh_state(run, machines[index], motions, index) if run.tell_mesh else None,
+                    mesh=_mesh_state(run, machines[index], motions, index)
+                    if run.tell_mesh
+                    else None,
                 )
             )
         else:

@@ -23,7 +23,13 @@ from gensig.systems.hot_pair import Duty, as_configured
 from gensig.systems.pair_machine import GearPairMachine
 from gensig.systems.sliced_pair import SlicedPair
 from gensig.systems.spur_pair import SpurPair
-from gensig.systems.supports import AS_GIVEN, held_axially, on_bearings, put_on_bearings, read_holding
+from gensig.systems.supports import (
+    AS_GIVEN,
+    held_axially,
+    on_bearings,
+    put_on_bearings,
+    read_holding,
+)
 from gensig.units import read, to_si
 
 COMMON_GEAR_KEYS = (
@@ -55,7 +61,9 @@ def read_spur_pair(config: Configuration) -> SpurPair:
     pair = read_pair(config)
     machine = _read_machine(config, pair)
     if modification.is_any and machine["mesh"].law == "paper":
-        raise ConfigError("modification opens gaps, which mesh.law=paper does not know: take mesh.law=one_sided")
+        raise ConfigError(
+            "modification opens gaps, which mesh.law=paper does not know: take mesh.law=one_sided"
+        )
     sound_teeth(pair, modification)  # raises for reliefs that overlap
     return SpurPair(pair=pair, modification=modification, **machine)
 
@@ -88,7 +96,10 @@ def _read_machine(config: Configuration, pair: GearPair) -> dict[str, Any]:
     held = {name: read_holding(gears[name], sides[name]) for name in SIDES}
     if on_bearings(machine.get("supports", AS_GIVEN), quality):
         force = operating.torque / pair.pinion.base_radius
-        bodies = {name: put_on_bearings(bodies[name], gears[name], held[name], material, force) for name in SIDES}
+        bodies = {
+            name: put_on_bearings(bodies[name], gears[name], held[name], material, force)
+            for name in SIDES
+        }
     return {
         "material": material,
         "mesh": read_mesh_options(config.section("mesh")),
@@ -133,8 +144,12 @@ def read_pair(config: Configuration) -> GearPair:
     """The two gears of a configuration; a wheel has the opposite hand unless it says otherwise."""
     gear = config.section("gear")
     helix = _number("gear.helix_angle_deg", gear["helix_angle_deg"])
-    pinion, wheel = (_read_gear(name, gear, hand * helix) for name, hand in zip(SIDES, (1.0, -1.0), strict=True))
-    return GearPair(pinion=pinion, wheel=wheel, backlash=_number("gear.backlash_um", gear["backlash_um"]))
+    pinion, wheel = (
+        _read_gear(name, gear, hand * helix) for name, hand in zip(SIDES, (1.0, -1.0), strict=True)
+    )
+    return GearPair(
+        pinion=pinion, wheel=wheel, backlash=_number("gear.backlash_um", gear["backlash_um"])
+    )
 
 
 def read_material(config: Configuration) -> Material:
@@ -155,10 +170,14 @@ def read_modification(config: Configuration) -> PairModification:
     sides = {}
     for name in SIDES:
         try:
-            sides[name] = read(FlankModification, config.section("modification", name), f"modification.{name}")
+            sides[name] = read(
+                FlankModification, config.section("modification", name), f"modification.{name}"
+            )
         except ConfigError as error:
             text = str(error)
-            raise ConfigError(text if text.startswith("modification") else f"modification.{name}.{text}") from None
+            raise ConfigError(
+                text if text.startswith("modification") else f"modification.{name}.{text}"
+            ) from None
     own = {key: value for key, value in config.section("modification").items() if key not in SIDES}
     return read(PairModification, own, "modification", **sides)
 
@@ -201,12 +220,20 @@ def _refuse_line(config: Configuration) -> None:
 def _read_gear(name: str, gear: Section, helix_angle: float) -> Gear:
     own = gear.section(name).without(*BODY_KEYS)
     given = {} if "helix_angle_deg" in own else {"helix_angle": helix_angle}
-    return read(Gear, {**{key: gear[key] for key in COMMON_GEAR_KEYS}, **own}, f"gear.{name}", name=name, **given)
+    return read(
+        Gear,
+        {**{key: gear[key] for key in COMMON_GEAR_KEYS}, **own},
+        f"gear.{name}",
+        name=name,
+        **given,
+    )
 
 
 def _read_body(gear: Gear, values: Section, material: Material) -> Body:
     """Mass and inertia as given, or those of a solid disc on the pitch circle less the bore where null."""
-    derived = solid_disc(gear.pitch_radius, gear.bore_radius, gear.face_width, material.density_kg_per_m3)
+    derived = solid_disc(
+        gear.pitch_radius, gear.bore_radius, gear.face_width, material.density_kg_per_m3
+    )
     given = [values["mass_kg"], values["inertia_kg_m2"]]
     mass, inertia = (
         fallback if value is None else _number(f"gear.{gear.name}.{key}", value)
@@ -214,8 +241,12 @@ def _read_body(gear: Gear, values: Section, material: Material) -> Body:
     )
     for key, value in (("mass_kg", mass), ("inertia_kg_m2", inertia)):
         if not value > 0.0:
-            raise ConfigError(f"gear.{gear.name}.{key} = {value:g} must be positive, or null to derive it")
-    given_support = {key: value for key, value in values.section("support").items() if value is not None}
+            raise ConfigError(
+                f"gear.{gear.name}.{key} = {value:g} must be positive, or null to derive it"
+            )
+    given_support = {
+        key: value for key, value in values.section("support").items() if value is not None
+    }
     support = read(Support, given_support, f"gear.{gear.name}.support")
     return Body(mass=mass, inertia=inertia, support=support)
 

@@ -100,7 +100,9 @@ class RootStrength:
     def force_for(self, stress: float) -> float:
         """Tangential force F_t in N that gives the decisive gear this sigma_F in Pa, load factors included."""
         if not (math.isfinite(stress) and stress > 0.0):
-            raise ConfigError(f"a root stress of {stress * 1e-6:g} MPa cannot be asked for; give a positive one")
+            raise ConfigError(
+                f"a root stress of {stress * 1e-6:g} MPa cannot be asked for; give a positive one"
+            )
         return stress / (self.factors[self.decisive].stress_per_force * self.strength.load_factor)
 
     def under(self, stress: float) -> RootStrength:
@@ -116,7 +118,10 @@ class RootStrength:
 
         def excess(force: float) -> float:
             loaded = replace(self, flanks=replace(self.flanks, torque=force * radius))
-            return max(float(values.max()) for values in loaded.history().stress.values()) / stress - 1.0
+            return (
+                max(float(values.max()) for values in loaded.history().stress.values()) / stress
+                - 1.0
+            )
 
         low = high = self.force_for(stress)
         while excess(low) > 0.0:
@@ -160,23 +165,31 @@ class RootStrength:
         """
         force = self.flanks.mesh_force * self.strength.force_factor
         pitch = self.pair.base_pitch
-        ends = np.array([0.0, self.pair.path_of_contact % pitch])  # where a pair enters or leaves, and a jump may be
+        ends = np.array(
+            [0.0, self.pair.path_of_contact % pitch]
+        )  # where a pair enters or leaves, and a jump may be
         near = (ends[:, None] + pitch * EDGE * np.array([-1.0, 1.0])).ravel() % pitch
         phases = np.sort(np.concatenate([self.flanks.phases(n_phases), near]))
-        roll, share, stress = self._sliced(phases, force) if self.sliced else self._whole(phases, force)
+        roll, share, stress = (
+            self._sliced(phases, force) if self.sliced else self._whole(phases, force)
+        )
         order = np.argsort(roll)
         roll, share = roll[order], share[order]
         bears = np.flatnonzero(share > 0.0)
         kept = slice(max(bears[0] - 1, 0), bears[-1] + 2)
         return RootHistory(
-            roll=roll[kept], share=share[kept], stress={name: values[order][kept] for name, values in stress.items()}
+            roll=roll[kept],
+            share=share[kept],
+            stress={name: values[order][kept] for name, values in stress.items()},
         )
 
     def _whole(self, phases: Array, force: float) -> tuple[Array, Array, dict[str, Array]]:
         """Pairs of a spur pair as wholes: roll, share of the load and stress by gear, (point,) each."""
         mesh = self.flanks.mesh
         flanks = self.flanks
-        table = loaded_pair_table(self.pair, flanks.material, mesh, force=force, modification=flanks.modification)
+        table = loaded_pair_table(
+            self.pair, flanks.material, mesh, force=force, modification=flanks.modification
+        )
         states = pair_states(table, phases)
         load = static_mesh(table, states, force).load
         stress = {
@@ -199,7 +212,10 @@ class RootStrength:
         stress = {}
         for name, gear in pair.gears.items():
             factor = stress_factor_on_path(
-                pair, gear, contact.position, allow_extrapolation=self.flanks.mesh.allow_extrapolation
+                pair,
+                gear,
+                contact.position,
+                allow_extrapolation=self.flanks.mesh.allow_extrapolation,
             )
             tangential = contact.line_load * math.cos(gear.transverse_pressure_angle)
             common = pair.face_width / root_width(pair, gear)

@@ -15,7 +15,11 @@ from gensig.systems.base import Machine
 from gensig.systems.run import CleanRecord, Start
 
 Array = NDArray[np.float64]
-SWITCHES = {"store_tacho": "tacho", "store_encoder": "encoder_angle", "store_shaft_angle": "shaft_angle"}
+SWITCHES = {
+    "store_tacho": "tacho",
+    "store_encoder": "encoder_angle",
+    "store_shaft_angle": "shaft_angle",
+}
 
 
 def gear_angle(system: Machine, shaft: str, start: Start, shaft_angle: Array) -> Array:
@@ -60,7 +64,9 @@ def shaft_signals(
     if "encoder_angle" in names:
         angle = gear_angle(system, sensing.encoder.shaft, start, record.shaft_angle)
         disc = draw_disc(gearbox_rng, sensing.encoder)
-        before = 2.0 * math.pi * math.floor((angle[0] - disc.index) / (2.0 * math.pi))  # turns that nobody counted
+        before = (
+            2.0 * math.pi * math.floor((angle[0] - disc.index) / (2.0 * math.pi))
+        )  # turns that nobody counted
         found["encoder_angle"] = disc.read(angle - before, quantised=sensing.encoder.quantised)
     return {name: found[name].astype(_type(name)) for name in names}
 

@@ -89,7 +89,14 @@ class SlicedPair:
     def sliced_mesh(self, faults: Sequence[Fault] = ()) -> SlicedMesh:
         """The pair cut into slices, modified flanks and faulty teeth included."""
         teeth = faulty_teeth(self.pair, faults)
-        return sliced_mesh(self.pair, self.material, self.mesh, self.slices, deviation=self.deviation(), teeth=teeth)
+        return sliced_mesh(
+            self.pair,
+            self.material,
+            self.mesh,
+            self.slices,
+            deviation=self.deviation(),
+            teeth=teeth,
+        )
 
     def deviation(self) -> Array | None:
         """How far all flanks stand back at the table's positions, (slice, node) m; None for perfect ones."""
@@ -105,11 +112,17 @@ class SlicedPair:
         """What the dynamics asks of the mesh with the given faults."""
         return _mesh_table(self, tuple(faults))
 
-    def phases(self, n_phases: int = N_PHASES, *, first_period: int = 0, n_periods: int = 1) -> Array:
+    def phases(
+        self, n_phases: int = N_PHASES, *, first_period: int = 0, n_periods: int = 1
+    ) -> Array:
         """Rolls of equally spaced phases of mesh periods, (phase,) m; ``n_phases`` to each."""
-        return self.pair.base_pitch * (first_period + (np.arange(n_periods * n_phases) + 0.5) / n_phases)
+        return self.pair.base_pitch * (
+            first_period + (np.arange(n_periods * n_phases) + 0.5) / n_phases
+        )
 
-    def transmission_error(self, faults: Sequence[Fault] = (), *, n_phases: int = N_PHASES) -> TransmissionError:
+    def transmission_error(
+        self, faults: Sequence[Fault] = (), *, n_phases: int = N_PHASES
+    ) -> TransmissionError:
         """Loaded contact over one mesh period, or over all in which a fault is seen and two sound ones on either side.
 
         The first faulty tooth of either gear meets that of the other, or a sound one.
@@ -150,7 +163,8 @@ class SlicedPair:
         mesh, sound = self.sliced_mesh(faults), self.sliced_mesh()
         within = float(loaded_contact(sound, self.phases(), self.mesh_force).approach.mean())
         pinion, wheel = (
-            int(side.kind[side.kind > 0][0]) if side.kind.any() else 0 for side in (mesh.pinion, mesh.wheel)
+            int(side.kind[side.kind > 0][0]) if side.kind.any() else 0
+            for side in (mesh.pinion, mesh.wheel)
         )
         closed = within - mesh.shared_compliance * self.mesh_force
         return single_pair_stiffness(mesh, position, self.mesh_force, (pinion, wheel), closed)

@@ -45,7 +45,9 @@ class SpurPair(GearPairMachine):
 
     def mesh_table(self, faults: Sequence[Fault] = ()) -> PairTable:
         """Compliance and gap tables with the given faults."""
-        return _mesh_table(self.pair, self.material, self.mesh, tuple(faults), self.mesh_force, self.modification)
+        return _mesh_table(
+            self.pair, self.material, self.mesh, tuple(faults), self.mesh_force, self.modification
+        )
 
     def stiffness_curves(
         self, faults: Sequence[Fault] = (), *, n_positions: int = 201, points_per_tooth: int = 100
@@ -85,7 +87,10 @@ class SpurPair(GearPairMachine):
         shared = plain.mesh_table().shared_compliance
         sound = single_pair(plain, alone, (), sound_teeth(pair, PLAIN))
         depth = self.mesh_force * (1.0 / sound.stiffness - shared)
-        starts = (pair.pinion, pair.pinion_curvature(alone[0])), (pair.wheel, pair.wheel_curvature(alone[1]))
+        starts = (
+            (pair.pinion, pair.pinion_curvature(alone[0])),
+            (pair.wheel, pair.wheel_curvature(alone[1])),
+        )
         pinion, wheel = (
             FlankModification(
                 tip_relief=float(back),

@@ -71,7 +71,9 @@ class SinglePair:
     @property
     def stiffness(self) -> Array:
         """Force over deflection from first touch, 0 where nothing touches, (phase,) N/m."""
-        return self.touches / np.sum([values for gear in self.terms.values() for values in gear.values()], axis=0)
+        return self.touches / np.sum(
+            [values for gear in self.terms.values() for values in gear.values()], axis=0
+        )
 
 
 def stiffness_curves(
@@ -114,17 +116,26 @@ def single_pair(
     """
     odd = faulty_teeth(machine.pair, faults, whole)
     structure = machine.material.in_plane(machine.mesh.elasticity)
-    sides = flank_sides(machine.pair, position, machine.material, machine.mesh, machine.mesh_force, pinion_share=0.5)
+    sides = flank_sides(
+        machine.pair, position, machine.material, machine.mesh, machine.mesh_force, pinion_share=0.5
+    )
     bending = slice_bending(machine.pair, position, machine.material, machine.mesh)
     terms, gap, touches = {}, np.zeros_like(position), np.ones_like(position)
     for name, side in sides.items():
         mine = {number: tooth for (gear, number), tooth in odd.items() if gear == name}
-        named = [fault.first_tooth for fault in faults if fault.gear == name and fault.first_tooth in mine]
+        named = [
+            fault.first_tooth
+            for fault in faults
+            if fault.gear == name and fault.first_tooth in mine
+        ]
         tooth = mine[named[0] if named else min(mine)] if mine else whole[name]
         tip = tooth.tip_curvature_radius
         own_gap, contact = side.contact(tooth, bending, machine.mesh)
         curvature = np.minimum(side.curvature, tip)
-        terms[name] = {**structural_terms(tooth, curvature, structure, machine.mesh), "contact": contact}
+        terms[name] = {
+            **structural_terms(tooth, curvature, structure, machine.mesh),
+            "contact": contact,
+        }
         gap += own_gap
         touches[(side.curvature > tip + 1e-12) | (not tooth.present)] = 0.0
     return SinglePair(terms=terms, gap=gap, touches=touches)

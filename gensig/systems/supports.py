@@ -69,7 +69,9 @@ def on_bearings(kind: Any, quality: Quality) -> bool:
     return True
 
 
-def put_on_bearings(body: Body, gear: Gear, holding: Holding, material: Material, force: float) -> Body:
+def put_on_bearings(
+    body: Body, gear: Gear, holding: Holding, material: Material, force: float
+) -> Body:
     """The gear held by its shaft and bearings under the static mesh ``force`` in N; its damping is left to a ratio.
 
     Along the axis and against tilting it is held as given: radial contact says nothing of that.
@@ -85,7 +87,9 @@ def put_on_bearings(body: Body, gear: Gear, holding: Holding, material: Material
             "system.supports=as_given"
         )
     across, along = support_stiffness(holding.bearing, holding.shaft, material, force)
-    held = replace(body.support, stiffness_x=across, stiffness_y=along, damping_x=0.0, damping_y=0.0)
+    held = replace(
+        body.support, stiffness_x=across, stiffness_y=along, damping_x=0.0, damping_y=0.0
+    )
     return replace(body, support=held)
 
 
@@ -101,9 +105,14 @@ def held_axially(body: Body, gear: Gear, values: Section) -> Body:
     ConfigError    where no support and no shaft says how the gear is held
     """
     given, support = values["support"], body.support
-    radial, damping = 0.5 * (support.stiffness_x + support.stiffness_y), 0.5 * (support.damping_x + support.damping_y)
+    radial, damping = (
+        0.5 * (support.stiffness_x + support.stiffness_y),
+        0.5 * (support.damping_x + support.damping_y),
+    )
     if not radial > 0.0:
-        raise ConfigError(f"gear.{gear.name}.support: a helical pair needs a radial stiffness above 0 on its bearings")
+        raise ConfigError(
+            f"gear.{gear.name}.support: a helical pair needs a radial stiffness above 0 on its bearings"
+        )
     derived = {"stiffness_z": AXIAL_SHARE * radial}
     if given.get("stiffness_tilt_nm_per_rad") is None:
         shaft = values.get("shaft")
@@ -113,7 +122,9 @@ def held_axially(body: Body, gear: Gear, values: Section) -> Body:
             )
         derived["stiffness_tilt"] = 0.25 * radial * to_si("span_mm", shaft["span_mm"]) ** 2
     springs = {"stiffness_z": support.stiffness_z, "stiffness_tilt": support.stiffness_tilt}
-    springs |= {name: value for name, value in derived.items() if given.get(KEYS_OF_AXIS[name]) is None}
+    springs |= {
+        name: value for name, value in derived.items() if given.get(KEYS_OF_AXIS[name]) is None
+    }
     dampers = {
         name: getattr(support, name)
         if given.get(KEYS_OF_AXIS[name]) is not None
@@ -131,7 +142,11 @@ def in_gearbox(body: Body, gearbox: Gearbox, axes: slice, quality: Quality) -> B
     unless ``quality`` has a range of damping ratios: then the ratio is the gearbox's, and without one the middle of the
     range.
     """
-    support, stiffness, damping = body.support, gearbox.stiffness_factor[axes], gearbox.damping_factor[axes]
+    support, stiffness, damping = (
+        body.support,
+        gearbox.stiffness_factor[axes],
+        gearbox.damping_factor[axes],
+    )
     stiffer, more_damped = float(np.sqrt(stiffness.prod())), float(np.sqrt(damping.prod()))
     scattered = replace(
         support,
@@ -146,6 +161,8 @@ def in_gearbox(body: Body, gearbox: Gearbox, axes: slice, quality: Quality) -> B
     )
     nominal = quality.support_damping_ratio
     if nominal is not None:
-        ratio = np.full(2, nominal) if gearbox.damping_ratio is None else gearbox.damping_ratio[axes]
+        ratio = (
+            np.full(2, nominal) if gearbox.damping_ratio is None else gearbox.damping_ratio[axes]
+        )
         scattered = scattered.damped(body, float(ratio[0]), float(ratio[1]))
     return replace(body, support=scattered)

@@ -28,11 +28,20 @@ def read_wear_case(config: Configuration) -> WearCase:
     ConfigError    for faulty gears, and for what ``wear_case`` refuses
     """
     if read_faults(config["fault"]):
-        raise ConfigError(f"fault={config['fault']['kind']}: a life begins with sound flanks; take fault=healthy")
+        raise ConfigError(
+            f"fault={config['fault']['kind']}: a life begins with sound flanks; take fault=healthy"
+        )
     system = read_sliced_pair(config)
-    if system.pair.pinion.helix_angle == 0.0 and not system.modification.is_any:  # all slices are alike
+    if (
+        system.pair.pinion.helix_angle == 0.0 and not system.modification.is_any
+    ):  # all slices are alike
         system = replace(system, slices=replace(system.slices, n_slices=1))
-    return wear_case(system.sliced_mesh(), system.material, read_wear_options(config.section("wear")), system.torque)
+    return wear_case(
+        system.sliced_mesh(),
+        system.material,
+        read_wear_options(config.section("wear")),
+        system.torque,
+    )
 
 
 def wear_fault(case: WearCase, depth: Array) -> dict[str, Any]:

@@ -28,7 +28,10 @@ def is_asked() -> bool:
 
 
 def answer(
-    program: str, verbs: Mapping[str, tuple[str, Callable[[argparse.ArgumentParser], None]]], *, primary: str
+    program: str,
+    verbs: Mapping[str, tuple[str, Callable[[argparse.ArgumentParser], None]]],
+    *,
+    primary: str,
 ) -> None:
     """Print the candidates for the word at the cursor and leave.
 
@@ -54,7 +57,10 @@ def _offer(action: argparse.Action, verb: str, primary: str) -> None:
     """Give an argument its candidates."""
     if action.dest == "overrides":
         action.completer = lambda prefix, parsed_args, **_: candidates(  # type: ignore[attr-defined]
-            prefix, list(parsed_args.overrides or ()), parsed_args, "generate" if verb == "detectability" else primary
+            prefix,
+            list(parsed_args.overrides or ()),
+            parsed_args,
+            "generate" if verb == "detectability" else primary,
         )
     elif action.dest == "what":
         action.completer = lambda prefix, parsed_args, **_: what_candidates(prefix, parsed_args)  # type: ignore[attr-defined]
@@ -80,8 +86,12 @@ def candidates(prefix: str, typed: Sequence[str], arguments: Any, primary: str) 
         found |= {f"{key.name}=": key.comment for key in section_keys(section)}
     for group in offered:
         option = chosen.get(group.name) or group.default
-        if prefix.startswith(group.name[: len(prefix)]) and option in [one.name for one in options(group.name, folder)]:
-            found |= {f"{key.name}=": key.comment for key in option_keys(group.name, str(option), folder)}
+        if prefix.startswith(group.name[: len(prefix)]) and option in [
+            one.name for one in options(group.name, folder)
+        ]:
+            found |= {
+                f"{key.name}=": key.comment for key in option_keys(group.name, str(option), folder)
+            }
     return found
 
 
@@ -93,4 +103,6 @@ def what_candidates(prefix: str, arguments: Any) -> dict[str, str]:
     name, equals, _ = prefix.partition("=")
     if equals:
         return {f"{name}={one.name}": one.about for one in options(name, folder)}
-    return {group.name: group.about for group in groups(folder)} | dict.fromkeys(sections(), "keys without a choice")
+    return {group.name: group.about for group in groups(folder)} | dict.fromkeys(
+        sections(), "keys without a choice"
+    )

@@ -31,7 +31,9 @@ class Parser(argparse.ArgumentParser):
     exits : what exit statuses mean that only this verb has
     """
 
-    def __init__(self, prog: str, description: str, examples: str, exits: Mapping[int, str]) -> None:
+    def __init__(
+        self, prog: str, description: str, examples: str, exits: Mapping[int, str]
+    ) -> None:
         super().__init__(
             prog=prog,
             description=description,
@@ -61,7 +63,9 @@ class Parser(argparse.ArgumentParser):
             flag, kind, given = found.groups()
             text = f"{flag} {given} is not a {'whole ' if kind == 'int' else ''}number"
             return f"{text}; key=value words stand before {flag}" if "=" in given else text
-        if found := re.match(r"argument (\S+): invalid choice: '(.*?)' \(choose from (.*)\)", message):
+        if found := re.match(
+            r"argument (\S+): invalid choice: '(.*?)' \(choose from (.*)\)", message
+        ):
             flag, given, known = found.groups()
             names = [name.strip(" '") for name in known.split(",")]
             return f"{flag} {given} is not one of {', '.join(names)}"
@@ -77,7 +81,12 @@ class Parser(argparse.ArgumentParser):
         word = next((one for one in words if one.startswith("-")), words[0])
         if not word.startswith("-"):
             return f"'{word}' is one word too many"
-        flags = [flag for action in self._actions for flag in action.option_strings if flag.startswith("--")]
+        flags = [
+            flag
+            for action in self._actions
+            for flag in action.option_strings
+            if flag.startswith("--")
+        ]
         if "=" in word and not nearest.near(word.partition("=")[0], flags):
             return f"no flag '{word}'; groups and keys have no dashes: {word.lstrip('-')}"
         return f"no flag '{word}'; {nearest.hint(word.partition('=')[0], flags)}"
@@ -86,8 +95,16 @@ class Parser(argparse.ArgumentParser):
         """The values of a flag as the help names them."""
         for action in self._actions:
             if name in action.option_strings and action.nargs != 0:
-                names = action.metavar if isinstance(action.metavar, tuple) else (str(action.metavar or action.dest),)
-                names = names * action.nargs if isinstance(action.nargs, int) and len(names) == 1 else names
+                names = (
+                    action.metavar
+                    if isinstance(action.metavar, tuple)
+                    else (str(action.metavar or action.dest),)
+                )
+                names = (
+                    names * action.nargs
+                    if isinstance(action.nargs, int) and len(names) == 1
+                    else names
+                )
                 return " ".join(names) + (" ..." if action.nargs == "+" else "")
         return ""
 
@@ -98,7 +115,9 @@ def exit_text(exits: Mapping[int, str]) -> str:
     return "\n".join(["exit status:", *lines])
 
 
-def refuse_verb(program: str, word: str, verbs: Mapping[str, object], other: str, other_verbs: tuple[str, ...]) -> None:
+def refuse_verb(
+    program: str, word: str, verbs: Mapping[str, object], other: str, other_verbs: tuple[str, ...]
+) -> None:
     """Raise for a first word that is no verb, with the nearest ones or the command that has it."""
     if word in other_verbs:
         raise ConfigError(f"'{word}' is a command of {other}; type {other} {word}")
@@ -115,7 +134,9 @@ def guarded(program: str, run: Callable[[], int], *, interrupted: str) -> int:
         return status
     except GensigError as error:
         return complain(program, str(error))
-    except BrokenPipeError:  # the reader of a pipe has gone, as head does: nothing to say, and nowhere to say it
+    except (
+        BrokenPipeError
+    ):  # the reader of a pipe has gone, as head does: nothing to say, and nowhere to say it
         os.dup2(os.open(os.devnull, os.O_WRONLY), 1)
         return 0
     except OSError as error:

@@ -5,7 +5,10 @@ from __future__ import annotations
 import difflib
 from collections.abc import Iterable
 
-NEAR, FAR = 0.65, 0.5  # shares of letters in common; between them the nearest is a guess, beside all there are
+NEAR, FAR = (
+    0.65,
+    0.5,
+)  # shares of letters in common; between them the nearest is a guess, beside all there are
 
 
 def hint(name: str, known: Iterable[str], *, n: int = 3, listed: int = 24) -> str:
@@ -26,5 +29,7 @@ def near(name: str, names: Iterable[str], *, n: int = 3, cutoff: float = NEAR) -
     by_lower = {one.lower(): one for one in reversed(list(names))}
     wanted = str(name).lower()
     found = difflib.get_close_matches(wanted, by_lower, n=n, cutoff=cutoff)
-    begun = [one for one in by_lower if len(wanted) >= 3 and one.startswith(wanted) and one not in found]
+    begun = [
+        one for one in by_lower if len(wanted) >= 3 and one.startswith(wanted) and one not in found
+    ]
     return [by_lower[one] for one in [*found, *begun][:n]]

@@ -107,14 +107,23 @@ def write_page(path: Path, *, title: str, lead: Sequence[str], sections: Sequenc
     """Write the page; the figures lie beside it and are copied into it, so that it can be sent alone."""
 
     def embedded(name: str) -> str:
-        return "data:image/png;base64," + base64.b64encode((path.parent / name).read_bytes()).decode("ascii")
+        return "data:image/png;base64," + base64.b64encode(
+            (path.parent / name).read_bytes()
+        ).decode("ascii")
 
-    text = _render(title=title, lead=lead, sections=sections, embedded=embedded, scripts=(), data="")
+    text = _render(
+        title=title, lead=lead, sections=sections, embedded=embedded, scripts=(), data=""
+    )
     path.write_text(text, encoding="utf-8")
 
 
 def interactive_page(
-    *, title: str, lead: Sequence[str], sections: Sequence[Section], script: str, data: Mapping[str, Any]
+    *,
+    title: str,
+    lead: Sequence[str],
+    sections: Sequence[Section],
+    script: str,
+    data: Mapping[str, Any],
 ) -> str:
     """The text of a page with charts, which cannot hold figures of files.
 
@@ -125,10 +134,19 @@ def interactive_page(
     """
     from plotly.offline import get_plotlyjs
 
-    scripts = [get_plotlyjs(), (Path(__file__).parent / "templates" / script).read_text(encoding="utf-8")]
+    scripts = [
+        get_plotlyjs(),
+        (Path(__file__).parent / "templates" / script).read_text(encoding="utf-8"),
+    ]
     # neither a tag nor a comment can begin inside of the block that holds the data
-    content = json.dumps(data, allow_nan=False, separators=(",", ":")).replace("<", "\\u003c").replace(">", "\\u003e")
-    return _render(title=title, lead=lead, sections=sections, embedded=None, scripts=scripts, data=content)
+    content = (
+        json.dumps(data, allow_nan=False, separators=(",", ":"))
+        .replace("<", "\\u003c")
+        .replace(">", "\\u003e")
+    )
+    return _render(
+        title=title, lead=lead, sections=sections, embedded=None, scripts=scripts, data=content
+    )
 
 
 def _render(*, scripts: Sequence[str], **content: Any) -> str:
@@ -136,10 +154,22 @@ def _render(*, scripts: Sequence[str], **content: Any) -> str:
     from markupsafe import Markup
 
     environment = Environment(
-        loader=PackageLoader("gensig.text"), autoescape=True, undefined=StrictUndefined, trim_blocks=True
+        loader=PackageLoader("gensig.text"),
+        autoescape=True,
+        undefined=StrictUndefined,
+        trim_blocks=True,
     )
-    hashes = [base64.b64encode(hashlib.sha256(text.encode()).digest()).decode("ascii") for text in scripts]
-    policy = "script-src " + " ".join(f"'sha256-{text}'" for text in hashes) + "; " if scripts else ""
+    hashes = [
+        base64.b64encode(hashlib.sha256(text.encode()).digest()).decode("ascii") for text in scripts
+    ]
+    policy = (
+        "script-src " + " ".join(f"'sha256-{text}'" for text in hashes) + "; " if scripts else ""
+    )
     content["data"] = Markup(content["data"])
     template = environment.get_template("page.html")
-    return template.render(**content, scripts=[Markup(text) for text in scripts], policy=Markup(policy)) + "\n"
+    return (
+        template.render(
+            **content, scripts=[Markup(text) for text in scripts], policy=Markup(policy)
+        )
+        + "\n"
+    )

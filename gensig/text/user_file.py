@@ -37,11 +37,17 @@ def read_table(key: str, file: str, *, least_rows: int) -> tuple[list[str], Arra
         reason = error.strerror if isinstance(error, OSError) else "it is no text in UTF-8"
         raise ConfigError(f"{where} cannot be read: {reason}") from None
     except ValueError as error:
-        raise ConfigError(f"{where}: {str(error).splitlines()[0].rstrip('.')}; give numbers under one header") from None
+        raise ConfigError(
+            f"{where}: {str(error).splitlines()[0].rstrip('.')}; give numbers under one header"
+        ) from None
     if len(names) != len(set(names)) or (values.size and values.shape[1] != len(names)):
-        raise ConfigError(f"{where}: {len(names)} names in the header for {values.shape[1]} columns; name each, once")
+        raise ConfigError(
+            f"{where}: {len(names)} names in the header for {values.shape[1]} columns; name each, once"
+        )
     if len(values) < least_rows:
-        raise ConfigError(f"{where} is too short: {len(values)} rows, at least {least_rows} are needed")
+        raise ConfigError(
+            f"{where} is too short: {len(values)} rows, at least {least_rows} are needed"
+        )
     bad = np.argwhere(~np.isfinite(values))
     if len(bad):
         row, column = bad[0]

@@ -23,7 +23,9 @@ from gensig.twin.lines import find_lines
 Array = NDArray[np.float64]
 
 N_RECORDS = 12
-EXPECTED = (N_RECORDS - 1) / (N_RECORDS + 1)  # share of equals that lies between the least and the greatest of them
+EXPECTED = (N_RECORDS - 1) / (
+    N_RECORDS + 1
+)  # share of equals that lies between the least and the greatest of them
 LONGEST = 2.0  # s of the held-out recording that are compared
 INDICATORS = ("level", "kurtosis", "crest factor", "sideband ratio")
 INDICATOR_UNITS = ("dB", "", "", "dB")
@@ -55,13 +57,17 @@ class Check:
     @property
     def share_within(self) -> Array:
         """Share of bands in which the measurement lies between the twin's least and greatest, (sensor,)."""
-        within = (self.measured_db >= self.twin_db.min(axis=0)) & (self.measured_db <= self.twin_db.max(axis=0))
+        within = (self.measured_db >= self.twin_db.min(axis=0)) & (
+            self.measured_db <= self.twin_db.max(axis=0)
+        )
         return np.asarray(within.mean(axis=1))
 
     @property
     def agrees(self) -> NDArray[np.bool_]:
         """Whether the measured indicator lies between the twin's least and greatest, (sensor, indicator)."""
-        return np.asarray((self.measured >= self.twin.min(axis=0)) & (self.measured <= self.twin.max(axis=0)))
+        return np.asarray(
+            (self.measured >= self.twin.min(axis=0)) & (self.measured <= self.twin.max(axis=0))
+        )
 
 
 def held_out_duration(held_out: Recording, fitted: Recording) -> float:
@@ -69,7 +75,9 @@ def held_out_duration(held_out: Recording, fitted: Recording) -> float:
     return min(LONGEST, held_out.duration, fitted.duration)
 
 
-def check(config: Configuration, held_out: Recording, motion: Motion, fitted: Recording, teeth: Teeth) -> Check:
+def check(
+    config: Configuration, held_out: Recording, motion: Motion, fitted: Recording, teeth: Teeth
+) -> Check:
     """Simulate healthy records of the twin and compare.
 
     Parameters
@@ -116,7 +124,11 @@ def _healthy_records(config: Configuration) -> tuple[Sequence[Array], Sequence[A
     whole = whole.with_keys("dataset", **unused, store_shaft_angle=True)
     drawn = make_plan(whole)
     records = simulate_records(whole, [drawn.record(place) for place in range(N_RECORDS)])
-    failed = [record.values["status_reason"] for record in records if record.values.get("status") == "failed"]
+    failed = [
+        record.values["status_reason"]
+        for record in records
+        if record.values.get("status") == "failed"
+    ]
     if failed:
         raise SimulationError(f"a healthy record of the twin failed: {failed[0]}")
     signals = [record.signals["acceleration"].astype(np.float64) for record in records]
@@ -127,7 +139,9 @@ def _indicators(signal: Array, cycles: Array, rate: float, teeth: Teeth) -> Arra
     """(sensor, indicator) as ``INDICATORS``."""
     centred = signal - signal.mean(axis=1, keepdims=True)
     ratios = sideband_ratios(find_lines(centred, cycles, rate, teeth), teeth)
-    middle = np.array([np.median(row[np.isfinite(row)]) if np.isfinite(row).any() else np.nan for row in ratios])
+    middle = np.array(
+        [np.median(row[np.isfinite(row)]) if np.isfinite(row).any() else np.nan for row in ratios]
+    )
     columns = [20.0 * np.log10(rms(centred)), kurtosis(centred), crest_factor(centred), middle]
     return np.stack(columns, axis=1)
 

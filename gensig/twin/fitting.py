@@ -14,20 +14,34 @@ from gensig.signals.mesh_motion import Motion, Teeth
 from gensig.signals.recording import Recording
 from gensig.systems.base import Machine
 from gensig.systems.run import CleanRecord
-from gensig.twin.grade import GRADES, N_SPECIMENS, Grade, fit_grade, simulated_lines, simulated_records
+from gensig.twin.grade import (
+    GRADES,
+    N_SPECIMENS,
+    Grade,
+    fit_grade,
+    simulated_lines,
+    simulated_records,
+)
 from gensig.twin.lines import Lines, band_centers, band_sums, find_lines
 from gensig.twin.speed import find_motion
 from gensig.units import from_si, to_si
 
 Array = NDArray[np.float64]
 
-SOURCE_CHANNEL = "pinion_y"  # the driving gear's bearing along the line of action, where the path begins
+SOURCE_CHANNEL = (
+    "pinion_y"  # the driving gear's bearing along the line of action, where the path begins
+)
 INTERNAL_RATE = 256_000.0  # Hz; least rate of the integration, that of the default configuration
-SIMULATED_TURNS = (12, 32)  # of the slower gear, in each simulated record: as many as measured, within these
+SIMULATED_TURNS = (
+    12,
+    32,
+)  # of the slower gear, in each simulated record: as many as measured, within these
 SEED = 0
 LOWEST_NOISE = 20.0  # Hz
 THIRD = 1.0 / 6.0  # octaves to either side over which a density is averaged, and at least some bins
-FINE = 1.0 / 24.0  # where lines are counted too: those of shafts stand far above what is beside them
+FINE = (
+    1.0 / 24.0
+)  # where lines are counted too: those of shafts stand far above what is beside them
 LEAST_FREE, LEAST_ALL = 20, 2
 CLEAR = 2.0  # a drift is written where the speed scatters this many times as much as pitch errors make it
 LEAST_SHARE = 0.1  # of the floor, left as noise where the model alone explains the power
@@ -69,7 +83,10 @@ class Fit:
 
 
 def fit(
-    recording: Recording, system: Machine, speed_rpm: float, tell: Callable[[str], None] = lambda text: None
+    recording: Recording,
+    system: Machine,
+    speed_rpm: float,
+    tell: Callable[[str], None] = lambda text: None,
 ) -> Fit:
     """Fit speed, drift, grade, path and noise to a healthy recording.
 
@@ -89,7 +106,9 @@ def fit(
     model = fitting_system(system, recording, motion.mesh_frequency, teeth)
     tell(f"speed {60.0 * motion.mesh_frequency / teeth.driving:.3f} r/min; simulating grades")
     graded = simulated_records(model, GRADES, N_SPECIMENS, SEED)
-    grade = fit_grade(measured, [[simulated_lines(one, model) for one in row] for row in graded], teeth)
+    grade = fit_grade(
+        measured, [[simulated_lines(one, model) for one in row] for row in graded], teeth
+    )
     tell(f"grade {grade.grade:.1f}; simulating that grade")
     (records,) = simulated_records(model, [grade.grade], 2 * N_SPECIMENS, SEED + 1)
     simulated = [simulated_lines(one, model) for one in records]
@@ -114,7 +133,9 @@ def _own_scatter(records: Sequence[CleanRecord], model: Machine, teeth: Teeth) -
     rate, speed_rpm = model.sensing.sampling_rate, from_si("speed_rpm", model.operating.speed)
     found = []
     for record in records:
-        heard = Recording(sensors=(SOURCE_CHANNEL,), acceleration=record.acceleration, sampling_rate=rate)
+        heard = Recording(
+            sensors=(SOURCE_CHANNEL,), acceleration=record.acceleration, sampling_rate=rate
+        )
         found.append(find_motion(heard, teeth, speed_rpm).scatter or 0.0)
     return float(np.median(found))
 
@@ -124,7 +145,9 @@ def oversampling(sampling_rate: float, at_least: int) -> int:
     return max(at_least, math.ceil(INTERNAL_RATE / sampling_rate))
 
 
-def fitting_system(system: Machine, recording: Recording, mesh_frequency: float, teeth: Teeth) -> Machine:
+def fitting_system(
+    system: Machine, recording: Recording, mesh_frequency: float, teeth: Teeth
+) -> Machine:
     """The machine at the speed that was found, heard by one ideal sensor at the recording's rate."""
     sampling_rate, solver = recording.sampling_rate, system.solver
     least, most = (turns * teeth.most / mesh_frequency for turns in SIMULATED_TURNS)
@@ -137,9 +160,15 @@ def fitting_system(system: Machine, recording: Recording, mesh_frequency: float,
             duration=math.ceil(duration * sampling_rate) / sampling_rate,
         ),
         sensing=replace(
-            system.sensing, sampling_rate=sampling_rate, channels=(SOURCE_CHANNEL,), sensors=None, path=None
+            system.sensing,
+            sampling_rate=sampling_rate,
+            channels=(SOURCE_CHANNEL,),
+            sensors=None,
+            path=None,
         ),
-        solver=replace(solver, oversampling=oversampling(sampling_rate, solver.oversampling), max_error=None),
+        solver=replace(
+            solver, oversampling=oversampling(sampling_rate, solver.oversampling), max_error=None
+        ),
     )
 
 
@@ -157,7 +186,9 @@ def fit_path(
     """
     centers = band_centers(0.5 * measured.mesh_frequency, recording.sampling_rate)
     power = band_sums(measured.synchronous, measured.frequency, centers)
-    n_bins = np.maximum(band_sums(measured.is_line[None].astype(float), measured.frequency, centers), 1.0)
+    n_bins = np.maximum(
+        band_sums(measured.is_line[None].astype(float), measured.frequency, centers), 1.0
+    )
     floor = band_sums(np.where(measured.is_line, measured.floor, 0.0), measured.frequency, centers)
     spread = floor / np.sqrt(n_bins / 2.0)  # two bins of a Hann window are about one of their own
     model = _mean([band_sums(one.synchronous, one.frequency, centers)[0] for one in simulated])
@@ -199,9 +230,12 @@ def fit_noise(
         return _mean_density(one, power, np.ones(len(one.frequency)), lines, FINE, LEAST_ALL)
 
     def lacking(density: Callable[[Lines, Array], Array]) -> Array:
-        explained = _mean([density(one, values) for one, values in zip(simulated, own, strict=True)])
+        explained = _mean(
+            [density(one, values) for one, values in zip(simulated, own, strict=True)]
+        )
         return np.maximum(
-            density(measured, measured.power) - explained, LEAST_SHARE * between(measured, measured.floor)
+            density(measured, measured.power) - explained,
+            LEAST_SHARE * between(measured, measured.floor),
         )
 
     low = lines < 0.5 * measured.mesh_frequency
@@ -209,13 +243,19 @@ def fit_noise(
     density[:, low] = np.maximum(density, lacking(all_of))[:, low]
     signal = _mean([values.sum(axis=1) for values in own])
     grid = np.linspace(0.0, 0.5 * recording.sampling_rate, 8192)
-    noise = np.array([np.interp(grid, lines, row).mean() for row in density]) * 0.5 * recording.sampling_rate
+    noise = (
+        np.array([np.interp(grid, lines, row).mean() for row in density])
+        * 0.5
+        * recording.sampling_rate
+    )
     return lines, density, 10.0 * np.log10(signal / noise)
 
 
 def _through(simulated: Lines, frequency: Array, gain: Array) -> Array:
     """Power of simulated lines at the sensors, (sensor, bin)."""
-    return np.stack([gain_at(simulated.frequency, frequency, row) ** 2 * simulated.power[0] for row in gain])
+    return np.stack(
+        [gain_at(simulated.frequency, frequency, row) ** 2 * simulated.power[0] for row in gain]
+    )
 
 
 def gain_at(wanted: Array, frequency: Array, gain: Array) -> Array:
@@ -224,7 +264,9 @@ def gain_at(wanted: Array, frequency: Array, gain: Array) -> Array:
     return np.asarray(np.exp(np.interp(axis, np.log(frequency), np.log(np.maximum(gain, 1e-300)))))
 
 
-def _mean_density(lines: Lines, power: Array, counted: Array, wanted: Array, half: float, least: int) -> Array:
+def _mean_density(
+    lines: Lines, power: Array, counted: Array, wanted: Array, half: float, least: int
+) -> Array:
     """Mean over ``half`` octaves and ``least`` bins to either side of the bins counted, (sensor, line) 1/Hz."""
     reach = least * lines.width
     first = np.searchsorted(lines.frequency, np.minimum(wanted * 2.0**-half, wanted - reach))

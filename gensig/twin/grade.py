@@ -44,7 +44,9 @@ class Grade:
 def sideband_orders(teeth: Teeth, harmonic: int) -> Array:
     """Mesh orders of the sidebands of a harmonic, each once, (line,)."""
     steps = np.arange(1, N_SIDEBANDS + 1)
-    offsets = np.concatenate([side * steps / n for n in (teeth.driving, teeth.driven) for side in (-1.0, 1.0)])
+    offsets = np.concatenate(
+        [side * steps / n for n in (teeth.driving, teeth.driven) for side in (-1.0, 1.0)]
+    )
     return harmonic + np.unique(np.round(offsets, 9))
 
 
@@ -67,7 +69,9 @@ def sideband_ratios(lines: Lines, teeth: Teeth) -> Array:
     return ratios
 
 
-def simulated_records(system: Machine, grades: Sequence[float], n_specimens: int, seed: int) -> list[list[CleanRecord]]:
+def simulated_records(
+    system: Machine, grades: Sequence[float], n_specimens: int, seed: int
+) -> list[list[CleanRecord]]:
     """Healthy records of the simulated bearing, by grade and specimen; specimens are the same for every grade.
 
     Raises
@@ -114,10 +118,19 @@ def fit_grade(measured: Lines, simulated: Sequence[Sequence[Lines]], teeth: Teet
     ratios = sideband_ratios(measured, teeth)
     n_ratios = int(np.isfinite(ratios).sum())
     # (grade, specimen): by how much a simulated set of gears has stronger sidebands than the measured one
-    excess = np.array([[_excess(sideband_ratios(one, teeth), ratios) for one in row] for row in simulated])
+    excess = np.array(
+        [[_excess(sideband_ratios(one, teeth), ratios) for one in row] for row in simulated]
+    )
     if n_ratios == 0 or not np.all(np.isfinite(excess)):
         middle = GRADES[len(GRADES) // 2 - 1]
-        return Grade(grade=middle, low=GRADES[0], high=GRADES[-1], ratio_db=np.nan, n_ratios=0, is_bounded=False)
+        return Grade(
+            grade=middle,
+            low=GRADES[0],
+            high=GRADES[-1],
+            ratio_db=np.nan,
+            n_ratios=0,
+            is_bounded=False,
+        )
     least, median, most = np.quantile(excess, [0.05, 0.5, 0.95], axis=1)
     grade, low, high = (_crossing(curve) for curve in (median, most, least))
     return Grade(
@@ -132,7 +145,11 @@ def fit_grade(measured: Lines, simulated: Sequence[Sequence[Lines]], teeth: Teet
 
 def _excess(simulated: Array, measured: Array) -> float:
     difference = simulated - measured
-    return float(np.median(difference[np.isfinite(difference)])) if np.isfinite(difference).any() else np.nan
+    return (
+        float(np.median(difference[np.isfinite(difference)]))
+        if np.isfinite(difference).any()
+        else np.nan
+    )
 
 
 def _crossing(excess: Array) -> float:

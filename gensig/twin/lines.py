@@ -16,7 +16,9 @@ Array = NDArray[np.float64]
 SPREAD = 2  # bins to either side of a line in which a Hann window leaves 99.9 % of its power
 FINER = 2  # upsampling before the interpolation to angle, whose error grows towards half the rate
 BANDS_AN_OCTAVE = 12
-HALF_BAND = 1.0 / 12.0  # octaves to either side; a mode of 5 % damping is a seventh of an octave wide
+HALF_BAND = (
+    1.0 / 12.0
+)  # octaves to either side; a mode of 5 % damping is a seventh of an octave wide
 LEAST_FREE = 40  # bins free of lines on which a floor rests
 
 
@@ -47,7 +49,9 @@ class Lines:
 
     def at(self, orders: Array) -> Array:
         """Power above the floor of the lines at some mesh orders, (sensor, order) (m/s2)^2; it may be negative."""
-        bins = np.rint(orders * self.n_cycles).astype(np.intp)[:, None] + np.arange(-SPREAD, SPREAD + 1)
+        bins = np.rint(orders * self.n_cycles).astype(np.intp)[:, None] + np.arange(
+            -SPREAD, SPREAD + 1
+        )
         inside = np.clip(bins, 0, len(self.frequency) - 1)
         return np.asarray((self.power - self.floor)[:, inside].sum(axis=2))
 
@@ -76,7 +80,9 @@ def find_lines(signal: Array, cycles: Array, sampling_rate: float, teeth: Teeth)
     fine = resample(signal, FINER * n_samples, axis=1)
     even = CubicSpline(np.arange(fine.shape[1]), fine, axis=1)(instants)
     window = np.hanning(even.shape[1])
-    power = np.abs(np.fft.rfft(even * window, axis=1)) ** 2 * (2.0 / (even.shape[1] * np.sum(window**2)))
+    power = np.abs(np.fft.rfft(even * window, axis=1)) ** 2 * (
+        2.0 / (even.shape[1] * np.sum(window**2))
+    )
     order = np.arange(power.shape[1]) / n_cycles
     frequency = order * mesh_frequency
     kept = frequency <= 0.5 * sampling_rate
@@ -101,7 +107,9 @@ def _floor(power: Array, is_line: NDArray[np.bool_]) -> Array:
     n_stretches = max(1, len(free) // LEAST_FREE)
     stretches = np.array_split(free, n_stretches)
     middle = np.array([stretch.mean() for stretch in stretches])
-    levels = np.stack([np.median(power[:, stretch], axis=1) for stretch in stretches], axis=1) / math.log(2.0)
+    levels = np.stack(
+        [np.median(power[:, stretch], axis=1) for stretch in stretches], axis=1
+    ) / math.log(2.0)
     return np.stack([np.interp(np.arange(power.shape[1]), middle, row) for row in levels])
 
 
@@ -115,5 +123,7 @@ def band_centers(lowest: float, sampling_rate: float) -> Array:
 def band_sums(values: Array, frequency: Array, centers: Array) -> Array:
     """Sums over the sixth of an octave around each center, (row, bin) to (row, band)."""
     sums = np.concatenate([np.zeros((len(values), 1)), np.cumsum(values, axis=1)], axis=1)
-    first, last = (np.searchsorted(frequency, centers * 2.0**half) for half in (-HALF_BAND, HALF_BAND))
+    first, last = (
+        np.searchsorted(frequency, centers * 2.0**half) for half in (-HALF_BAND, HALF_BAND)
+    )
     return np.asarray(sums[:, last] - sums[:, first])

@@ -29,7 +29,11 @@ def _sensor_names(file: str, names: Sequence[str]) -> tuple[str, ...]:
     made = []
     for place, name in enumerate(names):
         plain = re.sub(r"[^A-Za-z0-9_]+", "_", name).strip("_")[:32] or f"channel_{place}"
-        made.append(plain if plain[0].isalpha() and not is_turning(plain) else f"s_{plain}"[:30] + "_a")
+        made.append(
+            plain if plain[0].isalpha() and not is_turning(plain) else f"s_{plain}"[:30] + "_a"
+        )
     if len(set(made)) < len(made):
-        raise ConfigError(f"{file}: the names {', '.join(names)} differ in nothing but signs; rename the columns")
+        raise ConfigError(
+            f"{file}: the names {', '.join(names)} differ in nothing but signs; rename the columns"
+        )
     return tuple(made)

@@ -26,9 +26,8 @@ def fitted_rows(fitted: Fit, n_driving: int) -> list[tuple[str, str]]:
     seen = "" if motion.scatter is None else f"{100 * motion.scatter:.4f} % seen"
     errors = f"pitch errors of that grade make {100 * fitted.own_scatter:.4f} % by themselves"
     if fitted.drift is not None and motion.correlation_time is not None:
-        drift = (
-            f"{100 * fitted.drift:.4f} % (standard deviation) over {motion.correlation_time:.3g} s; {seen}, {errors}"
-        )
+        spread = f"{100 * fitted.drift:.4f} % (standard deviation)"
+        drift = f"{spread} over {motion.correlation_time:.3g} s; {seen}, {errors}"
     elif seen:
         fast = f"; changes within {motion.followed_time:.2g} s are the gears' own or noise"
         drift = f"none written: {seen} over {motion.correlation_time:.3g} s, {errors}{fast}"
@@ -36,15 +35,23 @@ def fitted_rows(fitted: Fit, n_driving: int) -> list[tuple[str, str]]:
         drift = f"none written: below the detection limit of {100 * motion.detection_limit:.4f} %"
     else:
         drift = "none written: one harmonic alone is heard, which does not tell it from noise"
-    quality = f"{grade.grade:.1f}, 90 % of simulated sets of gears: {grade.low:.1f} to {grade.high:.1f}"
+    quality = (
+        f"{grade.grade:.1f}, 90 % of simulated sets of gears: {grade.low:.1f} to {grade.high:.1f}"
+    )
     if not grade.is_bounded:
         quality += "; NOT BOUNDED: no grade from 1 to 11 gives such sidebands, or none are heard"
     heard = ", ".join(
-        f"{name} {100 * row.mean():.0f} %" for name, row in zip(fitted.sensors, fitted.heard, strict=True)
+        f"{name} {100 * row.mean():.0f} %"
+        for name, row in zip(fitted.sensors, fitted.heard, strict=True)
     )
-    snr = ", ".join(f"{name} {one:.1f} dB" for name, one in zip(fitted.sensors, fitted.snr, strict=True))
+    snr = ", ".join(
+        f"{name} {one:.1f} dB" for name, one in zip(fitted.sensors, fitted.snr, strict=True)
+    )
     return [
-        ("speed", f"{60.0 * motion.mesh_frequency / n_driving:.4f} r/min, mesh {motion.mesh_frequency:.4f} Hz"),
+        (
+            "speed",
+            f"{60.0 * motion.mesh_frequency / n_driving:.4f} r/min, mesh {motion.mesh_frequency:.4f} Hz",
+        ),
         ("drift", drift),
         ("ISO 1328 grade", quality),
         ("path", f"share of bands in which the gears are heard: {heard}"),
@@ -54,7 +61,14 @@ def fitted_rows(fitted: Fit, n_driving: int) -> list[tuple[str, str]]:
 
 def check_lines(check: Check) -> list[str]:
     """The held-out check as lines of a Markdown table, sensor by sensor."""
-    names = ["sensor", "bands within", "median difference", "largest", "machine against itself", *INDICATORS]
+    names = [
+        "sensor",
+        "bands within",
+        "median difference",
+        "largest",
+        "machine against itself",
+        *INDICATORS,
+    ]
     lines = ["| " + " | ".join(names) + " |", "|" + "---|" * len(names)]
     itself = np.median(np.abs(check.fitted_db - check.measured_db), axis=1)
     for place, sensor in enumerate(check.sensors):
@@ -69,14 +83,18 @@ def check_lines(check: Check) -> list[str]:
         for number, unit in enumerate(INDICATOR_UNITS):
             low, high = check.twin[:, place, number].min(), check.twin[:, place, number].max()
             word = "agrees" if check.agrees[place, number] else "NO"
-            cells.append(f"{check.measured[place, number]:.2f} {unit} in {low:.2f}..{high:.2f}: {word}")
+            cells.append(
+                f"{check.measured[place, number]:.2f} {unit} in {low:.2f}..{high:.2f}: {word}"
+            )
         lines.append("| " + " | ".join(" ".join(cell.split()) for cell in cells) + " |")
     return lines
 
 
 def check_summary(check: Check) -> list[str]:
     """The held-out check for a terminal: a line a sensor."""
-    head = f"{'sensor':<20}{'bands within':>14}{'median off':>12}" + "".join(f"{name:>16}" for name in INDICATORS)
+    head = f"{'sensor':<20}{'bands within':>14}{'median off':>12}" + "".join(
+        f"{name:>16}" for name in INDICATORS
+    )
     lines = [head]
     for place, sensor in enumerate(check.sensors):
         words = "".join(f"{'agrees' if agrees else 'NO':>16}" for agrees in check.agrees[place])
@@ -89,12 +107,14 @@ def verdict(check: Check) -> str:
     """One sentence on what agrees."""
     n_agree, n_all = int(check.agrees.sum()), check.agrees.size
     missed = [
-        f"{INDICATORS[number]} of {check.sensors[place]}" for place, number in np.argwhere(~check.agrees).tolist()
+        f"{INDICATORS[number]} of {check.sensors[place]}"
+        for place, number in np.argwhere(~check.agrees).tolist()
     ]
     return (
         f"{100 * check.share_within.mean():.0f} % of third-octave levels and {n_agree} of {n_all} indicators lie "
         f"between the least and the greatest of {N_RECORDS} healthy records of the twin; {100 * EXPECTED:.0f} % would, "
-        "were they of one of them." + (f" What does not agree: {', '.join(missed)}." if missed else "")
+        "were they of one of them."
+        + (f" What does not agree: {', '.join(missed)}." if missed else "")
     )
 
 

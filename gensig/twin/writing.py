@@ -13,7 +13,9 @@ from gensig.errors import ConfigError
 from gensig.text.option_writing import is_option_name, option_lines
 from gensig.twin.fitting import SOURCE_CHANNEL, Fit, minimum_phase, oversampling
 
-PATH_STEP = 20.0  # Hz between the lines of the path's file; its gain is smooth over a sixth of an octave
+PATH_STEP = (
+    20.0  # Hz between the lines of the path's file; its gain is smooth over a sixth of an octave
+)
 DEFAULT_OVERSAMPLING = 5  # solver.oversampling of configs/generate.yaml
 PATH_FILE, NOISE_FILE = "path.csv", "noise.csv"
 
@@ -27,14 +29,21 @@ def option_name(out: Path) -> str:
     """
     name = out.resolve().name
     if not is_option_name(name):
-        raise ConfigError(f"--out {out}: its name becomes that of the options; use letters, digits, _ and -")
+        raise ConfigError(
+            f"--out {out}: its name becomes that of the options; use letters, digits, _ and -"
+        )
     if out.exists() and (not out.is_dir() or any(out.iterdir())):
         raise ConfigError(f"--out {out} is there and not an empty folder; give another")
     return name
 
 
 def write_options(
-    out: Path, fitted: Fit, gear: Mapping[str, Any], remarks: Mapping[str, str], torque_nm: float, duration: float
+    out: Path,
+    fitted: Fit,
+    gear: Mapping[str, Any],
+    remarks: Mapping[str, str],
+    torque_nm: float,
+    duration: float,
 ) -> None:
     """Write gear, sensing and experiment options and the tables of path and noise.
 
@@ -49,7 +58,9 @@ def write_options(
     for group in ("gear", "sensing", "experiment"):
         (out / group).mkdir(parents=True, exist_ok=True)
     head = "# Written by gensig twin; report.md beside this folder's options says what was fitted and what assumed.\n"
-    (out / "gear" / f"{name}.yaml").write_text(head + "\n".join(option_lines(gear, remarks)) + "\n", encoding="utf-8")
+    (out / "gear" / f"{name}.yaml").write_text(
+        head + "\n".join(option_lines(gear, remarks)) + "\n", encoding="utf-8"
+    )
     (out / "sensing" / f"{name}.yaml").write_text(head + _sensing(out, fitted), encoding="utf-8")
     experiment = "# @package _global_\n" + head + _experiment(name, fitted, torque_nm, duration)
     (out / "experiment" / f"{name}.yaml").write_text(experiment, encoding="utf-8")
@@ -83,7 +94,10 @@ noise:
 
 def _experiment(name: str, fitted: Fit, torque_nm: float, duration: float) -> str:
     profile, found = _drift(fitted)
-    speed, steps = fitted.motion.mesh_frequency, oversampling(fitted.sampling_rate, DEFAULT_OVERSAMPLING)
+    speed, steps = (
+        fitted.motion.mesh_frequency,
+        oversampling(fitted.sampling_rate, DEFAULT_OVERSAMPLING),
+    )
     return f"""# gensig generate --config-dir {name} experiment={name} out=...
 defaults:
   - override /gear: {name}
@@ -120,12 +134,23 @@ def _drift(fitted: Fit) -> tuple[str, str]:
 def _write_path(file: Path, fitted: Fit) -> None:
     names, columns = ["frequency_hz"], []
     for sensor, gain in zip(fitted.sensors, fitted.gain, strict=True):
-        frequency, response = minimum_phase(fitted.gain_frequency, gain, fitted.sampling_rate, PATH_STEP)
+        frequency, response = minimum_phase(
+            fitted.gain_frequency, gain, fitted.sampling_rate, PATH_STEP
+        )
         columns += [response.real, response.imag]
         names += [f"{SOURCE_CHANNEL}_to_{sensor}_{part}" for part in ("real", "imaginary")]
-    np.savetxt(file, np.column_stack([frequency, *columns]), "%.9g", ",", header=",".join(names), comments="")
+    np.savetxt(
+        file,
+        np.column_stack([frequency, *columns]),
+        "%.9g",
+        ",",
+        header=",".join(names),
+        comments="",
+    )
 
 
 def _write_noise(file: Path, fitted: Fit) -> None:
     table = np.column_stack([fitted.noise_frequency, *fitted.density])
-    np.savetxt(file, table, "%.9g", ",", header=",".join(["frequency_hz", *fitted.sensors]), comments="")
+    np.savetxt(
+        file, table, "%.9g", ",", header=",".join(["frequency_hz", *fitted.sensors]), comments=""
+    )

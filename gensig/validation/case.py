@@ -82,7 +82,9 @@ class Case:
         """Curvature radius of a gear's flank at a named point, (1,) m."""
         position = np.array([self.position(point)])
         return np.asarray(
-            self.pair.pinion_curvature(position) if gear == "pinion" else self.pair.wheel_curvature(position)
+            self.pair.pinion_curvature(position)
+            if gear == "pinion"
+            else self.pair.wheel_curvature(position)
         )
 
 
@@ -99,7 +101,9 @@ def read_case(overrides: tuple[str, ...]) -> Case:
 def _read_machine(overrides: tuple[str, ...]) -> SpurPair:
     keys = [word.partition("=")[0] for word in overrides]
     if not all("." in key and not key.startswith("gear.rated_") for key in keys):
-        return read_spur_pair(compose("generate", overrides))  # groups, and values that others are made of
+        return read_spur_pair(
+            compose("generate", overrides)
+        )  # groups, and values that others are made of
     values = _default_machine().plain()
     for key, word in zip(keys, overrides, strict=True):
         *groups, last = key.split(".")
@@ -182,7 +186,9 @@ def record(case: Case) -> Array:
     turn = 2.0 * np.pi / system.operating.speed
     n_samples = RECORD_TURNS * turn * system.sensing.sampling_rate
     if abs(n_samples - round(n_samples)) > 1e-6:
-        raise ConfigError(f"{RECORD_TURNS} turns are {n_samples:.6g} samples, not a whole number: choose another speed")
+        raise ConfigError(
+            f"{RECORD_TURNS} turns are {n_samples:.6g} samples, not a whole number: choose another speed"
+        )
     machine = replace(
         system,
         operating=replace(system.operating, duration=RECORD_TURNS * turn),

@@ -224,7 +224,13 @@ beside those that are. No input was tuned to reach a printed number. "Deviation"
 def markdown(results: Sequence[Result]) -> str:
     """The whole page."""
     short = [result for result in results if result.verdict in (DIFFERS, FAILS)]
-    parts = [INTRO, "## Verdicts\n", summary(results), "\n## What differs, and what does not hold\n", _table(short)]
+    parts = [
+        INTRO,
+        "## Verdicts\n",
+        summary(results),
+        "\n## What differs, and what does not hold\n",
+        _table(short),
+    ]
     for source in _sources(results):
         mine = [result for result in results if result.row.origin == source]
         parts += [f"\n## {SOURCE_TITLES.get(source, source)}\n", SOURCE_TEXTS.get(source, "")]
@@ -239,7 +245,11 @@ def summary(results: Sequence[Result]) -> str:
     lines = ["| source | rows | " + " | ".join(VERDICTS) + " |", "|---" * (len(VERDICTS) + 2) + "|"]
     for source in _sources(results):
         found = Counter(result.verdict for result in results if result.row.origin == source)
-        lines.append(f"| {source} | {found.total()} | " + " | ".join(str(found[name]) for name in VERDICTS) + " |")
+        lines.append(
+            f"| {source} | {found.total()} | "
+            + " | ".join(str(found[name]) for name in VERDICTS)
+            + " |"
+        )
     return "\n".join(lines)
 
 
@@ -278,8 +288,13 @@ def _table(results: Sequence[Result], *, head: str = "") -> str:
     groups: dict[tuple[str, ...], list[Result]] = {}
     for result in results:
         row = result.row
-        groups.setdefault((row.id.rpartition(".")[0], row.unit, result.verdict, row.reason), []).append(result)
-    lines = ["| id | at | printed | computed | unit | deviation | verdict | source | reason |", "|---" * 9 + "|"]
+        groups.setdefault(
+            (row.id.rpartition(".")[0], row.unit, result.verdict, row.reason), []
+        ).append(result)
+    lines = [
+        "| id | at | printed | computed | unit | deviation | verdict | source | reason |",
+        "|---" * 9 + "|",
+    ]
     for (line, unit, verdict, reason), members in groups.items():
         rows = [result.row for result in members]
         printed = [row.printed for row in rows]

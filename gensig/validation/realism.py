@@ -43,7 +43,9 @@ class Range:
 
     def __post_init__(self) -> None:
         if self.low is not None and self.high is not None and not self.low <= self.high:
-            raise ConfigError(f"{self.id}, {self.at}: low = {self.low:g} lies above high = {self.high:g}")
+            raise ConfigError(
+                f"{self.id}, {self.at}: low = {self.low:g} lies above high = {self.high:g}"
+            )
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -61,7 +63,9 @@ class Comparison(Range):
         # slots make a new class, so the zero-argument super() would look at the old one
         Range.__post_init__(self)
         if self.verdict not in VERDICTS:
-            raise ConfigError(f"{self.id}, {self.at}: verdict = {self.verdict!r}; allowed: {', '.join(VERDICTS)}")
+            raise ConfigError(
+                f"{self.id}, {self.at}: verdict = {self.verdict!r}; allowed: {', '.join(VERDICTS)}"
+            )
 
     @property
     def place(self) -> Place:
@@ -127,7 +131,9 @@ def read_results(path: Path = RESULTS) -> tuple[str, list[Comparison]]:
     """
     lines = path.read_text(encoding="utf-8").splitlines()
     if not lines or not lines[0].startswith("# "):
-        raise ConfigError(f"{path.name} must begin with a line '# ' that says what was compared; make it again")
+        raise ConfigError(
+            f"{path.name} must begin with a line '# ' that says what was compared; make it again"
+        )
     found = [
         Comparison(**{**_read(line, ("low", "high", "median", "p5", "p95")), **_points(line)})
         for line in csv.DictReader(lines[1:])
@@ -163,10 +169,25 @@ def realism_lines(path: Path = RESULTS) -> list[str]:
 
 def table(found: Sequence[Comparison]) -> list[str]:
     """Comparisons as lines of a Markdown table."""
-    lines = ["| quantity | at | beside | median | 5 to 95 % | values | verdict | source | reason |", "|---" * 9 + "|"]
+    lines = [
+        "| quantity | at | beside | median | 5 to 95 % | values | verdict | source | reason |",
+        "|---" * 9 + "|",
+    ]
     for one in found:
-        name, spread = f"{one.id}, {one.unit}".rstrip(", "), f"{_number(one.p5)} to {_number(one.p95)}"
-        cells = (name, one.at, shown_range(one), _number(one.median), spread, str(one.n), one.verdict, one.source)
+        name, spread = (
+            f"{one.id}, {one.unit}".rstrip(", "),
+            f"{_number(one.p5)} to {_number(one.p95)}",
+        )
+        cells = (
+            name,
+            one.at,
+            shown_range(one),
+            _number(one.median),
+            spread,
+            str(one.n),
+            one.verdict,
+            one.source,
+        )
         lines.append(f"| {' | '.join((*cells, one.reason))} |")
     return lines
 
@@ -191,7 +212,10 @@ def _written(value: Any) -> Any:
 
 
 def _read(line: Mapping[str, str], numbers: Sequence[str]) -> dict[str, Any]:
-    return {key: (float(text) if text else None) if key in numbers else text for key, text in line.items()}
+    return {
+        key: (float(text) if text else None) if key in numbers else text
+        for key, text in line.items()
+    }
 
 
 def _points(line: Mapping[str, str]) -> dict[str, Any]:

@@ -10,7 +10,13 @@ from scipy.optimize import brentq
 
 from gensig.geometry.gear import Gear
 from gensig.geometry.tooth import Tooth, healthy_tooth
-from gensig.geometry.tooth_profile import N_FLANK_CELLS, N_ROOT_CELLS, ToothProfile, involute_point, root_curve
+from gensig.geometry.tooth_profile import (
+    N_FLANK_CELLS,
+    N_ROOT_CELLS,
+    ToothProfile,
+    involute_point,
+    root_curve,
+)
 
 
 def straight_root_profile(gear: Gear) -> ToothProfile:
@@ -60,7 +66,9 @@ def other_root_angle(gear: Gear, where: str) -> Gear:
     if where == "tangent_30deg":
 
         def excess(gamma: float) -> float:
-            turned = (gear.rounding_center_depth / math.tan(gamma) + gear.rounding_center_offset) / gear.pitch_radius
+            turned = (
+                gear.rounding_center_depth / math.tan(gamma) + gear.rounding_center_offset
+            ) / gear.pitch_radius
             return gamma - turned - math.radians(30.0)
 
         gamma = brentq(excess, gear.pressure_angle, 0.5 * math.pi)
@@ -70,4 +78,6 @@ def other_root_angle(gear: Gear, where: str) -> Gear:
         angle = math.atan2(float(y[0]), float(x[0]))
     else:
         angle = gear.half_tooth_angle_base
-    return _GearOnRootAngle(**{item.name: getattr(gear, item.name) for item in fields(Gear)}, body_half_angle=angle)
+    return _GearOnRootAngle(
+        **{item.name: getattr(gear, item.name) for item in fields(Gear)}, body_half_angle=angle
+    )

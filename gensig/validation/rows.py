@@ -33,7 +33,9 @@ SOURCES = (
     "wear_reference",
     "wear_paper",
 )
-ROUGH = ("engine_time",)  # sources of chaotic runs, whose numbers scatter by some per cent from machine to machine
+ROUGH = (
+    "engine_time",
+)  # sources of chaotic runs, whose numbers scatter by some per cent from machine to machine
 REPRODUCED, DIFFERS = "reproduced", "differs"
 HOLDS, FAILS = "claim holds", "claim does not hold"
 NOT_PRINTED = "not printed"
@@ -92,15 +94,25 @@ class Row:
 
     def __post_init__(self) -> None:
         if self.kind not in ("value", "claim"):
-            raise ConfigError(f"{self.origin}.csv, {self.id}: kind = {self.kind!r}; allowed: value, claim")
+            raise ConfigError(
+                f"{self.origin}.csv, {self.id}: kind = {self.kind!r}; allowed: value, claim"
+            )
         if self.unit not in UNITS:
-            raise ConfigError(f"{self.origin}.csv, {self.id}: unit = {self.unit!r}; allowed: {', '.join(UNITS)}")
+            raise ConfigError(
+                f"{self.origin}.csv, {self.id}: unit = {self.unit!r}; allowed: {', '.join(UNITS)}"
+            )
         if self.expected not in VERDICTS:
-            raise ConfigError(f"{self.origin}.csv, {self.id}: expected = {self.expected!r}; allowed: {VERDICTS}")
+            raise ConfigError(
+                f"{self.origin}.csv, {self.id}: expected = {self.expected!r}; allowed: {VERDICTS}"
+            )
         if (self.tolerance is not None) != (self.kind == "value" and bool(self.printed)):
-            raise ConfigError(f"{self.origin}.csv, {self.id}: a printed value, and nothing else, has a tolerance")
+            raise ConfigError(
+                f"{self.origin}.csv, {self.id}: a printed value, and nothing else, has a tolerance"
+            )
         if self.kind == "claim" and self.printed and self.printed.split()[0] not in (">", "<"):
-            raise ConfigError(f"{self.origin}.csv, {self.id}: a claim prints '> number' or '< number'")
+            raise ConfigError(
+                f"{self.origin}.csv, {self.id}: a claim prints '> number' or '< number'"
+            )
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -128,7 +140,9 @@ def read_rows(source: str) -> tuple[Row, ...]:
     """
     if source not in SOURCES:
         raise ConfigError(f"no validation source '{source}'; allowed: {', '.join(SOURCES)}")
-    text = resources.files("gensig.validation").joinpath(f"{source}.csv").read_text(encoding="utf-8")
+    text = (
+        resources.files("gensig.validation").joinpath(f"{source}.csv").read_text(encoding="utf-8")
+    )
     return tuple(_row(source, values) for values in csv.DictReader(text.splitlines()))
 
 
@@ -148,7 +162,11 @@ def judge(row: Row, value: float) -> Result:
         verdict = NOT_PRINTED
     elif row.kind == "claim":
         sign, bound = row.printed.split()
-        verdict = HOLDS if (computed > float(bound) if sign == ">" else computed < float(bound)) else FAILS
+        verdict = (
+            HOLDS
+            if (computed > float(bound) if sign == ">" else computed < float(bound))
+            else FAILS
+        )
     else:
         printed = float(row.printed)
         allowed = max((row.tolerance or 0.0) * abs(printed), half_last_digit(row.printed))
@@ -165,7 +183,9 @@ def half_last_digit(printed: str) -> float:
 
 
 def _row(source: str, values: dict[str, str]) -> Row:
-    good = NOT_PRINTED if not values["printed"] else REPRODUCED if values["kind"] == "value" else HOLDS
+    good = (
+        NOT_PRINTED if not values["printed"] else REPRODUCED if values["kind"] == "value" else HOLDS
+    )
     return Row(
         origin=source,
         id=values["id"],

@@ -49,7 +49,9 @@ def evaluate(row: Row) -> Result:
     for quantities, read in KINDS:
         if row.quantity in quantities:
             return judge(row, quantities[row.quantity](read(row.overrides), row.at))
-    raise ConfigError(f"{row.origin}.csv, {row.id}: no quantity '{row.quantity}'; see gensig.validation.verdicts")
+    raise ConfigError(
+        f"{row.origin}.csv, {row.id}: no quantity '{row.quantity}'; see gensig.validation.verdicts"
+    )
 
 
 def run_validation(

@@ -22,7 +22,9 @@ class SerialExecutor(Executor):
         """One shard at a time."""
         return 1
 
-    def run(self, job: Callable[[int], T], shard_indices: Sequence[int]) -> Iterator[tuple[int, T | ShardFailure]]:
+    def run(
+        self, job: Callable[[int], T], shard_indices: Sequence[int]
+    ) -> Iterator[tuple[int, T | ShardFailure]]:
         """See ``Executor.run``; there is no worker that could die."""
         for index in shard_indices:
             yield index, guarded(job, index)

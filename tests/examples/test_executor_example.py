@@ -25,7 +25,10 @@ def folder(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Path:
 
 
 def contents(out: Path) -> dict[str, bytes]:
-    return {path.name: path.read_bytes() for path in [out / "plan.csv", *sorted((out / "shards").glob("*.h5"))]}
+    return {
+        path.name: path.read_bytes()
+        for path in [out / "plan.csv", *sorted((out / "shards").glob("*.h5"))]
+    }
 
 
 def test_it_makes_the_same_bytes(folder: Path) -> None:

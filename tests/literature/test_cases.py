@@ -14,8 +14,17 @@ from gensig.validation.case import read_case, with_fault, with_words
     "words",
     [
         (),
-        ("mesh.law=paper", "mesh.contact=linear", "gear.pinion.bore_radius_mm=12.5", "mesh.body=ring"),
-        ("operating.speed_rpm=300", "sensing.sampling_rate_hz=51060", "material.youngs_modulus_gpa=205"),
+        (
+            "mesh.law=paper",
+            "mesh.contact=linear",
+            "gear.pinion.bore_radius_mm=12.5",
+            "mesh.body=ring",
+        ),
+        (
+            "operating.speed_rpm=300",
+            "sensing.sampling_rate_hz=51060",
+            "material.youngs_modulus_gpa=205",
+        ),
         ("gear.rated_torque_nm=10",),
         ("gear=xiamen_23_84", "mesh.law=paper"),
     ],
@@ -24,7 +33,9 @@ def test_a_typed_machine_is_the_composed_one(words):
     assert read_case(words).system == read_system(compose("generate", words))
 
 
-@pytest.mark.parametrize("word", ["mesh.lawn=paper", "gear.pinyon.bore_radius_mm=9", "mesh.law=papers"])
+@pytest.mark.parametrize(
+    "word", ["mesh.lawn=paper", "gear.pinyon.bore_radius_mm=9", "mesh.law=papers"]
+)
 def test_mistakes_are_answered(word):
     with pytest.raises(ConfigError):
         _ = read_case((word,)).system

@@ -36,14 +36,19 @@ def test_rows_are_unique_and_shortfalls_are_explained():
 
 
 def test_every_quantity_is_used():
-    assert {name for quantities, _ in KINDS for name in quantities} == {row.quantity for row in ROWS}
+    assert {name for quantities, _ in KINDS for name in quantities} == {
+        row.quantity for row in ROWS
+    }
 
 
 @pytest.mark.parametrize(
     ("row_id", "word"),
     [
         ("table_2_2.pair_stiffness.C", "material.youngs_modulus_gpa=205"),
-        ("table_2_2.pinion_foundation.C", "gear.cutter_tip_radius_coefficient=0.3"),  # changes theta_f
+        (
+            "table_2_2.pinion_foundation.C",
+            "gear.cutter_tip_radius_coefficient=0.3",
+        ),  # changes theta_f
         ("table_2_2.wheel_bending.A", "gear.cutter_tip_radius_coefficient=0.2"),
         ("table_2_3.9_15_crack_1mm_gamma.C", "fault.crack_start=arc_mid"),
         ("table_2_3.9_15_pit.C", "fault.pit_width_mm=9"),
@@ -65,7 +70,10 @@ def test_every_quantity_is_used():
         ("wear_per_mesh.band_wheel.A", "wear.wheel.hardness_hbs=190"),
         ("wear_per_mesh.fixed_intervals.50", "wear.rule=band"),
         ("wear_rate.both_flanks.band", "gear.wheel.n_teeth=56"),
-        ("fluctuation_computed.flywheel.in_sequence", "excitation.cylinder.reciprocating_mass_kg=40"),
+        (
+            "fluctuation_computed.flywheel.in_sequence",
+            "excitation.cylinder.reciprocating_mass_kg=40",
+        ),
     ],
 )
 def test_a_wrong_input_differs(row_id, word):
@@ -105,6 +113,11 @@ def test_mistakes_are_answered():
         run_validation(["spur"])
     with pytest.raises(ConfigError, match="has no row 'table_9'"):
         printed_value("spur_reference", "table_9")
-    for wrong in ({"unit": "furlong"}, {"kind": "rumour"}, {"tolerance": None}, {"expected": "fine"}):
+    for wrong in (
+        {"unit": "furlong"},
+        {"kind": "rumour"},
+        {"tolerance": None},
+        {"expected": "fine"},
+    ):
         with pytest.raises(ConfigError, match=re.escape(row.id)):
             replace(row, **wrong)

@@ -21,7 +21,11 @@ def results():
     try:
         return run_validation(on_row=found.append)
     except Exception as error:
-        error.add_note(f"in the row after {found[-1].row.origin}.{found[-1].row.id}" if found else "in the first row")
+        error.add_note(
+            f"in the row after {found[-1].row.origin}.{found[-1].row.id}"
+            if found
+            else "in the first row"
+        )
         raise
 
 
@@ -82,16 +86,27 @@ def test_a_changed_page_is_noticed(results):
 
 def test_page_is_deterministic_and_counts_every_row(results):
     page = markdown(results)
-    again = [evaluate(result.row) if place % 7 == 0 else result for place, result in enumerate(results)]
+    again = [
+        evaluate(result.row) if place % 7 == 0 else result for place, result in enumerate(results)
+    ]
     assert page == markdown(again)
     for source in SOURCES:
         counts = [int(cell) for cell in re.search(rf"\| {source} \|(.*)\|", page)[1].split("|")]
-        assert counts[0] == sum(counts[1:]) == sum(result.row.origin == source for result in results)
+        assert (
+            counts[0] == sum(counts[1:]) == sum(result.row.origin == source for result in results)
+        )
         assert len(counts) == 1 + len(VERDICTS)
-    assert not [line for line in page.splitlines() if line.startswith("| ") and line.count("|") not in (8, 10)]
+    assert not [
+        line
+        for line in page.splitlines()
+        if line.startswith("| ") and line.count("|") not in (8, 10)
+    ]
 
 
 def test_shortfalls_are_listed_and_none_is_unexpected(results):
     lines = shortfalls(results)
-    assert any(line.startswith("pit.softens_less_than_crack.arc_mid: printed < 1, computed 1.425") for line in lines)
+    assert any(
+        line.startswith("pit.softens_less_than_crack.arc_mid: printed < 1, computed 1.425")
+        for line in lines
+    )
     assert not [line for line in lines if line.startswith("UNEXPECTED")]

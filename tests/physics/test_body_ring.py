@@ -8,7 +8,12 @@ import pytest
 from numpy.testing import assert_allclose
 
 from gensig.geometry.tooth_profile import load_angle
-from gensig.mesh.body_coupling import arc_flexibility, cross_compliance, ring_harmonic, shared_body_compliance
+from gensig.mesh.body_coupling import (
+    arc_flexibility,
+    cross_compliance,
+    ring_harmonic,
+    shared_body_compliance,
+)
 
 # 1e-15 m/Pa, upper triangles (11, 12, 22); independently derived
 HARMONICS = {
@@ -81,16 +86,24 @@ def test_flexibility_of_the_neighbor(gear, side, xiamen):
 
 @pytest.mark.parametrize("k", [1, 2, 5])
 def test_reciprocity_and_mirror_symmetry(gear, xiamen, k):
-    ahead, behind = (arc_flexibility(gear, xiamen.material, neighbor(gear, sign * k)) for sign in (1, -1))
-    scale = np.sqrt(np.outer(np.diag(ahead0 := arc_flexibility(gear, xiamen.material, 0.0)), np.diag(ahead0)))
+    ahead, behind = (
+        arc_flexibility(gear, xiamen.material, neighbor(gear, sign * k)) for sign in (1, -1)
+    )
+    scale = np.sqrt(
+        np.outer(np.diag(ahead0 := arc_flexibility(gear, xiamen.material, 0.0)), np.diag(ahead0))
+    )
     assert_allclose((behind - ahead.T) / scale, 0.0, rtol=0, atol=1e-10)
     assert_allclose((behind - MIRROR @ ahead @ MIRROR) / scale, 0.0, rtol=0, atol=1e-10)
-    assert np.abs((ahead - ahead.T) / scale).max() > 1e-5, "symmetric by itself: reciprocity would show nothing"
+    assert np.abs((ahead - ahead.T) / scale).max() > 1e-5, (
+        "symmetric by itself: reciprocity would show nothing"
+    )
 
 
 def test_body_under_the_loaded_tooth_at_the_pitch_point(gear, side, xiamen):
     rho = xiamen.pair.pinion_curvature(xiamen.pair.pitch_point)
-    angle = load_angle(gear, np.array([rho if side == "pinion" else xiamen.pair.tangent_length - rho]))
+    angle = load_angle(
+        gear, np.array([rho if side == "pinion" else xiamen.pair.tangent_length - rho])
+    )
     found = cross_compliance(gear, xiamen.material, angle, angle, pitches=0)
     assert_allclose(found, {"pinion": 1031.22e-12, "wheel": 2372.06e-12}[side], rtol=1e-5, atol=0)
 
@@ -98,7 +111,9 @@ def test_body_under_the_loaded_tooth_at_the_pitch_point(gear, side, xiamen):
 def cross_over_the_zone(pair, material, side, pitches):
     s = np.array(S_MM) * 1e-3
     gear, curvature = getattr(pair, side), getattr(pair, f"{side}_curvature")
-    loaded, probed = (load_angle(gear, np.asarray(curvature(s + k * pair.base_pitch))) for k in (0, 1))
+    loaded, probed = (
+        load_angle(gear, np.asarray(curvature(s + k * pair.base_pitch))) for k in (0, 1)
+    )
     return cross_compliance(gear, material, loaded, probed, pitches=pitches)
 
 
@@ -114,19 +129,24 @@ def test_the_wrong_neighbor_misses_the_finite_elements(side, xiamen):
 
 def test_shared_compliance_is_the_mean_of_both_gears_over_the_double_zone(xiamen):
     expected = sum(np.mean(CROSS_FE[side]) for side in SIDES) * 1e-12
-    assert_allclose(shared_body_compliance(xiamen.pair, xiamen.material), expected, rtol=0.005, atol=0)
+    assert_allclose(
+        shared_body_compliance(xiamen.pair, xiamen.material), expected, rtol=0.005, atol=0
+    )
 
 
 def test_cross_compliance_follows_the_bore(gear, xiamen):
     """Rigid twist of the body about the bore: a larger bore couples less, by more than the change in radius."""
     cross = [
-        arc_flexibility(replace(gear, bore_radius=bore * gear.root_radius), xiamen.material, neighbor(gear))[2, 2]
+        arc_flexibility(
+            replace(gear, bore_radius=bore * gear.root_radius), xiamen.material, neighbor(gear)
+        )[2, 2]
         for bore in (0.2, 0.4, 0.6)
     ]
     assert np.all(np.diff(np.abs(cross)) != 0)
     shared = [
         shared_body_compliance(
-            replace(xiamen.pair, pinion=replace(xiamen.pair.pinion, bore_radius=bore)), xiamen.material
+            replace(xiamen.pair, pinion=replace(xiamen.pair.pinion, bore_radius=bore)),
+            xiamen.material,
         )
         for bore in (7e-3, 9e-3, 12e-3)
     ]

@@ -32,7 +32,11 @@ def ripple(system, faults=()):
 
 
 def columns(table):
-    return [getattr(getattr(table, side), name) for side in SIDES for name in ("compliance", "gap", "gap_slope")]
+    return [
+        getattr(getattr(table, side), name)
+        for side in SIDES
+        for name in ("compliance", "gap", "gap_slope")
+    ]
 
 
 def test_no_depth_is_no_relief_bit_for_bit(xiamen, machine):
@@ -99,7 +103,10 @@ def sides(system):
     [
         ({"crowning": 3 * UM}, 0.03),
         ({"end_relief": 10 * UM, "end_relief_width": 3 * MM}, 0.03),
-        ({"helix_slope": 5 * UM}, 0.08),  # bears on part of the face, whose secant is taken at the set torque
+        (
+            {"helix_slope": 5 * UM},
+            0.08,
+        ),  # bears on part of the face, whose secant is taken at the set torque
     ],
 )
 def test_leads_are_those_of_the_sliced_pair(config_with, lead, share):
@@ -116,7 +123,10 @@ def test_leads_are_those_of_the_sliced_pair(config_with, lead, share):
 
 
 def test_opposite_slopes_leave_an_aligned_pair(xiamen):
-    slope = {"pinion": FlankModification(helix_slope=8 * UM), "wheel": FlankModification(helix_slope=-8 * UM)}
+    slope = {
+        "pinion": FlankModification(helix_slope=8 * UM),
+        "wheel": FlankModification(helix_slope=-8 * UM),
+    }
     askew = replace(xiamen, modification=PairModification(**slope)).mesh_table()
     for mine, theirs in zip(columns(askew), columns(xiamen.mesh_table()), strict=True):
         assert_allclose(mine, theirs, rtol=1e-9, atol=1e-15)
@@ -129,5 +139,7 @@ def test_relieved_gears_shake_less_along_the_line_of_action(machine):
         Run(system=replace(system, modification=modification), faults=())
         for modification in (PLAIN, system.long_relief())
     ]
-    plain, quiet = (np.sqrt((record.acceleration**2).mean(axis=1)) for record in simulate_together(runs))
+    plain, quiet = (
+        np.sqrt((record.acceleration**2).mean(axis=1)) for record in simulate_together(runs)
+    )
     assert (quiet < 0.5 * plain).all()

@@ -34,7 +34,9 @@ def curvature(system, gear):
 
 def along_flank(system, gear):
     """Place on the flank, 0 at the lower end of the involute and 1 at the tip, at the nodes on the path."""
-    flank = faulty_teeth(system.pair, (one("pitch_error", gear=gear, tooth=0),))[gear, 0].profile.curvature_radius
+    flank = faulty_teeth(system.pair, (one("pitch_error", gear=gear, tooth=0),))[
+        gear, 0
+    ].profile.curvature_radius
     return (curvature(system, gear) - flank[0]) / (flank[-1] - flank[0])
 
 
@@ -53,7 +55,9 @@ class TestOneIsTheOther:
         found, expected = (pair_states(table, roll) for table in tables)
         assert_allclose(found.gap, expected.gap, rtol=0, atol=0)
         assert np.isinf(expected.gap).any()
-        loads = [static_mesh(table, pair_states(table, roll), xiamen.mesh_force).load for table in tables]
+        loads = [
+            static_mesh(table, pair_states(table, roll), xiamen.mesh_force).load for table in tables
+        ]
         assert_allclose(loads[0], loads[1], rtol=0, atol=1e-9)
         there = np.isfinite(expected.gap)
         assert_allclose(found.compliance[there], expected.compliance[there], rtol=1e-12, atol=0)
@@ -61,15 +65,25 @@ class TestOneIsTheOther:
     @pytest.mark.parametrize("height_mm", [0.5, 2.0])
     def test_chipped_over_the_whole_face_is_broken(self, xiamen, gear, height_mm):
         chip = one(
-            "chipped", gear=gear, tooth=0, chip_height_mm=height_mm, chip_width_mm=FULL, chip_shape="rectangular"
+            "chipped",
+            gear=gear,
+            tooth=0,
+            chip_height_mm=height_mm,
+            chip_width_mm=FULL,
+            chip_shape="rectangular",
         )
         broken = one("broken", gear=gear, tooth=0, broken_height_mm=height_mm)
         for found, expected in zip(rows(xiamen, chip), rows(xiamen, broken), strict=True):
             assert_allclose(found, expected, rtol=1e-12, atol=0)
-        assert chip.severity(getattr(xiamen.pair, gear)) == pytest.approx(broken.severity(getattr(xiamen.pair, gear)))
+        assert chip.severity(getattr(xiamen.pair, gear)) == pytest.approx(
+            broken.severity(getattr(xiamen.pair, gear))
+        )
 
     def test_a_rectangular_spall_is_a_pit(self, xiamen, gear):
-        pit, spall = patch("pitting", "pit", gear), patch("spalling", "spall", gear, spall_shape="rectangular")
+        pit, spall = (
+            patch("pitting", "pit", gear),
+            patch("spalling", "spall", gear, spall_shape="rectangular"),
+        )
         for found, expected in zip(rows(xiamen, spall), rows(xiamen, pit), strict=True):
             assert_allclose(found, expected, rtol=0, atol=0)
         body = getattr(xiamen.pair, gear)
@@ -78,7 +92,10 @@ class TestOneIsTheOther:
         assert ellipse.severity(body) == pytest.approx(0.25 * np.pi * pit.severity(body))
 
     def test_an_ellipse_costs_less_than_its_rectangle(self, xiamen, gear):
-        inner, outer = (deflection(xiamen, patch("spalling", "spall", gear, spall_shape=shape)) for shape in SHAPES)
+        inner, outer = (
+            deflection(xiamen, patch("spalling", "spall", gear, spall_shape=shape))
+            for shape in SHAPES
+        )
         none = deflection(xiamen)
         assert np.all(inner >= none * (1 - 1e-9))
         assert np.all(inner <= outer * (1 + 1e-9))
@@ -87,12 +104,24 @@ class TestOneIsTheOther:
 
 
 SHAPES = ("elliptic", "rectangular")
-PATCH = {"length_mm": 1.2, "width_mm": 9.0, "depth_mm": 0.4, "position_mm": 2.4, "face_position_mm": 6.0}
+PATCH = {
+    "length_mm": 1.2,
+    "width_mm": 9.0,
+    "depth_mm": 0.4,
+    "position_mm": 2.4,
+    "face_position_mm": 6.0,
+}
 
 
 def patch(kind, prefix, gear, **changes):
     """One hole of the same size and place, as a pit or as a spall."""
-    return one(kind, gear=gear, tooth=0, **{f"{prefix}_{key}": value for key, value in PATCH.items()}, **changes)
+    return one(
+        kind,
+        gear=gear,
+        tooth=0,
+        **{f"{prefix}_{key}": value for key, value in PATCH.items()},
+        **changes,
+    )
 
 
 @pytest.mark.parametrize("gear", GEARS)
@@ -114,21 +143,30 @@ def test_a_broken_tooth_bends_as_the_sound_one_up_to_its_corner(xiamen, gear, he
 class TestGapsInClosedForm:
     @pytest.mark.parametrize("depth_um", [5.0, 80.0])
     def test_uniform_wear_is_a_gap_of_its_depth(self, xiamen, gear, depth_um):
-        gap, _ = rows(xiamen, one("wear", gear=gear, tooth=0, wear_depth_um=depth_um, wear_profile=None))
+        gap, _ = rows(
+            xiamen, one("wear", gear=gear, tooth=0, wear_depth_um=depth_um, wear_profile=None)
+        )
         assert_allclose(gap[path(xiamen)[0]], depth_um * UM, rtol=1e-12, atol=0)
         uneven, _ = rows(xiamen, one("wear", gear=gear, tooth=0, wear_depth_um=depth_um))
         assert np.ptp(uneven[path(xiamen)[0]]) > 0.5 * depth_um * UM
 
     @pytest.mark.parametrize("error_um", [20.0, -20.0, 0.5])
     def test_a_pitch_error_is_its_value_everywhere(self, xiamen, gear, error_um):
-        gap, compliance = rows(xiamen, one("pitch_error", gear=gear, tooth=0, pitch_error_um=error_um))
+        gap, compliance = rows(
+            xiamen, one("pitch_error", gear=gear, tooth=0, pitch_error_um=error_um)
+        )
         # far off the path the corner gap is millimetres, whose rounding remains
         assert_allclose(gap, error_um * UM, rtol=1e-9, atol=1e-16)
-        assert_allclose(compliance, side_of(xiamen.mesh_table(), gear).compliance[0], rtol=1e-12, atol=0)
+        assert_allclose(
+            compliance, side_of(xiamen.mesh_table(), gear).compliance[0], rtol=1e-12, atol=0
+        )
 
     @pytest.mark.parametrize("slope_um", [20.0, -20.0])
     def test_a_profile_slope_is_straight_in_roll(self, xiamen, gear, slope_um):
-        gap, _ = rows(xiamen, one("profile_error", gear=gear, tooth=0, profile_slope_um=slope_um, profile_form_um=0))
+        gap, _ = rows(
+            xiamen,
+            one("profile_error", gear=gear, tooth=0, profile_slope_um=slope_um, profile_form_um=0),
+        )
         expected = slope_um * UM * (along_flank(xiamen, gear) - 0.5)
         within_second_order(xiamen, gear, gap, expected)
         # half of it stands back at one end of the flank, as much stands proud at the other
@@ -137,21 +175,34 @@ class TestGapsInClosedForm:
 
     @pytest.mark.parametrize("waves", [1.0, 2.0])
     def test_a_profile_form_is_waves(self, xiamen, gear, waves):
-        fault = one("profile_error", gear=gear, tooth=0, profile_slope_um=0, profile_form_um=2, profile_waves=waves)
+        fault = one(
+            "profile_error",
+            gear=gear,
+            tooth=0,
+            profile_slope_um=0,
+            profile_form_um=2,
+            profile_waves=waves,
+        )
         expected = 2 * UM * np.sin(np.pi * waves * along_flank(xiamen, gear)) ** 2
         within_second_order(xiamen, gear, rows(xiamen, fault)[0], expected)
 
     @pytest.mark.parametrize(("curve", "power"), [("linear", 1), ("parabolic", 2)])
     def test_tip_relief_falls_off_from_the_tip(self, xiamen, gear, curve, power):
-        fault = one("tip_relief", gear=gear, tooth=0, relief_um=10, relief_length_mm=3, relief_curve=curve)
-        from_tip = np.abs(path(xiamen)[1] - (xiamen.pair.path_of_contact if gear == "pinion" else 0.0))
+        fault = one(
+            "tip_relief", gear=gear, tooth=0, relief_um=10, relief_length_mm=3, relief_curve=curve
+        )
+        from_tip = np.abs(
+            path(xiamen)[1] - (xiamen.pair.path_of_contact if gear == "pinion" else 0.0)
+        )
         expected = 10 * UM * np.maximum(1 - from_tip / 3e-3, 0.0) ** power
         assert expected.max() > 9.9 * UM
         within_second_order(xiamen, gear, rows(xiamen, fault)[0], expected)
 
     def test_the_mate_rides_on_the_start_of_a_steep_relief(self, xiamen, gear):
         """Where slope times slope times radius is no longer small the gap is the edge's, not the relief's."""
-        gap, _ = rows(xiamen, one("tip_relief", gear=gear, tooth=0, relief_um=50, relief_length_mm=0.2))
+        gap, _ = rows(
+            xiamen, one("tip_relief", gear=gear, tooth=0, relief_um=50, relief_length_mm=0.2)
+        )
         assert 0 < gap[path(xiamen)[0]].max() < 25 * UM
         with pytest.raises(AssertionError):
             within_second_order(xiamen, gear, gap, np.zeros_like(path(xiamen)[1]))
@@ -193,15 +244,21 @@ class TestRunout:
                 for k in range(n_teeth)
             )
 
-        second = 40 * UM / curvature(xiamen, gear)  # slope of the deviation along the flank, at most
-        assert jump(1) < 1.25 * (second**2 * relative_radius(xiamen.pair, path(xiamen)[1]) / 2).max()
+        second = (
+            40 * UM / curvature(xiamen, gear)
+        )  # slope of the deviation along the flank, at most
+        assert (
+            jump(1) < 1.25 * (second**2 * relative_radius(xiamen.pair, path(xiamen)[1]) / 2).max()
+        )
         assert jump(-1) > 2 * UM
 
     @pytest.mark.parametrize("gear", GEARS)
     def test_the_amplitude_is_the_eccentricity(self, xiamen, gear):
         table = xiamen.mesh_table((one("runout", gear=gear, tooth=5, eccentricity_um=40),))
         side = side_of(table, gear)
-        at_pitch_point = np.array([np.interp(xiamen.pair.pitch_point, table.position, row) for row in side.gap])
+        at_pitch_point = np.array(
+            [np.interp(xiamen.pair.pitch_point, table.position, row) for row in side.gap]
+        )
         turn = 2 * np.pi * (np.arange(len(side.kind)) - 5) / len(side.kind)
         assert_allclose(at_pitch_point[side.kind], 40 * UM * np.cos(turn), rtol=0, atol=0.1 * UM)
         assert at_pitch_point[side.kind].argmax() == 5
@@ -217,7 +274,12 @@ class TestMisalignment:
         tooth = faulty_teeth(system.pair, (fault,))[gear, 0]
         at, force = np.array([system.pair.pitch_point]), system.mesh_force
         side = flank_sides(
-            system.pair, at, system.material, system.mesh, force, pinion_share=1.0 if gear == "pinion" else 0.0
+            system.pair,
+            at,
+            system.material,
+            system.mesh,
+            force,
+            pinion_share=1.0 if gear == "pinion" else 0.0,
         )[gear]
         bending = slice_bending(system.pair, at, system.material, system.mesh)
         gap, compliance = side.contact(tooth, bending, system.mesh)
@@ -233,7 +295,9 @@ class TestMisalignment:
         tilt = ratio * even
         expected = even + tilt / 2 if ratio < 2 else np.sqrt(2 * even * tilt)
         for sign in (1, -1):
-            assert_allclose(self.approach(system, sign * tilt / UM, gear)[0], expected, rtol=0.015, atol=0)
+            assert_allclose(
+                self.approach(system, sign * tilt / UM, gear)[0], expected, rtol=0.015, atol=0
+            )
 
     def test_full_bearing_is_no_answer_for_a_large_tilt(self, machine):
         system = machine({"mesh.contact": "linear", "mesh.bending": "whole"})
@@ -241,11 +305,15 @@ class TestMisalignment:
         assert found < 0.5 * (even + 7.5 * UM)
 
     def test_slices_that_bend_by_themselves_are_softer(self, machine):
-        by_slice, whole = (self.approach(machine({"mesh.bending": how}), 15.0) for how in ("by_slice", "whole"))
+        by_slice, whole = (
+            self.approach(machine({"mesh.bending": how}), 15.0) for how in ("by_slice", "whole")
+        )
         assert by_slice[0] > whole[0] * 1.2
         assert by_slice[1] > whole[1] * 1.2
 
     def test_either_end_of_the_face_is_the_same(self, xiamen):
-        one_end, other_end = (rows(xiamen, one("misalignment", tooth=0, misalignment_um=d)) for d in (15, -15))
+        one_end, other_end = (
+            rows(xiamen, one("misalignment", tooth=0, misalignment_um=d)) for d in (15, -15)
+        )
         for found, expected in zip(one_end, other_end, strict=True):
             assert_allclose(found, expected, rtol=1e-9, atol=1e-15)

@@ -27,7 +27,9 @@ def test_severity_zero_is_healthy(xiamen, name, gear):
     side, sound_side = side_of(table, gear), side_of(sound, gear)
     row = side.kind[0]
     for key in ("compliance", "gap", "compliance_slope", "gap_slope"):
-        assert_allclose(getattr(side, key)[row], getattr(sound_side, key)[0], rtol=0, atol=0, err_msg=key)
+        assert_allclose(
+            getattr(side, key)[row], getattr(sound_side, key)[0], rtol=0, atol=0, err_msg=key
+        )
     assert side.present.all()
 
 
@@ -38,9 +40,15 @@ def series(xiamen):
 
     def make(name, gear):
         if (name, gear) not in known:
-            faults = [CASES[name].fault(value, gear) for value in (CASES[name].nothing, *CASES[name].rising)]
+            faults = [
+                CASES[name].fault(value, gear)
+                for value in (CASES[name].nothing, *CASES[name].rising)
+            ]
             found = np.array([deflection(xiamen, fault) for fault in faults])
-            known[name, gear] = found, np.array([fault.severity(getattr(xiamen.pair, gear)) for fault in faults])
+            known[name, gear] = (
+                found,
+                np.array([fault.severity(getattr(xiamen.pair, gear)) for fault in faults]),
+            )
         return known[name, gear]
 
     return make
@@ -96,8 +104,13 @@ class TestTheChecksCanFail:
 
     def test_material_instead_of_gaps(self, xiamen):
         """The paper's law narrows the face by the whole pit, however short; over gaps the mate rides on its edges."""
-        narrow, short = replace(xiamen, mesh=replace(xiamen.mesh, law="paper")), one("pitting", pit_length_mm=0.05)
-        by_gap, by_width = ((deflection(system, short) - deflection(system)).max() for system in (xiamen, narrow))
+        narrow, short = (
+            replace(xiamen, mesh=replace(xiamen.mesh, law="paper")),
+            one("pitting", pit_length_mm=0.05),
+        )
+        by_gap, by_width = (
+            (deflection(system, short) - deflection(system)).max() for system in (xiamen, narrow)
+        )
         assert by_gap < 0.1 * by_width
 
 
@@ -111,8 +124,12 @@ class TestWhoseFacesBear:
         assert crack.severity(getattr(xiamen.pair, gear)) > 0.2
 
     def test_on_the_tension_side_it_is_open(self, xiamen, gear):
-        breathing, kept_open = (one("crack", gear=gear, tooth=0, crack_faces=faces) for faces in ("breathing", "open"))
-        assert_allclose(deflection(xiamen, breathing), deflection(xiamen, kept_open), rtol=1e-12, atol=0)
+        breathing, kept_open = (
+            one("crack", gear=gear, tooth=0, crack_faces=faces) for faces in ("breathing", "open")
+        )
+        assert_allclose(
+            deflection(xiamen, breathing), deflection(xiamen, kept_open), rtol=1e-12, atol=0
+        )
         assert (deflection(xiamen, kept_open) / deflection(xiamen)).max() > 1.02
 
 
@@ -142,7 +159,12 @@ class TestThePapersCrack:
     @pytest.mark.parametrize(("start", "loss"), [("gamma_mid", 0.0281), ("arc_mid", 0.0403)])
     def test_it_costs_what_its_formula_says(self, paper_machine, start, loss):
         # spur reference (docs/validation.md), section 2.3: loss of pair stiffness at the pitch point, 1 mm
-        assert_allclose(lost_at_pitch_point(paper_machine, one("crack", crack_start=start)), loss, rtol=0, atol=2e-4)
+        assert_allclose(
+            lost_at_pitch_point(paper_machine, one("crack", crack_start=start)),
+            loss,
+            rtol=0,
+            atol=2e-4,
+        )
 
 
 def lost_at_pitch_point(system, fault):
@@ -154,9 +176,13 @@ def lost_at_pitch_point(system, fault):
 
 class TestThePapersPit:
     def test_it_costs_what_its_formula_says(self, paper_machine):
-        assert_allclose(lost_at_pitch_point(paper_machine, one("pitting")), 0.0574, rtol=0, atol=2e-4)
+        assert_allclose(
+            lost_at_pitch_point(paper_machine, one("pitting")), 0.0574, rtol=0, atol=2e-4
+        )
 
-    def test_slices_cost_the_same_where_the_pit_is_deeper_than_the_load(self, machine, paper_machine):
+    def test_slices_cost_the_same_where_the_pit_is_deeper_than_the_load(
+        self, machine, paper_machine
+    ):
         """The rest of the paper's conventions under the law with gaps: the pit's slices stand clear of the mate."""
         terms = {
             "elasticity": "plane_stress",
@@ -167,7 +193,9 @@ class TestThePapersPit:
         }
         sliced = machine({f"mesh.{key}": value for key, value in terms.items()})
         assert sliced.mesh.law == "one_sided"
-        found, expected = (lost_at_pitch_point(system, one("pitting")) for system in (sliced, paper_machine))
+        found, expected = (
+            lost_at_pitch_point(system, one("pitting")) for system in (sliced, paper_machine)
+        )
         assert 0.04 < found < 0.08
         assert_allclose(found, expected, rtol=1e-3, atol=0)
         bridged = lost_at_pitch_point(sliced, one("pitting", pit_length_mm=0.02))

@@ -70,7 +70,10 @@ def test_tooth_and_body_of_many_gears(strain, case):
 def test_tooth_and_body_over_all_gears(strain):
     errors = []
     for rows in groups("tooth", "case").values():
-        gear, curvature = reference_gear(rows[0]), column(rows, "curvature_radius_over_module") * MODULE
+        gear, curvature = (
+            reference_gear(rows[0]),
+            column(rows, "curvature_radius_over_module") * MODULE,
+        )
         angle = load_angle(gear, curvature)
         own = tooth_compliance(healthy_tooth(gear), curvature, strain, reach="to_centreline").total
         body = cross_compliance(gear, strain, angle, angle, pitches=0)
@@ -125,35 +128,49 @@ def test_crack_on_the_compression_side(strain):
 
 def test_breathing_on_the_tension_side_stays_open(strain):
     rows = next(rows for key, rows in groups("crack", *CRACKS).items() if key[1] == "tension")
-    assert_allclose(increments(strain, rows, faces="breathing"), increments(strain, rows), rtol=0, atol=0)
+    assert_allclose(
+        increments(strain, rows, faces="breathing"), increments(strain, rows), rtol=0, atol=0
+    )
 
 
 @pytest.mark.parametrize(("depth", "angle"), [(0.85, 45.0), (0.3, 80.0), (0.3, 20.0)])
 def test_outside_what_was_checked(strain, depth, angle):
     rows = next(iter(groups("crack", *CRACKS).values()))
     chord = float(rows[0]["depth_over_module"]) / float(rows[0]["depth_over_chord"])
-    odd = [{**row, "depth_over_module": str(depth * chord), "crack_angle_deg": str(angle)} for row in rows]
+    odd = [
+        {**row, "depth_over_module": str(depth * chord), "crack_angle_deg": str(angle)}
+        for row in rows
+    ]
     with pytest.raises(ExtrapolationError, match="calibrated crack was checked"):
         increments(strain, odd)
 
 
-@pytest.mark.parametrize("key", [key for key in groups("bores", "gear", "elasticity", "bore_radius_over_module")])
+@pytest.mark.parametrize(
+    "key", [key for key in groups("bores", "gear", "elasticity", "bore_radius_over_module")]
+)
 def test_ring_over_bores(xiamen, strain, stress, key):
     """Self within 5 %, cross within 5 % (2 % for the bores of the paper's pair as we take them)."""
     name, elasticity, bore = key
     material = strain if elasticity == "plane_strain" else stress
     pair, gear = xiamen.pair, getattr(xiamen.pair, name)
     own = type(gear)(
-        **{field: getattr(gear, field) for field in gear.__dataclass_fields__} | {"bore_radius": float(bore) * MODULE}
+        **{field: getattr(gear, field) for field in gear.__dataclass_fields__}
+        | {"bore_radius": float(bore) * MODULE}
     )
     rows = groups("bores", "gear", "elasticity", "bore_radius_over_module")[key]
     cross = [row for row in rows if row["kind"] == "cross"]
     entering = column(cross, "position_over_module") * MODULE
     curvature = pair.pinion_curvature if name == "pinion" else pair.wheel_curvature
-    angles = [load_angle(own, np.asarray(curvature(entering + shift))) for shift in (0.0, pair.base_pitch)]
-    found = cross_compliance(own, material, angles[0], angles[1], pitches=1 if name == "pinion" else -1)
+    angles = [
+        load_angle(own, np.asarray(curvature(entering + shift))) for shift in (0.0, pair.base_pitch)
+    ]
+    found = cross_compliance(
+        own, material, angles[0], angles[1], pitches=1 if name == "pinion" else -1
+    )
     tolerance = 0.02 if float(bore) * MODULE * 1e3 in (9.0, 15.0) else 0.05
-    assert_allclose(found * YOUNG * WIDTH / column(cross, "compliance"), 1.0, rtol=tolerance, atol=0)
+    assert_allclose(
+        found * YOUNG * WIDTH / column(cross, "compliance"), 1.0, rtol=tolerance, atol=0
+    )
 
 
 def three_d(fault, depth, extent, point, quantity, loaded="1"):
@@ -196,11 +213,20 @@ def test_partial_width_load_in_three_dimensions(machine):
         (pitted, radius), _ = three_d("pit", "0", "0", "C", "rigid", "0.5"), None
         position = np.array([radius - system.pair.start_curvature_radius])
         material = system.material.in_plane("plane_strain")
-        whole = sum(structural_terms(healthy_tooth(pinion), np.array([radius]), material, system.mesh).values())
-        share = tooth_compliance(healthy_tooth(pinion), np.array([radius]), material, reach="to_centreline").total
+        whole = sum(
+            structural_terms(
+                healthy_tooth(pinion), np.array([radius]), material, system.mesh
+            ).values()
+        )
+        share = tooth_compliance(
+            healthy_tooth(pinion), np.array([radius]), material, reach="to_centreline"
+        ).total
         own = slice_bending(system.pair, position, system.material, system.mesh)
         mate = tooth_compliance(
-            healthy_tooth(wheel), np.asarray(system.pair.wheel_curvature(position)), material, reach="to_centreline"
+            healthy_tooth(wheel),
+            np.asarray(system.pair.wheel_curvature(position)),
+            material,
+            reach="to_centreline",
         ).total
         # half of the slices bear: what is theirs counts twice; the wheel's part is not in this reference
         extra = own - mate if bending == "by_slice" else own

@@ -20,12 +20,20 @@ def physical(xiamen):
 
 
 def positions(system):
-    return np.clip(np.array(CURVATURE_MM) * 1e-3 - system.pair.start_curvature_radius, 0.0, system.pair.path_of_contact)
+    return np.clip(
+        np.array(CURVATURE_MM) * 1e-3 - system.pair.start_curvature_radius,
+        0.0,
+        system.pair.path_of_contact,
+    )
 
 
 def single_pair(system):
     curves = system.stiffness_curves()
-    return np.interp(positions(system) / system.pair.base_pitch, curves.contact_position, curves.single_pair_stiffness)
+    return np.interp(
+        positions(system) / system.pair.base_pitch,
+        curves.contact_position,
+        curves.single_pair_stiffness,
+    )
 
 
 def test_single_pair_against_finite_elements(physical):
@@ -46,7 +54,10 @@ def test_local_part_against_finite_elements(physical):
     at = positions(physical)
     width, load = physical.pair.pinion.face_width, physical.mesh_force
     found = weber_contact(physical.pair, at, physical.material).compliance(width, load)
-    assert np.all((found / (np.array(LOCAL_PART) * 1e-12) > 0.90) & (found / (np.array(LOCAL_PART) * 1e-12) < 0.95))
+    assert np.all(
+        (found / (np.array(LOCAL_PART) * 1e-12) > 0.90)
+        & (found / (np.array(LOCAL_PART) * 1e-12) < 0.95)
+    )
     assert linear_contact(at, physical.material).compliance(width, load)[0] < 0.3 * found.min()
 
 
@@ -72,13 +83,19 @@ def test_load_sharing_and_compliance_agree(physical):
     roll = physical.pair.base_pitch * (np.arange(40) + 0.5) / 40
     states = pair_states(table, roll)
     load = static_mesh(table, states, force).load
-    inside = (states.position > 0) & (states.position < physical.pair.path_of_contact) & (load > 0.1 * force)
+    inside = (
+        (states.position > 0)
+        & (states.position < physical.pair.path_of_contact)
+        & (load > 0.1 * force)
+    )
     at, width = states.position[inside], physical.pair.pinion.face_width
     own = states.compliance[inside] + table.shared_compliance
     law = weber_contact(physical.pair, at, physical.material)
     contact, full = law.compliance(width, load[inside]), law.compliance(width, force)
     curves = physical.stiffness_curves()
-    alone = 1.0 / np.interp(at / physical.pair.base_pitch, curves.contact_position, curves.single_pair_stiffness)
+    alone = 1.0 / np.interp(
+        at / physical.pair.base_pitch, curves.contact_position, curves.single_pair_stiffness
+    )
     assert_allclose(own - contact, alone - full, rtol=2e-3, atol=0)
 
 

@@ -47,7 +47,9 @@ class TestFourMilliseconds:
             dynamics = dynamics_of(system, phase=PHASE)
             start, step = at_rest(dynamics), 1 / (SAMPLING_RATE * oversampling)
             _, v = trajectory(dynamics, start[:6], start[6:], step, cls.N_SAMPLES * oversampling)
-            return (np.linalg.norm(v[::oversampling] - exact, axis=0) / np.linalg.norm(exact, axis=0)).max()
+            return (
+                np.linalg.norm(v[::oversampling] - exact, axis=0) / np.linalg.norm(exact, axis=0)
+            ).max()
 
         return measured
 
@@ -74,7 +76,10 @@ class Case:
 
     @property
     def changes(self):
-        return {"operating.speed_rpm": self.speed_rpm, "operating.duration_s": self.n_periods * self.period}
+        return {
+            "operating.speed_rpm": self.speed_rpm,
+            "operating.duration_s": self.n_periods * self.period,
+        }
 
     @property
     def mesh_frequency(self):
@@ -100,14 +105,24 @@ def periodic_motion(dynamics, period, n_points):
     that what is periodic turns at the set speed, and the period is known.
     """
     slope, free = equations(dynamics)
-    stiffness, direction, mass = dynamics.mean_mesh_stiffness, dynamics.approach_direction(), dynamics.system().mass
-    damping = 2 * dynamics.table.options.damping_ratio * math.sqrt(stiffness * dynamics.equivalent_mass)
+    stiffness, direction, mass = (
+        dynamics.mean_mesh_stiffness,
+        dynamics.approach_direction(),
+        dynamics.system().mass,
+    )
+    damping = (
+        2 * dynamics.table.options.damping_ratio * math.sqrt(stiffness * dynamics.equivalent_mass)
+    )
     held = free.copy()
-    held[6:] -= np.outer(direction / mass, np.concatenate([stiffness * direction, damping * direction]))
+    held[6:] -= np.outer(
+        direction / mass, np.concatenate([stiffness * direction, damping * direction])
+    )
     returns = expm(held * period) - np.eye(12)
     start, times = at_rest(dynamics), np.linspace(0.0, period, n_points + 1)
     for rtol in (1e-5, 1e-5, 1e-6, 1e-8):
-        start = start - np.linalg.solve(returns, solved(slope, start, times, "LSODA", rtol)[-1] - start)
+        start = start - np.linalg.solve(
+            returns, solved(slope, start, times, "LSODA", rtol)[-1] - start
+        )
     return solved(slope, start, times, "LSODA", 1e-8)
 
 
@@ -134,9 +149,13 @@ class TestPeriodicMotion:
 
         def found(oversampling, changes=None, phase=PHASE):
             system = machine({**case.changes, **(changes or {})})
-            system = replace(system, solver=replace(system.solver, oversampling=oversampling, max_error=None))
+            system = replace(
+                system, solver=replace(system.solver, oversampling=oversampling, max_error=None)
+            )
             start = Start(tooth_pinion=0, tooth_wheel=0, phase=phase)
-            return np.fft.rfft(system.simulate(case.faults, start=start).acceleration, norm="forward")
+            return np.fft.rfft(
+                system.simulate(case.faults, start=start).acceleration, norm="forward"
+            )
 
         return found
 
@@ -200,7 +219,9 @@ class TestOutOfContact:
         bouncing = {"operating.torque_nm": 1.0, "operating.speed_rpm": 3600, "operating.duration_s": 0.2,
                     "solver.oversampling": 5, "solver.max_error": None}  # fmt: skip
         changes = ({}, {"solver.oversampling": 20}, {"operating.torque_nm": 1.1})
-        return simulate_together([Run(system=machine({**bouncing, **change}), faults=missing) for change in changes])
+        return simulate_together(
+            [Run(system=machine({**bouncing, **change}), faults=missing) for change in changes]
+        )
 
     def test_they_are(self, records):
         assert min(record.contact_loss_fraction for record in records) > 0.05

@@ -46,7 +46,9 @@ def rack_clearance(gear, x, y):
         from_tip, from_flank = deep, -along * math.cos(alpha) + deep * math.sin(alpha)
         on_tip, on_flank = along > 0, -along * math.sin(alpha) - deep * math.cos(alpha) > 0
         outside = np.where(
-            on_tip & (from_tip > 0), from_tip, np.where(on_flank & (from_flank > 0), from_flank, np.hypot(along, deep))
+            on_tip & (from_tip > 0),
+            from_tip,
+            np.where(on_flank & (from_flank > 0), from_flank, np.hypot(along, deep)),
         )
         inside = (from_tip <= 0) & (from_flank <= 0)
         return np.where(inside, np.maximum(from_tip, from_flank), outside) - rounding

@@ -40,7 +40,9 @@ def violation(states, static, shared, force):
     C is the full flexibility matrix, own compliances on the diagonal and the shared body compliance everywhere.
     """
     flexibility = np.einsum("ij,jk->ijk", states.compliance, np.eye(4)) + shared
-    slack = states.gap + np.einsum("ijk,ik->ij", flexibility, static.load) - static.approach[:, None]
+    slack = (
+        states.gap + np.einsum("ijk,ik->ij", flexibility, static.load) - static.approach[:, None]
+    )
     scale = static.approach.max()
     carrying = static.load > 0
     return max(
@@ -85,7 +87,9 @@ def test_equilibrium_with_every_fault_over_a_turn(xiamen, kind, gear):
     assert share.min() >= 0
     sound = static_mesh(xiamen.mesh_table(), pair_states(xiamen.mesh_table(), roll), force)
     assert np.abs(static.load - sound.load).max() > 1e-3 * force
-    assert violation(states, replace(static, load=sound.load), faulty.shared_compliance, force) > 1e-6
+    assert (
+        violation(states, replace(static, load=sound.load), faulty.shared_compliance, force) > 1e-6
+    )
 
 
 def test_approach_rises_with_force_and_stiffness_is_its_slope(table):
@@ -97,7 +101,9 @@ def test_approach_rises_with_force_and_stiffness_is_its_slope(table):
     same = ((low.load > 0) == (high.load > 0)).all(axis=1)
     slope = 2e-4 / (high.approach - low.approach)
     assert same.mean() > 0.9
-    assert_allclose(static_mesh(table, states, 1000.0).stiffness[same], slope[same], rtol=1e-5, atol=0)
+    assert_allclose(
+        static_mesh(table, states, 1000.0).stiffness[same], slope[same], rtol=1e-5, atol=0
+    )
 
 
 def test_shares_of_the_stiffness_curves_sum_to_one(xiamen):
@@ -146,7 +152,10 @@ def test_start_teeth_shift_the_fault(xiamen, gear):
     roll = xiamen.pair.base_pitch * np.linspace(0, 3, 60, endpoint=False)
     shifted = pair_states(table, roll, **{f"start_tooth_{gear}": 6})
     assert_allclose(
-        shifted.compliance, pair_states(table, roll + 6 * xiamen.pair.base_pitch).compliance, rtol=1e-9, atol=0
+        shifted.compliance,
+        pair_states(table, roll + 6 * xiamen.pair.base_pitch).compliance,
+        rtol=1e-9,
+        atol=0,
     )
     assert np.abs(shifted.compliance - pair_states(table, roll).compliance).max() > 1e-10
 
@@ -171,7 +180,9 @@ class TestPaperLaw:
         roll = pitch * (np.arange(20000) + 0.5) / 20000
         n_carrying = (static_mesh(table, pair_states(table, roll), 925.0).load > 0).sum(axis=1)
         assert set(n_carrying.tolist()) == {1, 2}
-        assert_allclose(n_carrying.mean(), paper_machine.pair.transverse_contact_ratio, rtol=0, atol=1e-4)
+        assert_allclose(
+            n_carrying.mean(), paper_machine.pair.transverse_contact_ratio, rtol=0, atol=1e-4
+        )
 
     def test_the_one_sided_law_keeps_pairs_longer(self, xiamen):
         roll = xiamen.pair.base_pitch * (np.arange(2000) + 0.5) / 2000
@@ -200,6 +211,8 @@ class TestPaperLaw:
         assert_allclose(curves.mesh_stiffness[:20], expected, rtol=2e-3, atol=0)
 
     def test_no_pair_no_stiffness(self, paper_machine):
-        curves = paper_machine.stiffness_curves((fault("missing_tooth", tooth=0),), points_per_tooth=200)
+        curves = paper_machine.stiffness_curves(
+            (fault("missing_tooth", tooth=0),), points_per_tooth=200
+        )
         lost = np.mean(curves.mesh_stiffness <= 0) * 23
         assert_allclose(lost, 2 - paper_machine.pair.transverse_contact_ratio, rtol=0, atol=0.01)

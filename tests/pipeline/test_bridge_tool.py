@@ -24,8 +24,12 @@ FAST = [
 
 
 def world(seed=0, n_channels=1):
-    made = FakeDataset(n_units=12, records_per_unit=8, duration=0.5, n_channels=n_channels, seed=seed)
-    made.columns["gearbox_id"] = np.array([f"g{index % 2}" for index in np.repeat(np.arange(12), 8)])
+    made = FakeDataset(
+        n_units=12, records_per_unit=8, duration=0.5, n_channels=n_channels, seed=seed
+    )
+    made.columns["gearbox_id"] = np.array(
+        [f"g{index % 2}" for index in np.repeat(np.arange(12), 8)]
+    )
     return made
 
 
@@ -51,13 +55,19 @@ def test_scores_know_a_perfect_variant_from_chance():
         worlds.Judged(
             label=label,
             unit=unit,
-            log_probability={worlds.BEFORE: random, "same": random, "perfect": np.stack([sure, sure])},
+            log_probability={
+                worlds.BEFORE: random,
+                "same": random,
+                "perfect": np.stack([sure, sure]),
+            },
             n_windows=1,
         ),
         CLASSES,
     )
     assert found["perfect"]["balanced_accuracy"] == found["perfect"]["auroc"] == 1.0
-    assert found["perfect"]["gain"] == pytest.approx(1.0 - found[worlds.BEFORE]["balanced_accuracy"])
+    assert found["perfect"]["gain"] == pytest.approx(
+        1.0 - found[worlds.BEFORE]["balanced_accuracy"]
+    )
     assert found["perfect"]["gain_interval"][0] > 0.5
     assert found["same"]["gain_interval"] == [0.0, 0.0]
     low, high = found[worlds.BEFORE]["interval"]
@@ -77,7 +87,9 @@ def test_every_variant_judges_units_that_no_adaptation_saw(model):
     for name, values in judged.log_probability.items():
         assert values.shape == (1, judged.label.size, 4)
         assert np.isfinite(values).all()
-        assert (name == worlds.BEFORE) == np.array_equal(values, judged.log_probability[worlds.BEFORE])
+        assert (name == worlds.BEFORE) == np.array_equal(
+            values, judged.log_probability[worlds.BEFORE]
+        )
 
 
 def recorded(folder, gain):
@@ -94,14 +106,20 @@ def recorded(folder, gain):
     return folder / "negative_control_x.npz"
 
 
-def test_the_control_has_a_row_for_every_case_and_forgives_a_sound_gear(model, tmp_path, monkeypatch):
+def test_the_control_has_a_row_for_every_case_and_forgives_a_sound_gear(
+    model, tmp_path, monkeypatch
+):
     monkeypatch.delenv(control.VARIABLE, raising=False)
     assert control.find_control() is None
     file = recorded(tmp_path, 20.0)
     monkeypatch.setenv(control.VARIABLE, str(tmp_path))
     assert control.find_control() == file
     rows = control.judge_control(file, [model])
-    assert len({(row["channel"], row["load"], row["variant"]) for row in rows}) == len(rows) == 2 * 3 * 3
+    assert (
+        len({(row["channel"], row["load"], row["variant"]) for row in rows})
+        == len(rows)
+        == 2 * 3 * 3
+    )
     assert {row["n_windows"] for row in rows} == {20}
     alike = [row for row in rows if row["channel"] == 1]
     assert sum(row["contains_zero"] or row["refuses_both"] for row in alike) >= 7
@@ -119,4 +137,6 @@ def test_a_difference_is_told_from_none():
     assert not row["refuses_both"]
     shifted = {**noise, "broken_tooth": noise["broken_tooth"] + 0.3}
     assert not control._row(shifted, told, np.random.default_rng(1))["contains_zero"]
-    assert control._row(noise, {state: np.ones(20) for state in noise}, np.random.default_rng(1))["refuses_both"]
+    assert control._row(noise, {state: np.ones(20) for state in noise}, np.random.default_rng(1))[
+        "refuses_both"
+    ]

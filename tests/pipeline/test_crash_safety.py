@@ -54,7 +54,15 @@ def resume(out: Path, *words: str) -> int:
 
 
 def test_killed_at_random_moments_it_ends_byte_equal() -> None:
-    command = [sys.executable, "-m", "benchmarks.kill_campaign", "--kills", "5", "--seed", str(time.time_ns())]
+    command = [
+        sys.executable,
+        "-m",
+        "benchmarks.kill_campaign",
+        "--kills",
+        "5",
+        "--seed",
+        str(time.time_ns()),
+    ]
     result = subprocess.run(command, cwd=ROOT, capture_output=True, text=True, check=False)
     assert result.returncode == 0, f"{command}\n{result.stdout}{result.stderr}"
 
@@ -70,9 +78,20 @@ def alive_in_group(group: int) -> list[str]:
     return found
 
 
-def test_interrupt_from_a_terminal_reaches_all_processes_and_is_one_line(reference: Path, tmp_path: Path) -> None:
+def test_interrupt_from_a_terminal_reaches_all_processes_and_is_one_line(
+    reference: Path, tmp_path: Path
+) -> None:
     out = tmp_path / "data"
-    command = [sys.executable, "-m", "gensig.cli", "generate", "--quiet", *TINY, "executor.n_workers=2", f"out={out}"]
+    command = [
+        sys.executable,
+        "-m",
+        "gensig.cli",
+        "generate",
+        "--quiet",
+        *TINY,
+        "executor.n_workers=2",
+        f"out={out}",
+    ]
     process = subprocess.Popen(command, stderr=subprocess.PIPE, text=True, start_new_session=True)
     while not (out / "manifest.json").is_file():
         assert process.poll() is None
@@ -96,13 +115,17 @@ def small_disk(folder: Path) -> Iterator[Callable[[int], None] | None]:
     """A disk of its own that can be enlarged; None where none can be mounted."""
     folder.mkdir()
     mounted = subprocess.run(
-        ["mount", "-t", "tmpfs", "-o", "size=100k", "tmpfs", str(folder)], capture_output=True, check=False
+        ["mount", "-t", "tmpfs", "-o", "size=100k", "tmpfs", str(folder)],
+        capture_output=True,
+        check=False,
     )
     if mounted.returncode:
         yield None
         return
     try:
-        yield lambda size: subprocess.run(["mount", "-o", f"remount,size={size}", str(folder)], check=True)
+        yield lambda size: subprocess.run(
+            ["mount", "-o", f"remount,size={size}", str(folder)], check=True
+        )
     finally:
         subprocess.run(["umount", str(folder)], check=True)
 
@@ -139,7 +162,9 @@ def closed(folder: Path) -> Iterator[None]:
     """A folder that may not be written, not even by root."""
     is_root = os.geteuid() == 0
     if is_root:
-        changed = shutil.which("chattr") and subprocess.run(["chattr", "+i", folder], capture_output=True, check=False)
+        changed = shutil.which("chattr") and subprocess.run(
+            ["chattr", "+i", folder], capture_output=True, check=False
+        )
         if not changed or changed.returncode:
             pytest.skip("root writes everywhere on this file system")
     else:
@@ -202,7 +227,11 @@ def change_plan(out: Path) -> None:
     ],
 )
 def test_resume_with_another_identity_is_refused(
-    begun: Path, change: Callable, words: tuple[str, ...], hints: tuple[str, ...], capsys: pytest.CaptureFixture[str]
+    begun: Path,
+    change: Callable,
+    words: tuple[str, ...],
+    hints: tuple[str, ...],
+    capsys: pytest.CaptureFixture[str],
 ) -> None:
     change(begun)
     before = {path: path.read_bytes() for path in begun.rglob("*") if path.is_file()}
@@ -212,7 +241,9 @@ def test_resume_with_another_identity_is_refused(
     assert {path: path.read_bytes() for path in begun.rglob("*") if path.is_file()} == before
 
 
-def test_what_was_begun_says_how_it_is_finished(begun: Path, capsys: pytest.CaptureFixture[str]) -> None:
+def test_what_was_begun_says_how_it_is_finished(
+    begun: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
     how = f"2 of 6 records done; `gensig resume {begun}` finishes it"
     assert main(["generate", *TINY, f"out={begun}"]) == 2
     assert how in capsys.readouterr().err
@@ -236,7 +267,9 @@ def test_a_change_is_refused_where_the_options_it_began_with_are_not_known(
     assert resume(out) == 0
 
 
-def test_a_change_is_named_before_any_shard_is_done(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
+def test_a_change_is_named_before_any_shard_is_done(
+    tmp_path: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
     out = tmp_path / "data"
     assert main(["plan", "--freeze", *TINY, f"out={out}"]) == 0
     change_config(out)
@@ -260,7 +293,10 @@ def test_a_killed_beginning_says_what_to_do_and_is_begun_anew(
         "main(sys.argv[1:])"
     )
     words = ["generate", "--quiet", *TINY, "executor.n_workers=1", f"out={out}"]
-    assert subprocess.run([sys.executable, "-c", code, *words], check=False).returncode == -signal.SIGKILL
+    assert (
+        subprocess.run([sys.executable, "-c", code, *words], check=False).returncode
+        == -signal.SIGKILL
+    )
     assert (out / "plan.csv").is_file()
     assert not (out / "manifest.json").exists()
     for verb in ("resume", "verify", "finalize", "inspect"):

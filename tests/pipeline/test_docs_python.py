@@ -23,14 +23,18 @@ SMALL = (
 
 
 def _python(page: Path) -> list[Block]:
-    return [block for block in blocks(page.read_text(encoding="utf-8")) if block.language == "python"]
+    return [
+        block for block in blocks(page.read_text(encoding="utf-8")) if block.language == "python"
+    ]
 
 
 def _runs(block: Block) -> bool:
     return not block.mark.startswith(("not run: ", "run by "))
 
 
-RUN = [page for page in PAGES if page.parent != ROOT and any(_runs(block) for block in _python(page))]
+RUN = [
+    page for page in PAGES if page.parent != ROOT and any(_runs(block) for block in _python(page))
+]
 
 
 @pytest.fixture(scope="module")
@@ -54,7 +58,9 @@ def test_python_compiles_and_says_who_runs_it(page: Path) -> None:
 
 
 @pytest.mark.parametrize("page", RUN, ids=lambda page: page.name)
-def test_python_runs_as_it_stands(page: Path, folder: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+def test_python_runs_as_it_stands(
+    page: Path, folder: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
     monkeypatch.chdir(folder)
     names: dict[str, object] = {}
     for block in filter(_runs, _python(page)):

@@ -72,7 +72,9 @@ def refuse(notes: Path, index: int) -> int:
 
 @pytest.mark.parametrize("n_workers", [1, 2])
 def test_an_exception_is_one_line_and_not_tried_again(tmp_path: Path, n_workers: int) -> None:
-    results = dict(LocalExecutor(n_workers=n_workers).run(functools.partial(refuse, tmp_path), range(3)))
+    results = dict(
+        LocalExecutor(n_workers=n_workers).run(functools.partial(refuse, tmp_path), range(3))
+    )
     assert results == {0: 0, 1: ShardFailure(reason="ValueError: no such luck"), 2: 2}
     assert len(list(tmp_path.iterdir())) == 3
 
@@ -122,7 +124,11 @@ def test_a_script_without_a_main_guard_runs_once(tmp_path: Path) -> None:
     )
     ran = subprocess.run([sys.executable, script], capture_output=True, text=True, timeout=120)
     assert ran.returncode == 0, ran.stderr
-    assert ran.stdout.splitlines() == ["begun", "[(0, 0), (1, -1), (2, -2), (3, -3)]", f"{script} None"]
+    assert ran.stdout.splitlines() == [
+        "begun",
+        "[(0, 0), (1, -1), (2, -2), (3, -3)]",
+        f"{script} None",
+    ]
     assert not ran.stderr
 
 
@@ -141,7 +147,10 @@ def test_tasks_of_an_array_share_all_shards_out() -> None:
         ({"kind": "cloud"}, "local, dask, slurm"),
         ({"kind": "local", "n_workers": 0}, "executor.n_workers"),
         ({"kind": "dask", "n_workers": 1, "address": 3}, "executor.address"),
-        ({"kind": "slurm", "n_workers": 1, "shard_index": None, "shard_count": 2}, "executor.shard_index"),
+        (
+            {"kind": "slurm", "n_workers": 1, "shard_index": None, "shard_count": 2},
+            "executor.shard_index",
+        ),
         ({"kind": "slurm", "n_workers": 1, "shard_index": 2, "shard_count": 2}, "--array=0-1"),
         ({"kind": "slurm", "n_workers": 1, "shard_index": -1, "shard_count": 2}, "at least 0"),
     ],
@@ -184,7 +193,9 @@ def test_two_tasks_at_a_time_make_the_same_bytes(
 
 
 @pytest.mark.parametrize("words", [(), ("dataset.compression=gzip", "dataset.sample_type=int16")])
-def test_plan_predicts_bytes(tmp_path: Path, words: tuple[str, ...], capsys: pytest.CaptureFixture[str]) -> None:
+def test_plan_predicts_bytes(
+    tmp_path: Path, words: tuple[str, ...], capsys: pytest.CaptureFixture[str]
+) -> None:
     overrides = ("dataset.records_per_shard=2", *words)
     out = make(tmp_path / "data", *overrides)
     n_bytes = sum(path.stat().st_size for path in out.rglob("*") if path.is_file())
@@ -196,7 +207,12 @@ def test_plan_predicts_bytes(tmp_path: Path, words: tuple[str, ...], capsys: pyt
 
 
 def test_a_task_needs_a_frozen_folder(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
-    words = ["executor=slurm", "executor.shard_index=0", "executor.shard_count=1", f"out={tmp_path / 'x'}"]
+    words = [
+        "executor=slurm",
+        "executor.shard_index=0",
+        "executor.shard_count=1",
+        f"out={tmp_path / 'x'}",
+    ]
     assert main(["generate", *words]) == 2
     assert "--freeze" in capsys.readouterr().err
     assert not (tmp_path / "x").exists()
@@ -205,7 +221,9 @@ def test_a_task_needs_a_frozen_folder(tmp_path: Path, capsys: pytest.CaptureFixt
 
 
 @pytest.fixture(scope="module")
-def cluster(tmp_path_factory: pytest.TempPathFactory) -> Iterator[tuple[str, list[subprocess.Popen]]]:
+def cluster(
+    tmp_path_factory: pytest.TempPathFactory,
+) -> Iterator[tuple[str, list[subprocess.Popen]]]:
     """Address of a Dask scheduler process, and two worker processes."""
     import json
 
@@ -214,7 +232,14 @@ def cluster(tmp_path_factory: pytest.TempPathFactory) -> Iterator[tuple[str, lis
     environment = {**os.environ, "PYTHONPATH": str(Path(__file__).parent)}
 
     def start(*words: str) -> subprocess.Popen:
-        command = [sys.executable, "-m", "distributed.cli.dask_" + words[0], *words[1:], "--scheduler-file", str(note)]
+        command = [
+            sys.executable,
+            "-m",
+            "distributed.cli.dask_" + words[0],
+            *words[1:],
+            "--scheduler-file",
+            str(note),
+        ]
         with (folder / "log").open("a") as log:
             return subprocess.Popen(command, cwd=folder, env=environment, stdout=log, stderr=log)
 
@@ -248,7 +273,19 @@ def test_dask_survives_a_killed_worker_with_the_same_bytes(
 
     thread = threading.Thread(target=kill_in_mid_run)
     thread.start()
-    assert main(["generate", "--quiet", *TINY, "executor=dask", f"executor.address={address}", f"out={out}"]) == 0
+    assert (
+        main(
+            [
+                "generate",
+                "--quiet",
+                *TINY,
+                "executor=dask",
+                f"executor.address={address}",
+                f"out={out}",
+            ]
+        )
+        == 0
+    )
     thread.join()
     assert killed.is_set()
     assert contents(out) == contents(reference)

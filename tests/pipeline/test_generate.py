@@ -43,12 +43,18 @@ def signals(folder: Path) -> np.ndarray:
 
 
 @pytest.mark.parametrize("per_shard", [1, 3])
-def test_bits_do_not_depend_on_shards_or_workers(reference: Path, tmp_path: Path, per_shard: int) -> None:
-    other = make(tmp_path / "data", f"dataset.records_per_shard={per_shard}", "executor.n_workers=2")
+def test_bits_do_not_depend_on_shards_or_workers(
+    reference: Path, tmp_path: Path, per_shard: int
+) -> None:
+    other = make(
+        tmp_path / "data", f"dataset.records_per_shard={per_shard}", "executor.n_workers=2"
+    )
     assert signals(other).tobytes() == signals(reference).tobytes()
 
 
-def test_same_configuration_gives_the_same_bytes_and_another_seed_does_not(reference: Path, tmp_path: Path) -> None:
+def test_same_configuration_gives_the_same_bytes_and_another_seed_does_not(
+    reference: Path, tmp_path: Path
+) -> None:
     same = make(tmp_path / "same", "executor.n_workers=1")
     for name in ("plan.csv", "index.h5", "shards/shard-00000.h5"):
         assert (same / name).read_bytes() == (reference / name).read_bytes(), name
@@ -67,7 +73,9 @@ def test_a_data_set_is_labelled_and_whole(reference: Path) -> None:
         assert data.attributes["n_teeth_pinion"] == 23
         severity, label = data.column("severity"), data.column("label")
         assert np.all((severity == 0.0) == (label == 0))
-        assert np.allclose(data.column("speed_rpm"), data.column("speed_set_rpm"), rtol=2e-3, atol=0.0)
+        assert np.allclose(
+            data.column("speed_rpm"), data.column("speed_set_rpm"), rtol=2e-3, atol=0.0
+        )
         gears = data.column("fault_gear")
         assert set(gears[label > 0]) == {"pinion"}
     with h5py.File(reference / "index.h5") as index:
@@ -85,16 +93,27 @@ def test_noise_floor_is_the_same_for_every_class_of_a_condition(reference: Path)
 
 
 def test_sham_plan_keeps_labels_without_faults(tmp_path: Path) -> None:
-    folder = make(tmp_path / "data", "plan.sham=true", "sensing.snr_db=null", "dataset.records_per_shard=8")
+    folder = make(
+        tmp_path / "data", "plan.sham=true", "sensing.snr_db=null", "dataset.records_per_shard=8"
+    )
     with gensig.open_dataset(folder) as data:
         assert set(data.column("severity")) == {0.0}
         assert len(set(data.column("label"))) == 4
-        level = {name: np.std(data.signals(i)[1]) for i, name in enumerate(data.column("label_name"))}
+        level = {
+            name: np.std(data.signals(i)[1]) for i, name in enumerate(data.column("label_name"))
+        }
     assert level["missing_tooth"] < 1.3 * level["healthy"]
 
 
 def test_multirun_makes_one_data_set_each(tmp_path: Path) -> None:
-    words = ["generate", "--quiet", "-m", "fault=healthy,crack", "plan.n_records=1", "operating.duration_s=0.02"]
+    words = [
+        "generate",
+        "--quiet",
+        "-m",
+        "fault=healthy,crack",
+        "plan.n_records=1",
+        "operating.duration_s=0.02",
+    ]
     assert main([*words, f"out={tmp_path / 'all'}"]) == 0
     folders = sorted(path.name for path in (tmp_path / "all").iterdir())
     assert folders == ["0-fault=healthy", "1-fault=crack"]
@@ -104,7 +123,12 @@ def test_multirun_makes_one_data_set_each(tmp_path: Path) -> None:
 
 
 def test_python_interface_makes_and_opens(tmp_path: Path) -> None:
-    words = ("plan.n_records=2", "plan.classes=[healthy,crack]", "operating.duration_s=0.02", "executor.n_workers=1")
+    words = (
+        "plan.n_records=2",
+        "plan.classes=[healthy,crack]",
+        "operating.duration_s=0.02",
+        "executor.n_workers=1",
+    )
     with gensig.generate(*words, out=tmp_path / "data") as data:
         assert data.n_records == 2
 
@@ -152,7 +176,15 @@ def test_disk_refusing_is_one_line_and_leaves_an_incomplete_set(tmp_path: Path) 
         resource.setrlimit(resource.RLIMIT_FSIZE, (100_000, 100_000))
 
     result = subprocess.run(
-        [sys.executable, "-m", "gensig.cli", "generate", *SMALL, "executor.n_workers=1", f"out={out}"],
+        [
+            sys.executable,
+            "-m",
+            "gensig.cli",
+            "generate",
+            *SMALL,
+            "executor.n_workers=1",
+            f"out={out}",
+        ],
         preexec_fn=no_large_files,
         capture_output=True,
         text=True,

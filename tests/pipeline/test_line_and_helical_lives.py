@@ -45,7 +45,9 @@ def test_a_crack_of_a_drive_line_grows_by_the_impacts_of_its_mesh(line):
     # the mean load of the pump drive would leave it below the threshold
     assert columns["params/fault.stress_intensity_range_mpa_sqrt_m"][crack].min() > 5.0
     # turns of the driving gear, whose shaft has half the crank's speed
-    running = columns["life_cycles"][crack][1] / (60.0 * 0.5 * columns["speed_set_rpm"][crack][1] * 2.0)
+    running = columns["life_cycles"][crack][1] / (
+        60.0 * 0.5 * columns["speed_set_rpm"][crack][1] * 2.0
+    )
     assert running <= columns["life_time_h"][crack][1] * (1.0 + 1e-9)
     assert_allclose(columns["speed_set_rpm"], 844.0, rtol=1e-9)
     assert_array_equal(columns["torque_nm"], 12680.0)
@@ -81,5 +83,7 @@ def test_cracks_and_pits_of_helical_pairs_make_lives():
     assert (np.diff(columns["severity"][crack]) > 0.0).all()
     assert columns["life_growing"].all()
     assert (np.diff(columns["params/fault.pitting_damage"][~crack]) > 0.0).all()
-    record = simulate_records(read_request(list(HELICAL)).config, [plan.record(int(np.flatnonzero(crack)[-1]))])[0]
+    record = simulate_records(
+        read_request(list(HELICAL)).config, [plan.record(int(np.flatnonzero(crack)[-1]))]
+    )[0]
     assert np.isfinite(record.signals["acceleration"]).all()

@@ -20,7 +20,11 @@ SMALLER = {"plan.n_records=40": "plan.n_records=4", "plan.n_units=10": "plan.n_u
 
 @pytest.fixture(scope="module")
 def folder(tmp_path_factory):
-    return make(tmp_path_factory.mktemp("drifting") / "data", "operating=drifting", "dataset.store_operating=true")
+    return make(
+        tmp_path_factory.mktemp("drifting") / "data",
+        "operating=drifting",
+        "dataset.store_operating=true",
+    )
 
 
 def test_generate_verify_reproduce(folder, capsys):
@@ -41,7 +45,19 @@ def test_the_traces_are_in_the_file(folder):
 def test_the_configuration_tells_the_duration_of_turns(tmp_path):
     words = [word for word in TINY if not word.startswith("operating.")]
     out = tmp_path / "data"
-    assert main(["generate", "--quiet", *words, "executor.n_workers=1", "operating.turns=1", f"out={out}"]) == 0
+    assert (
+        main(
+            [
+                "generate",
+                "--quiet",
+                *words,
+                "executor.n_workers=1",
+                "operating.turns=1",
+                f"out={out}",
+            ]
+        )
+        == 0
+    )
     told = yaml.safe_load((out / "config.yaml").read_text(encoding="utf-8"))["operating"]
     assert told["turns"] == 1
     assert told["duration_s"] == pytest.approx(1 / 30, abs=1 / 51200)
@@ -51,7 +67,9 @@ def test_the_configuration_tells_the_duration_of_turns(tmp_path):
 
 @pytest.mark.parametrize("value", ["1", "null", "yes"])
 def test_the_switch_is_true_or_false(value, tmp_path, capsys):
-    assert main(["generate", *TINY, f"dataset.store_operating={value}", f"out={tmp_path / 'x'}"]) != 0
+    assert (
+        main(["generate", *TINY, f"dataset.store_operating={value}", f"out={tmp_path / 'x'}"]) != 0
+    )
     assert "dataset.store_operating = " in capsys.readouterr().err
 
 

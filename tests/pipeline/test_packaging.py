@@ -98,7 +98,9 @@ def test_wheel_holds_the_packages_and_nothing_else(wheel: Path) -> None:
 
 def test_wheel_runs_from_another_folder(python: Path, tmp_path: Path) -> None:
     def run(*command: str | Path) -> str:
-        done = subprocess.run(command, cwd=tmp_path, env=ENVIRONMENT, capture_output=True, text=True, check=False)
+        done = subprocess.run(
+            command, cwd=tmp_path, env=ENVIRONMENT, capture_output=True, text=True, check=False
+        )
         assert done.returncode == 0, done.stderr
         return done.stdout
 
@@ -115,15 +117,31 @@ def test_wheel_runs_from_another_folder(python: Path, tmp_path: Path) -> None:
 def test_tests_run_from_the_wheel(source: Path, python: Path) -> None:
     """A file of them; `make wheel-test` runs all."""
     take_packages_out(source, python)
-    assert run_tests(source, python, ["-q", "-p", "no:cacheprovider", "tests/unit/test_units.py"], ENVIRONMENT) == 0
+    assert (
+        run_tests(
+            source,
+            python,
+            ["-q", "-p", "no:cacheprovider", "tests/unit/test_units.py"],
+            ENVIRONMENT,
+        )
+        == 0
+    )
 
 
 def test_types_reach_those_who_use_the_wheel(python: Path, tmp_path: Path) -> None:
     (tmp_path / "typed.py").write_text(TYPED)
     (tmp_path / "mistyped.py").write_text(MISTYPED)
-    options = ["--python-executable", str(python), "--follow-imports=silent", "--cache-dir", str(tmp_path / "cache")]
+    options = [
+        "--python-executable",
+        str(python),
+        "--follow-imports=silent",
+        "--cache-dir",
+        str(tmp_path / "cache"),
+    ]
     command = [sys.executable, "-m", "mypy", *options, "typed.py", "mistyped.py"]
-    shown = subprocess.run(command, cwd=tmp_path, env=ENVIRONMENT, capture_output=True, text=True, check=False).stdout
+    shown = subprocess.run(
+        command, cwd=tmp_path, env=ENVIRONMENT, capture_output=True, text=True, check=False
+    ).stdout
     errors = [line.split(" error: ")[0] for line in shown.splitlines() if " error: " in line]
     assert errors == ["mistyped.py:4:", "mistyped.py:5:"], shown
 
@@ -131,11 +149,27 @@ def test_types_reach_those_who_use_the_wheel(python: Path, tmp_path: Path) -> No
 def test_all_is_every_extra_that_a_command_asks_for() -> None:
     extras = PROJECT["optional-dependencies"]
     of_commands = set(extras) - NOT_FOR_COMMANDS
-    assert {line for name in of_commands for line in extras[name]} <= {*extras["test"], "torch>=2.6"}  # tests try them
-    assert extras["all"] == [f"gensig[{','.join(name for name in extras if name not in NOT_FOR_COMMANDS)}]"]
-    files = [path for name in ("gensig", "diagnose", "configs", "docs") for path in (ROOT / name).rglob("*")]
-    texts = [path.read_text(encoding="utf-8") for path in files if path.suffix in (".py", ".yaml", ".md")]
-    named = {name for text in texts for part in re.findall(r"gensig\[([\w, ]+)\]", text) for name in part.split(",")}
+    assert {line for name in of_commands for line in extras[name]} <= {
+        *extras["test"],
+        "torch>=2.6",
+    }  # tests try them
+    assert extras["all"] == [
+        f"gensig[{','.join(name for name in extras if name not in NOT_FOR_COMMANDS)}]"
+    ]
+    files = [
+        path
+        for name in ("gensig", "diagnose", "configs", "docs")
+        for path in (ROOT / name).rglob("*")
+    ]
+    texts = [
+        path.read_text(encoding="utf-8") for path in files if path.suffix in (".py", ".yaml", ".md")
+    ]
+    named = {
+        name
+        for text in texts
+        for part in re.findall(r"gensig\[([\w, ]+)\]", text)
+        for name in part.split(",")
+    }
     assert of_commands <= named  # whoever lacks a package is told the extra that brings it
     assert named <= set(extras)
 

@@ -17,7 +17,9 @@ PROGRAMS = {"gensig": "gensig.cli", "diagnose": "diagnose.cli"}
 
 def block(title: str) -> str:
     """The code of the section with this title."""
-    (code,) = re.findall(rf"^## {title}\n.*?^```\w+\n(.*?)^```", TEXT, flags=re.DOTALL | re.MULTILINE)
+    (code,) = re.findall(
+        rf"^## {title}\n.*?^```\w+\n(.*?)^```", TEXT, flags=re.DOTALL | re.MULTILINE
+    )
     return code
 
 
@@ -38,7 +40,12 @@ def ran(words: list[str], folder: Path) -> str:
     """What a command prints; fails where it fails."""
     paths = {"PATH": f"{folder / 'bin'}{os.pathsep}{os.environ['PATH']}", "PYTHONPATH": str(ROOT)}
     done = subprocess.run(
-        words, cwd=folder / "empty", env=os.environ | paths, capture_output=True, text=True, timeout=3600
+        words,
+        cwd=folder / "empty",
+        env=os.environ | paths,
+        capture_output=True,
+        text=True,
+        timeout=3600,
     )
     assert done.returncode == 0, f"{done.stdout[-2000:]}\n{done.stderr[-2000:]}"
     return done.stdout
@@ -49,7 +56,14 @@ def test_ten_lines_of_shell(folder: Path) -> None:
     assert len(code.strip().splitlines()) == 10
     said = ran(["sh", "-e", "-c", code], folder)
     assert "is whole and unaltered" in said
-    for name in ("crack.png", "crack.json", "missing.png", "missing.csv", "twin.png", "runs/report/report.html"):
+    for name in (
+        "crack.png",
+        "crack.json",
+        "missing.png",
+        "missing.csv",
+        "twin.png",
+        "runs/report/report.html",
+    ):
         assert (folder / "empty" / name).stat().st_size > 1000, name
 
 
@@ -71,10 +85,16 @@ def test_the_two_commands_are_those_of_the_makefile() -> None:
         assert re.search(rf"^{target}:", makefile, flags=re.MULTILINE)
 
 
-@pytest.mark.parametrize("page", ["README.md", "docs/what_is_inside.md", "docs/alternatives.md", "docs/tour.ipynb"])
+@pytest.mark.parametrize(
+    "page", ["README.md", "docs/what_is_inside.md", "docs/alternatives.md", "docs/tour.ipynb"]
+)
 def test_links_lead_somewhere(page: str) -> None:
     text = (ROOT / page).read_text(encoding="utf-8")
-    links = [link for link in re.findall(r"\]\(([^)\s]+)\)", text) if not link.startswith(("http", "attachment"))]
+    links = [
+        link
+        for link in re.findall(r"\]\(([^)\s]+)\)", text)
+        if not link.startswith(("http", "attachment"))
+    ]
     assert links
     missing = [link for link in links if not ((ROOT / page).parent / link.split("#")[0]).exists()]
     assert not missing
@@ -84,11 +104,16 @@ def test_links_lead_somewhere(page: str) -> None:
     ("words", "answer"),
     [
         (["stiffness", "fault=crak"], "crack"),
-        (["simulate", "fault=crack", "fault.crack_depth=1.5"], "did you mean 'fault.crack_depth_mm'?"),
+        (
+            ["simulate", "fault=crack", "fault.crack_depth=1.5"],
+            "did you mean 'fault.crack_depth_mm'?",
+        ),
         (["generate", "experiment=quickstart"], "give out=DIR"),
     ],
 )
-def test_typical_mistakes_are_one_line(words: list[str], answer: str, capsys: pytest.CaptureFixture[str]) -> None:
+def test_typical_mistakes_are_one_line(
+    words: list[str], answer: str, capsys: pytest.CaptureFixture[str]
+) -> None:
     assert main(words) == 2
     said = capsys.readouterr().err.strip()
     assert answer in said

@@ -16,7 +16,14 @@ from gensig.plan.request import read_request
 from gensig.validation.realism import read_ranges
 
 BASE = ["experiment=quickstart", "executor.n_workers=1"]
-TINY = sets.Size(n_units=2, n_gearboxes=1, speeds=(0.5, 1.0), torques=(1.0,), n_turns=3.2, recording_duration=0.16)
+TINY = sets.Size(
+    n_units=2,
+    n_gearboxes=1,
+    speeds=(0.5, 1.0),
+    torques=(1.0,),
+    n_turns=3.2,
+    recording_duration=0.16,
+)
 RATE, TEETH, SPEED = 25600.0, 23, 2000.0 / 60.0
 TIME = np.arange(32768) / RATE
 
@@ -26,7 +33,9 @@ def healthy(seed=0, *, teeth=TEETH, depth=0.3, noise=0.3):
     turn = 2 * np.pi * 1.003 * SPEED * TIME
     mesh = sum(a * np.cos(k * teeth * turn) for k, a in ((1, 1.0), (2, 0.5), (3, 0.25)))
     x = (1 + depth * np.cos(turn)) * mesh
-    return np.stack([x, 3.0 * x]) + noise * np.random.default_rng(seed).standard_normal((2, TIME.size))
+    return np.stack([x, 3.0 * x]) + noise * np.random.default_rng(seed).standard_normal(
+        (2, TIME.size)
+    )
 
 
 class TestValues:
@@ -39,7 +48,12 @@ class TestValues:
 
     def test_a_record_whose_speed_varies(self):
         turned = 30.0 * TIME + 0.2 / (2 * np.pi * 2.0) * np.sin(2 * np.pi * 2.0 * TIME)
-        x = np.stack([2.0 * np.cos(2 * np.pi * TEETH * turned), np.random.default_rng(0).standard_normal(TIME.size)])
+        x = np.stack(
+            [
+                2.0 * np.cos(2 * np.pi * TEETH * turned),
+                np.random.default_rng(0).standard_normal(TIME.size),
+            ]
+        )
         found = values.record_values(x, 2 * np.pi * turned, RATE, 30.0, TEETH)
         assert_allclose(found["mesh"][0], [2.0, 0.0, 0.0], atol=0.02)
         assert_allclose(found["nonsynchronous_share"], [0.0, 1.0], atol=0.02)
@@ -48,7 +62,9 @@ class TestValues:
         assert found["n_turns"][0] == np.floor(turned[-1])
 
     def test_harmonic_decades(self):
-        mesh = np.array([[[1.0, 0.1, 1.0], [1.0, 10.0, 1.0]], [[2.0, 2.0, np.nan], [5.0, 5.0, 5.0]]])
+        mesh = np.array(
+            [[[1.0, 0.1, 1.0], [1.0, 10.0, 1.0]], [[2.0, 2.0, np.nan], [5.0, 5.0, 5.0]]]
+        )
         assert values.harmonic_decades(mesh) == pytest.approx(2.0)
 
     @staticmethod
@@ -56,9 +72,15 @@ class TestValues:
         """Two gearboxes with two specimens each, one set-point and a slower one, healthy and with a missing tooth."""
         rows = [(label, gearbox, specimen, speed) for label in ("healthy", "missing_tooth") for gearbox in "ab"
                 for specimen in "xy" for speed in (600.0, 1800.0)]  # fmt: skip
-        labels, gearboxes, specimens, speeds = (np.array(column) for column in zip(*rows, strict=True))
-        size = np.where(labels == "healthy", 1.0, 3.0) * np.where(specimens == "x", 1.0, 10.0) * speeds
-        size *= np.where(gearboxes == "a", 1.0, 1e6)  # which other gearboxes or speeds would tell at once
+        labels, gearboxes, specimens, speeds = (
+            np.array(column) for column in zip(*rows, strict=True)
+        )
+        size = (
+            np.where(labels == "healthy", 1.0, 3.0) * np.where(specimens == "x", 1.0, 10.0) * speeds
+        )
+        size *= np.where(
+            gearboxes == "a", 1.0, 1e6
+        )  # which other gearboxes or speeds would tell at once
         plain = ("rms", "kurtosis", "rms_full_band", "kurtosis_full_band", "fm4", "nonsynchronous_share",
                  "impacts_per_turn", "peak_over_residual", "impact_decay")  # fmt: skip
         indicators = {name: np.stack([size, 2 * size], axis=1) for name in plain}
@@ -70,20 +92,26 @@ class TestValues:
     def test_pairs_are_of_one_gearbox_and_set_point_and_of_another_specimen(self):
         found = values.quantities(self.table())
         ratios = found["missing_tooth.rms_ratio", values.ALL]
-        assert_allclose(sorted(ratios), [0.3] * 8 + [30.0] * 8)  # 2 gearboxes x 2 speeds x 2 channels, each way
+        assert_allclose(
+            sorted(ratios), [0.3] * 8 + [30.0] * 8
+        )  # 2 gearboxes x 2 speeds x 2 channels, each way
         assert_allclose(found["missing_tooth.rms_ratio_same_unit", values.ALL], 3.0)
         assert_allclose(sorted(set(found["healthy.mesh_amplitude_ratio", values.ALL])), [0.1, 10.0])
 
     def test_the_slow_and_light_corner_stands_apart(self):
         found = values.quantities(self.table())
-        slow, rest = (found["missing_tooth.kurtosis", where] for where in (values.SLOW, values.ELSEWHERE))
+        slow, rest = (
+            found["missing_tooth.kurtosis", where] for where in (values.SLOW, values.ELSEWHERE)
+        )
         assert len(slow) == len(rest) == 8
         assert_allclose(sorted(rest), 3.0 * np.sort(slow))
         assert len(found["missing_tooth.kurtosis", values.ALL]) == 16
 
     def test_every_range_has_its_quantity(self):
         found = values.quantities(self.table())
-        fault = {place for place in read_ranges() if place[0].startswith(("missing_tooth", "healthy"))}
+        fault = {
+            place for place in read_ranges() if place[0].startswith(("missing_tooth", "healthy"))
+        }
         assert fault <= set(found)
 
 
@@ -106,7 +134,8 @@ class TestSets:
 
     def test_the_machine_of_the_recording_and_what_is_wrong_on_purpose(self):
         right, teeth, finer, rougher = (
-            read_request(sets.recording_words(BASE, TINY, control)).config for control in sets.CONTROLS
+            read_request(sets.recording_words(BASE, TINY, control)).config
+            for control in sets.CONTROLS
         )
         assert [right["gear"][side]["n_teeth"] for side in ("pinion", "wheel")] == [23, 46]
         assert [teeth["gear"][side]["n_teeth"] for side in ("pinion", "wheel")] == [27, 42]
@@ -121,14 +150,22 @@ class TestSets:
         with pytest.raises(ConfigError, match="perfect gears"):
             sets.recording_words([*BASE, "quality.iso1328_grade=null"], TINY, "right")
         with pytest.raises(ConfigError, match="would be crossed"):
-            sets.yardstick_words([*BASE, "plan.vary={sensing.snr_db: {distribution: choice, values: [10, 20]}}"], TINY)
+            sets.yardstick_words(
+                [*BASE, "plan.vary={sensing.snr_db: {distribution: choice, values: [10, 20]}}"],
+                TINY,
+            )
 
 
 class TestRecording:
     def test_indicators_do_not_know_the_gain(self):
         x = healthy()
         for name, found in recording.indicators(x, RATE, TEETH, SPEED).items():
-            assert_allclose(recording.indicators(1e-3 * x, RATE, TEETH, SPEED)[name], found, rtol=1e-6, err_msg=name)
+            assert_allclose(
+                recording.indicators(1e-3 * x, RATE, TEETH, SPEED)[name],
+                found,
+                rtol=1e-6,
+                err_msg=name,
+            )
 
     def test_indicators_of_a_modulated_mesh(self):
         found = recording.indicators(healthy(noise=0.05), RATE, TEETH, SPEED)
@@ -136,16 +173,23 @@ class TestRecording:
         assert_allclose(found["harmonic_3_over_1"], -12.04, atol=0.4)
         assert_allclose(found["sideband_ratio"], 20 * np.log10(0.3), atol=0.6)
         carrier = 0.5 * (1 + 0.25 + 0.0625)
-        assert_allclose(found["mesh_share"], 10 * np.log10(carrier / (carrier * (1 + 0.3**2 / 2))), atol=0.1)
+        assert_allclose(
+            found["mesh_share"], 10 * np.log10(carrier / (carrier * (1 + 0.3**2 / 2))), atol=0.1
+        )
 
     def test_other_teeth_and_stronger_sidebands_are_told_apart_and_the_same_machine_is_not(self):
         def simulated(**changes):
-            rows = [recording.indicators(healthy(seed, **changes), RATE, TEETH, SPEED) for seed in range(10, 22)]
+            rows = [
+                recording.indicators(healthy(seed, **changes), RATE, TEETH, SPEED)
+                for seed in range(10, 22)
+            ]
             return {name: np.array([row[name] for row in rows]) for name in recording.INDICATORS}
 
         controls = dict(zip(sets.CONTROLS, (simulated(), simulated(teeth=27), simulated(depth=0.1), simulated()),
                             strict=True))  # fmt: skip
-        found = recording.recording_comparisons(controls, recording.indicators(healthy(1), RATE, TEETH, SPEED))
+        found = recording.recording_comparisons(
+            controls, recording.indicators(healthy(1), RATE, TEETH, SPEED)
+        )
         verdicts = {one.place: one.verdict for one in found}
         assert verdicts["recording.mesh_share", "wrong teeth"] == "told apart"
         assert verdicts["recording.sideband_ratio", "errors / 3"] == "told apart"
@@ -170,7 +214,9 @@ class TestRecording:
             pytest.skip(f"${recording.VARIABLE} names no folder with the recording")
         found = recording.recording_indicators(x)
         assert all(np.isfinite(one).all() for one in found.values())
-        assert recording.find_mesh_frequency(x, RATE, TEETH, SPEED) == pytest.approx(TEETH * SPEED, rel=2e-3)
+        assert recording.find_mesh_frequency(x, RATE, TEETH, SPEED) == pytest.approx(
+            TEETH * SPEED, rel=2e-3
+        )
 
 
 def test_storing_needs_the_commit_and_all_units(capsys):
@@ -191,7 +237,10 @@ def test_from_nothing_to_table_and_figures(tmp_path, monkeypatch, capsys):
     assert "real recording is left out" in said
     assert "16 records, 0 failed, at least 3 turns" in said
     assert "ranges frozen in commit (none named)" in said
-    rows = {(row["id"], row["at"]): row for row in json.loads((tmp_path / "found.json").read_text())["rows"]}
+    rows = {
+        (row["id"], row["at"]): row
+        for row in json.loads((tmp_path / "found.json").read_text())["rows"]
+    }
     assert set(read_ranges()) < set(rows)
     # 2 specimens each way x 2 set-points x 4 channels
     assert rows["crack.rms_ratio", "all conditions"]["n"] == 16

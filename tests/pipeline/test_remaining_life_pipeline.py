@@ -14,8 +14,20 @@ def test_lives_are_made_and_learnt_whole(tmp_path, capsys):
         "dataset.records_per_shard=60",
     )  # fmt: skip
     out = tmp_path / "report"
-    words = ["task=remaining_life", f"data={lives}", f"out={out}", "protocols=[by_unit]", "model=cnn", "epochs=1"]
-    assert diagnose(["train", *words, "seeds=1", "window_samples=1024", "n_threads=1", "n_bootstrap=50"]) == 0
+    words = [
+        "task=remaining_life",
+        f"data={lives}",
+        f"out={out}",
+        "protocols=[by_unit]",
+        "model=cnn",
+        "epochs=1",
+    ]
+    assert (
+        diagnose(
+            ["train", *words, "seeds=1", "window_samples=1024", "n_threads=1", "n_bootstrap=50"]
+        )
+        == 0
+    )
     capsys.readouterr()
     found = json.loads((out / "metrics.json").read_text())["protocols"]["by_unit"]
     assert {"constant", "age_only", "indicators", "cnn"} <= set(found["methods"])

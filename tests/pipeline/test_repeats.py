@@ -22,7 +22,9 @@ WORDS = (
 )
 
 
-def test_repeats_are_stored_and_told_apart(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
+def test_repeats_are_stored_and_told_apart(
+    tmp_path: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
     out = tmp_path / "data"
     assert main(["generate", *WORDS, f"out={out}"]) == 0
     assert "12 records in " in capsys.readouterr().out

@@ -31,9 +31,14 @@ def reproduce(folder: Path, capsys: pytest.CaptureFixture[str], *words: str) -> 
     return main(["reproduce", str(folder), *words]), capsys.readouterr().out
 
 
-def test_every_record_has_the_same_bits(reference: Path, capsys: pytest.CaptureFixture[str]) -> None:
+def test_every_record_has_the_same_bits(
+    reference: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
     assert reproduce(reference, capsys) == (0, "6 of 6 records have the same bits\n")
-    assert reproduce(reference, capsys, "--records", "2") == (0, "2 of 2 records have the same bits\n")
+    assert reproduce(reference, capsys, "--records", "2") == (
+        0,
+        "2 of 2 records have the same bits\n",
+    )
 
 
 def test_a_set_of_the_default_backend_is_stored_as_by_0_9(reference: Path) -> None:
@@ -82,9 +87,16 @@ def alter(reference: Path, out: Path, part: float, environment: dict[str, str]) 
 ELSEWHERE = {"cpu_model": "Another CPU"}
 
 
-@pytest.mark.parametrize(("part", "environment", "status"), [(5e-7, {}, 1), (5e-7, ELSEWHERE, 0), (2e-6, ELSEWHERE, 1)])
+@pytest.mark.parametrize(
+    ("part", "environment", "status"), [(5e-7, {}, 1), (5e-7, ELSEWHERE, 0), (2e-6, ELSEWHERE, 1)]
+)
 def test_a_difference_is_accepted_only_elsewhere_and_up_to_1e_6(
-    reference: Path, tmp_path: Path, capsys: pytest.CaptureFixture[str], part: float, environment: dict, status: int
+    reference: Path,
+    tmp_path: Path,
+    capsys: pytest.CaptureFixture[str],
+    part: float,
+    environment: dict,
+    status: int,
 ) -> None:
     folder = alter(reference, tmp_path / "data", part, environment)
     found, said = reproduce(folder, capsys)
@@ -94,7 +106,9 @@ def test_a_difference_is_accepted_only_elsewhere_and_up_to_1e_6(
     assert ("made with cpu_model Another CPU" in said) == bool(environment)
 
 
-@pytest.mark.parametrize("name", ["tacho", "encoder_angle", "mesh_force", "mesh_pinion_tooth", "noise_power"])
+@pytest.mark.parametrize(
+    "name", ["tacho", "encoder_angle", "mesh_force", "mesh_pinion_tooth", "noise_power"]
+)
 def test_all_that_is_stored_is_compared(
     reference: Path, tmp_path: Path, capsys: pytest.CaptureFixture[str], name: str
 ) -> None:
@@ -109,11 +123,20 @@ def test_all_that_is_stored_is_compared(
     assert "in r000002" in said
 
 
-def test_records_that_failed_are_told_apart(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
+def test_records_that_failed_are_told_apart(
+    tmp_path: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
     """Half of the conditions ask for steps that are too long; all that says so names the reason."""
     out = tmp_path / "data"
     vary = "plan.vary={operating.drive_frequency_hz:{distribution:choice,values:[1,1e6]}}"
-    words = ["generate", *TINY, "dataset.records_per_shard=4", vary, "executor.n_workers=1", f"out={out}"]
+    words = [
+        "generate",
+        *TINY,
+        "dataset.records_per_shard=4",
+        vary,
+        "executor.n_workers=1",
+        f"out={out}",
+    ]
     failed = r"(\d) of 6 records failed.*: solver.oversampling = 5 makes internal steps of .* at least \d+"
     assert main(words) == 1
     found = re.search(failed, capsys.readouterr().err)
@@ -142,7 +165,10 @@ def test_record_and_twin_differ_by_the_fault_alone(
         folder = make(tmp_path / "data", *SET, "sensing.snr_reference=record", "sensing.snr_db=20")
     with h5py.File(folder / "shards" / "shard-00000.h5") as file:
         faulty = int(np.flatnonzero(file["label_name"].asstr()[:] == "crack")[0])
-        stored = {name: file[name][faulty] for name in ("acceleration", "acceleration_clean", "noise_power")}
+        stored = {
+            name: file[name][faulty]
+            for name in ("acceleration", "acceleration_clean", "noise_power")
+        }
     words = ["simulate", "--from", str(folder), "--record", str(faulty), "--output"]
     assert main([*words, str(tmp_path / "again.h5")]) == 0
     assert main([*words, str(tmp_path / "twin.h5"), "--twin"]) == 0
@@ -152,14 +178,23 @@ def test_record_and_twin_differ_by_the_fault_alone(
     again, twin = read_one(tmp_path / "again.h5"), read_one(tmp_path / "twin.h5")
     for name, values in stored.items():
         assert np.array_equal(again[name], values), name
-    for name in ("unit_id", "condition_id", "start_tooth_pinion", "start_phase", "speed_set_rpm", "noise_power"):
+    for name in (
+        "unit_id",
+        "condition_id",
+        "start_tooth_pinion",
+        "start_phase",
+        "speed_set_rpm",
+        "noise_power",
+    ):
         assert np.array_equal(twin[name], again[name]), name
     assert again["severity"] > 0.0
     assert twin["severity"] == 0.0
     assert twin["faults_json"] == b"[]"
     assert not np.array_equal(twin["acceleration_clean"], again["acceleration_clean"])
     level = np.sqrt(np.mean(np.square(stored["acceleration"], dtype=np.float64)))
-    residuals = [again[name].astype(float) - twin[name] for name in ("acceleration", "acceleration_clean")]
+    residuals = [
+        again[name].astype(float) - twin[name] for name in ("acceleration", "acceleration_clean")
+    ]
     np.testing.assert_allclose(*residuals, rtol=0.0, atol=3e-6 * level)
 
 

@@ -18,7 +18,12 @@ from gensig.plan.make import make_plan
 from gensig.plan.request import read_request
 from gensig.record.simulate import simulate_records
 
-LIVES = ("experiment=run_to_failure", "plan.n_units=12", "plan.n_gearboxes=3", "life.snapshot_count=8")
+LIVES = (
+    "experiment=run_to_failure",
+    "plan.n_units=12",
+    "plan.n_gearboxes=3",
+    "life.snapshot_count=8",
+)
 SMALL = (
     "experiment=run_to_failure", "plan.n_units=2", "plan.classes=[crack,wear]", "life.snapshot_count=3",
     "operating.duration_s=0.02", "executor.n_workers=1",
@@ -36,14 +41,26 @@ def plan():
 
 def lives(plan):
     """Rows of each life, by its id."""
-    return {name: np.flatnonzero(plan.columns["life_id"] == name) for name in np.unique(plan.columns["life_id"])}
+    return {
+        name: np.flatnonzero(plan.columns["life_id"] == name)
+        for name in np.unique(plan.columns["life_id"])
+    }
 
 
 def test_a_life_is_one_unit_with_gears_of_its_own_and_one_class(plan):
     assert plan.n_records == 12 * 8
     assert all(len(rows) == 8 for rows in lives(plan).values())
-    for name in ("unit_id", "specimen_id", "gearbox_id", "label_name", "life_failed", "fault_tooth"):
-        assert all(len(set(plan.columns[name][rows].tolist())) == 1 for rows in lives(plan).values()), name
+    for name in (
+        "unit_id",
+        "specimen_id",
+        "gearbox_id",
+        "label_name",
+        "life_failed",
+        "fault_tooth",
+    ):
+        assert all(
+            len(set(plan.columns[name][rows].tolist())) == 1 for rows in lives(plan).values()
+        ), name
     assert len(set(plan.columns["specimen_id"].tolist())) == 12
     names, counts = np.unique(plan.columns["label_name"], return_counts=True)
     assert names.tolist() == ["crack", "distributed_pitting", "wear"]
@@ -79,7 +96,12 @@ def test_the_same_seed_gives_the_same_lives_and_another_seed_others(plan):
 
 
 def test_number_of_unit_and_gearbox_do_not_tell_the_class():
-    plan = planned("plan.n_units=160", "plan.n_gearboxes=2", "life.snapshot_count=3", "plan.classes=[healthy,crack]")
+    plan = planned(
+        "plan.n_units=160",
+        "plan.n_gearboxes=2",
+        "life.snapshot_count=3",
+        "plan.classes=[healthy,crack]",
+    )
     first = np.array([rows[0] for rows in lives(plan).values()])
     labels = plan.columns["label"][first]
     boxes = np.unique(plan.columns["gearbox_id"][first], return_inverse=True)[1]
@@ -94,7 +116,9 @@ def test_splits_keep_a_life_whole_on_one_side():
     assert {"by_unit", "cross_specimen", "cross_gearbox"} <= set(tables)
     for name in ("by_unit", "cross_specimen", "cross_gearbox"):
         assert split_problems(name, tables[name], plan) == []
-        sides = dict(zip(tables[name].record_id.tolist(), tables[name].subset.tolist(), strict=True))
+        sides = dict(
+            zip(tables[name].record_id.tolist(), tables[name].subset.tolist(), strict=True)
+        )
         ids = plan.columns["record_id"]
         assert all(len({sides[ids[row]] for row in rows}) == 1 for rows in lives(plan).values())
 
@@ -106,7 +130,9 @@ def test_below_the_threshold_the_records_say_that_nothing_grows_and_the_life_is_
     assert not plan.columns["life_growing"].any()
     ranges = plan.columns["params/fault.stress_intensity_range_mpa_sqrt_m"]
     assert (ranges < 5.0).all()
-    assert_allclose(plan.columns["life_time_h"][7] + plan.columns["remaining_life_h"][7], 500.0, rtol=0.05)
+    assert_allclose(
+        plan.columns["life_time_h"][7] + plan.columns["remaining_life_h"][7], 500.0, rtol=0.05
+    )
     for rows in lives(plan).values():
         assert len(set(plan.columns["severity"][rows].tolist())) == 1
 
@@ -172,10 +198,22 @@ def lived():
         ("life.wear.rate_scatter", -1.0, "rate_scatter"),
         ("life.blocks", [[0, 1, 1800, 90]], r"pin it, or take plan\.vary"),
         ("life.drift", {"mesh.friction": {"change": 1, "time_h": 5, "scatter": 0}}, "is no key"),
-        ("life.drift", {"operating.torque_nm": {"change": 1, "time_h": 5, "scatter": 0}}, "drawn for each set-point"),
-        ("life.drift", {"mesh.damping_ratio": {"change": -2, "time_h": 5, "scatter": 0}}, "change = -2"),
+        (
+            "life.drift",
+            {"operating.torque_nm": {"change": 1, "time_h": 5, "scatter": 0}},
+            "drawn for each set-point",
+        ),
+        (
+            "life.drift",
+            {"mesh.damping_ratio": {"change": -2, "time_h": 5, "scatter": 0}},
+            "change = -2",
+        ),
         ("life.drift", 3, r"life\.drift = 3"),
-        ("plan.vary", {"life.horizon_h": {"distribution": "uniform", "low": 1, "high": 2}}, "a whole data set"),
+        (
+            "plan.vary",
+            {"life.horizon_h": {"distribution": "uniform", "low": 1, "high": 2}},
+            "a whole data set",
+        ),
         ("life.crack", 3, "group of keys"),
         ("life.colour", "red", "unknown key 'colour'"),
     ],
@@ -223,7 +261,12 @@ def test_a_data_set_of_lives_whatever_its_shards(tmp_path):
 
 
 def test_other_data_sets_have_no_columns_of_lives(tmp_path):
-    tiny = ("plan.n_records=2", "plan.n_units=1", "operating.duration_s=0.02", "executor.n_workers=1")
+    tiny = (
+        "plan.n_records=2",
+        "plan.n_units=1",
+        "operating.duration_s=0.02",
+        "executor.n_workers=1",
+    )
     generate(*tiny, "sensing.channels=[pinion_y]", out=tmp_path / "a")
     assert not set(LIFE_COLUMNS) & set(open_dataset(tmp_path / "a").column_names)
 

@@ -27,7 +27,9 @@ SMALL = (
 
 
 def digest(records) -> str:
-    return hashlib.sha256(b"".join(record.signals["acceleration"].tobytes() for record in records)).hexdigest()
+    return hashlib.sha256(
+        b"".join(record.signals["acceleration"].tobytes() for record in records)
+    ).hexdigest()
 
 
 def bits(items) -> list[tuple[bytes, int]]:
@@ -65,7 +67,9 @@ def test_records_are_those_of_generate_bit_for_bit(stream, records, stored: Path
         for name in data.column_names:
             key = "signals" if name in SIGNALS else "values"
             streamed = np.array([getattr(record, key)[name] for record in records])
-            np.testing.assert_array_equal(streamed, data.column(name), err_msg=name, strict=name in SIGNALS)
+            np.testing.assert_array_equal(
+                streamed, data.column(name), err_msg=name, strict=name in SIGNALS
+            )
         for index, record in enumerate(records):
             assert set(record.values) == set(data.column_names) - set(SIGNALS)
             for name in ("acceleration", "acceleration_clean"):
@@ -82,7 +86,10 @@ def test_records_are_those_of_generate_bit_for_bit(stream, records, stored: Path
 def test_random_access_is_iteration(stream, records) -> None:
     for place in (4, -1):
         assert stream[place].values["record_id"] == records[place].values["record_id"]
-        assert stream[place].signals["acceleration"].tobytes() == records[place].signals["acceleration"].tobytes()
+        assert (
+            stream[place].signals["acceleration"].tobytes()
+            == records[place].signals["acceleration"].tobytes()
+        )
     with pytest.raises(IndexError):
         stream[6]
 
@@ -94,7 +101,9 @@ def test_shards_are_disjoint_complete_and_keep_a_condition_whole(stream, count: 
     conditions = [set(part.column("condition_id")) for part in parts]
     assert sum(len(part) for part in conditions) == 3
     assert all(ids(part) == sorted(ids(part)) for part in parts)
-    assert [ids(stream.shard(index, count)) for index in range(count)] == [ids(part) for part in parts]
+    assert [ids(stream.shard(index, count)) for index in range(count)] == [
+        ids(part) for part in parts
+    ]
 
 
 def test_shard_of_a_shard_and_its_records(stream, records) -> None:
@@ -108,10 +117,14 @@ def test_shard_of_a_shard_and_its_records(stream, records) -> None:
     ]
 
 
-def test_a_later_epoch_is_a_data_set_of_its_own_and_can_be_stored(stream, records, tmp_path: Path) -> None:
+def test_a_later_epoch_is_a_data_set_of_its_own_and_can_be_stored(
+    stream, records, tmp_path: Path
+) -> None:
     words = ("plan.n_records=1", "operating.duration_s=0.02")
     later = gensig.stream(*words, epoch=1)
-    with gensig.generate(*words, f"seed={later.seed}", "executor.n_workers=1", out=tmp_path / "data") as data:
+    with gensig.generate(
+        *words, f"seed={later.seed}", "executor.n_workers=1", out=tmp_path / "data"
+    ) as data:
         assert later[0].signals["acceleration"].tobytes() == data.signals(0).tobytes()
     assert digest(stream.at_epoch(1).take([0])) != digest(records[:1])
     assert len({epoch_seed(seed, epoch) for seed in range(3) for epoch in range(50)}) == 150
@@ -129,7 +142,9 @@ def test_epochs_follow_one_another_and_keep_the_part(stream) -> None:
     assert not np.array_equal(again.column("speed_set_rpm"), stream.column("speed_set_rpm"))
 
 
-def test_windows_are_those_of_the_stored_set_also_from_workers_and_a_fresh_process(stream, stored: Path) -> None:
+def test_windows_are_those_of_the_stored_set_also_from_workers_and_a_fresh_process(
+    stream, stored: Path
+) -> None:
     options = {"window_samples": 300, "stride_samples": 100, "channels": ["wheel_y", "pinion_x"]}
     windows = StreamingDataset(stream, "random_window_leaky", "train", **options)
     with gensig.open_dataset(stored) as data:
@@ -139,14 +154,24 @@ def test_windows_are_those_of_the_stored_set_also_from_workers_and_a_fresh_proce
     assert windows.n_windows == len(expected) > 6
     assert bits(windows) == bits(expected)
     # a loader asks its workers in turn; each has every other condition
-    mine = [[item for item, place in zip(expected, condition, strict=True) if place % 2 == worker] for worker in (0, 1)]
+    mine = [
+        [item for item, place in zip(expected, condition, strict=True) if place % 2 == worker]
+        for worker in (0, 1)
+    ]
     in_turn = [item for pair in itertools.zip_longest(*mine) for item in pair if item is not None]
-    assert bits(DataLoader(windows, batch_size=None, num_workers=2, multiprocessing_context="fork")) == bits(in_turn)
-    assert bits(DataLoader(windows, batch_size=None, num_workers=1, multiprocessing_context="spawn")) == bits(expected)
+    assert bits(
+        DataLoader(windows, batch_size=None, num_workers=2, multiprocessing_context="fork")
+    ) == bits(in_turn)
+    assert bits(
+        DataLoader(windows, batch_size=None, num_workers=1, multiprocessing_context="spawn")
+    ) == bits(expected)
 
 
 def test_a_failed_record_has_the_values_of_a_stored_one() -> None:
-    record = Record(signals={}, values={"record_id": "r0", "status": "failed", "status_reason": "x" + "\u00e9" * 200})
+    record = Record(
+        signals={},
+        values={"record_id": "r0", "status": "failed", "status_reason": "x" + "\u00e9" * 200},
+    )
     values = _as_stored(record).values
     assert values["status_reason"] == ("x" + "\\xe9" * 200)[:256]
     assert np.isnan(values["contact_loss_fraction"])
@@ -156,7 +181,10 @@ def test_a_failed_record_has_the_values_of_a_stored_one() -> None:
 @pytest.mark.parametrize(
     ("words", "message"),
     [
-        (("operating.sped_rpm=1",), "unknown key 'operating.sped_rpm'; did you mean 'operating.speed_rpm'"),
+        (
+            ("operating.sped_rpm=1",),
+            "unknown key 'operating.sped_rpm'; did you mean 'operating.speed_rpm'",
+        ),
         (("fault=healthy,crack",), "a stream is one data set: give one value a key"),
         (("-m", "fault=crack"), "cannot read the override"),
         ((["seed=1", "fault=crack"],), "an override is a text such as 'seed=1', not"),

@@ -47,10 +47,16 @@ def printed(tmp_path_factory: pytest.TempPathFactory) -> str:
 
 
 def test_it_runs_and_the_figures_in_its_outputs_are_still_true(printed: str) -> None:
-    stored = "".join("".join(output.get("text", [])) for cell in CELLS for output in cell.get("outputs", []))
+    stored = "".join(
+        "".join(output.get("text", [])) for cell in CELLS for output in cell.get("outputs", [])
+    )
 
     def of_the_physics(text: str) -> list[list[float]]:
-        lines = [line for line in text.splitlines() if re.match(r"A crack|crack +\d+%|sidebands|spur|helical", line)]
+        lines = [
+            line
+            for line in text.splitlines()
+            if re.match(r"A crack|crack +\d+%|sidebands|spur|helical", line)
+        ]
         return [[float(number) for number in re.findall(r"\d+\.?\d*", line)] for line in lines]
 
     now, then = of_the_physics(printed), of_the_physics(stored)
@@ -62,7 +68,18 @@ def test_it_runs_and_the_figures_in_its_outputs_are_still_true(printed: str) -> 
 def test_its_outputs_are_small_and_name_no_place_of_a_machine() -> None:
     text = NOTEBOOK.read_text(encoding="utf-8")
     assert len(text) < 600_000
-    assert sum("image/png" in output.get("data", {}) for cell in CELLS for output in cell.get("outputs", [])) == 4
-    shown = "".join("".join(output.get("text", [])) for cell in CELLS for output in cell.get("outputs", []))
+    assert (
+        sum(
+            "image/png" in output.get("data", {})
+            for cell in CELLS
+            for output in cell.get("outputs", [])
+        )
+        == 4
+    )
+    shown = "".join(
+        "".join(output.get("text", [])) for cell in CELLS for output in cell.get("outputs", [])
+    )
     assert not re.search(r"/(tmp|home|root|Users)/", shown)
-    assert all(output["output_type"] != "error" for cell in CELLS for output in cell.get("outputs", []))
+    assert all(
+        output["output_type"] != "error" for cell in CELLS for output in cell.get("outputs", [])
+    )

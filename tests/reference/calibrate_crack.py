@@ -25,7 +25,11 @@ Array = NDArray[np.float64]
 
 DATA = Path(__file__).parent / "data" / "crack.csv"
 TARGET = Path(__file__).parents[2] / "gensig" / "mesh" / "root_crack_coefficients.py"
-MODULE, WIDTH, POISSON = 2e-3, 20e-3, 0.3  # of the stored plane-strain runs, which state E W compliance
+MODULE, WIDTH, POISSON = (
+    2e-3,
+    20e-3,
+    0.3,
+)  # of the stored plane-strain runs, which state E W compliance
 # a crack almost along the outline cuts the tooth off: no intensity factor of the root's resultants describes it
 LEFT_OUT = {("z84", 75.0)}
 
@@ -50,7 +54,13 @@ def read_series() -> list[Series]:
     groups: dict[tuple[str, ...], list[dict[str, str]]] = defaultdict(list)
     with DATA.open(encoding="utf-8", newline="") as file:
         for row in csv.DictReader(file):
-            groups[row["case"], row["side"], row["start"], row["crack_angle_deg"], row["depth_over_chord"]].append(row)
+            groups[
+                row["case"],
+                row["side"],
+                row["start"],
+                row["crack_angle_deg"],
+                row["depth_over_chord"],
+            ].append(row)
     return [_series(rows) for rows in groups.values()]
 
 
@@ -107,7 +117,9 @@ def fit(series: Sequence[Series]) -> Array:
 
 def errors(series: Sequence[Series], coefficients: Array) -> Array:
     """Relative errors of the increments."""
-    return np.concatenate([(one.design @ coefficients.ravel()) ** 2 / one.increment - 1.0 for one in series])
+    return np.concatenate(
+        [(one.design @ coefficients.ravel()) ** 2 / one.increment - 1.0 for one in series]
+    )
 
 
 def _told(name: str, found: Array) -> None:
@@ -124,22 +136,31 @@ def main() -> None:
     tension = [one for one in everything if one.side == "tension"]
     used = [one for one in tension if (one.case, one.angle_deg) not in LEFT_OUT]
     coefficients = fit(used)
-    lines = ",\n".join("    (" + ", ".join(f"{value:.6g}" for value in row) + ")" for row in coefficients)
+    lines = ",\n".join(
+        "    (" + ", ".join(f"{value:.6g}" for value in row) + ")" for row in coefficients
+    )
     TARGET.write_text(
         '"""Written by ``python -m tests.reference.calibrate_crack``.\n\n'
         'For moment, shear and normal force, one number a function of ``gensig.mesh.root_crack.basis``.\n"""\n\n'
         f"COEFFICIENTS = (\n{lines},\n)\n",
         encoding="utf-8",
     )
-    print(f"{'increment over finite elements':<28}{'n':>4}{'rms %':>8}{'95 %':>8}{'least':>8}{'most':>8}")
+    print(
+        f"{'increment over finite elements':<28}{'n':>4}{'rms %':>8}{'95 %':>8}{'least':>8}{'most':>8}"
+    )
     _told("all that was fitted", errors(used, coefficients))
     for case in sorted({one.case for one in used}):
         _told(case, errors([one for one in used if one.case == case], coefficients))
         if case != MOST_ANGLES:
             held_out = fit([one for one in used if one.case != case])
-            _told("  left out of the fit", errors([one for one in used if one.case == case], held_out))
+            _told(
+                "  left out of the fit", errors([one for one in used if one.case == case], held_out)
+            )
     for angle in sorted({one.angle_deg for one in used}):
-        _told(f"angle {angle:g}", errors([one for one in used if one.angle_deg == angle], coefficients))
+        _told(
+            f"angle {angle:g}",
+            errors([one for one in used if one.angle_deg == angle], coefficients),
+        )
     others = [one for one in tension if (one.case, one.angle_deg) in LEFT_OUT]
     for name, some in (
         ("not fitted: z84, 75 deg", others),

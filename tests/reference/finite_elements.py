@@ -45,7 +45,9 @@ class Plane:
 
     def __post_init__(self) -> None:
         if self.elasticity not in ("plane_stress", "plane_strain"):
-            raise ValueError(f"elasticity = {self.elasticity!r} must be 'plane_stress' or 'plane_strain'")
+            raise ValueError(
+                f"elasticity = {self.elasticity!r} must be 'plane_stress' or 'plane_strain'"
+            )
 
     @property
     def unit_compliance(self) -> float:
@@ -83,7 +85,13 @@ def structural_compliance(
     -------
     (contact,) m/N    positive along the force
     """
-    mesh = gear_mesh(gear, {0: curvature_radius}, crack=crack, resolution=resolution, modelled_teeth=modelled_teeth)
+    mesh = gear_mesh(
+        gear,
+        {0: curvature_radius},
+        crack=crack,
+        resolution=resolution,
+        modelled_teeth=modelled_teeth,
+    )
     solution = _solve(mesh, _on_bore(gear, mesh), gear, curvature_radius, plane)
     return _along_force(solution, gear, curvature_radius) * plane.unit_compliance
 
@@ -106,7 +114,12 @@ def tooth_compliance(
 
 
 def crack_increment(
-    gear: Gear, curvature_radius: Array, plane: Plane, crack: Crack, *, resolution: Resolution | None = None
+    gear: Gear,
+    curvature_radius: Array,
+    plane: Plane,
+    crack: Crack,
+    *,
+    resolution: Resolution | None = None,
 ) -> Array:
     """Structural compliance of the cracked less that of the sound gear, (contact,) m/N.
 
@@ -115,7 +128,9 @@ def crack_increment(
     """
     compliance = []
     for opened in (True, False):
-        mesh = gear_mesh(gear, {0: curvature_radius}, crack=crack, opened=opened, resolution=resolution)
+        mesh = gear_mesh(
+            gear, {0: curvature_radius}, crack=crack, opened=opened, resolution=resolution
+        )
         solution = _solve(mesh, _on_bore(gear, mesh), gear, curvature_radius, plane)
         compliance.append(_along_force(solution, gear, curvature_radius))
     return (compliance[0] - compliance[1]) * plane.unit_compliance
@@ -142,7 +157,12 @@ def cross_compliance(
     (contact,) m/N    positive where the neighbour moves away from its mate like the loaded tooth
     """
     probed = curvature_radius + tooth * gear.base_pitch
-    mesh = gear_mesh(gear, {0: curvature_radius, tooth: probed}, resolution=resolution, modelled_teeth=modelled_teeth)
+    mesh = gear_mesh(
+        gear,
+        {0: curvature_radius, tooth: probed},
+        resolution=resolution,
+        modelled_teeth=modelled_teeth,
+    )
     solution = _solve(mesh, _on_bore(gear, mesh), gear, curvature_radius, plane)
     turn = 2.0 * math.pi * tooth / gear.n_teeth
     points = polar_rotation(_flank_point(gear, probed), turn)
@@ -164,7 +184,9 @@ class Solution:
         return Solution(self.basis, self.displacement[:, loads])
 
 
-def _solve(mesh: MeshTri, clamped: NDArray[np.int64], gear: Gear, radii: Array, plane: Plane) -> Solution:
+def _solve(
+    mesh: MeshTri, clamped: NDArray[np.int64], gear: Gear, radii: Array, plane: Plane
+) -> Solution:
     """Displacements under a unit force at each of the curvature radii on tooth 0, one factorisation for all."""
     basis = Basis(mesh, ElementVector(ElementTriP2()))
     stiffness = linear_elasticity(*plane.lame).assemble(basis).tocsr()
@@ -185,7 +207,9 @@ def solve_definite(matrix: csr_matrix, loads: Array) -> Array:
     except ImportError:
         from scipy.sparse.linalg import splu
 
-        return splu(matrix.tocsc(), permc_spec="MMD_AT_PLUS_A", options={"SymmetricMode": True}).solve(loads)
+        return splu(
+            matrix.tocsc(), permc_spec="MMD_AT_PLUS_A", options={"SymmetricMode": True}
+        ).solve(loads)
     solver = PyPardisoSolver(mtype=2)
     result = solver.solve(triu(matrix, format="csr"), np.asfortranarray(loads))
     solver.free_memory(everything=True)
@@ -223,7 +247,9 @@ def point_values(basis: Basis, points: Array) -> csr_matrix:
     return basis.probes(points).tocsr()
 
 
-def contact_radii(gear: Gear, n_contacts: int, *, root_margin: float = 0.05, tip_margin: float) -> Array:
+def contact_radii(
+    gear: Gear, n_contacts: int, *, root_margin: float = 0.05, tip_margin: float
+) -> Array:
     """Curvature radii spread evenly over the usable involute, (contact,) m.
 
     ``root_margin`` is left free at the junction as a share of the involute, ``tip_margin`` at the tip in m.
@@ -252,21 +278,27 @@ def root_stress_factor(
     (contact,)        stress along the free edge: E (plane strain: E / (1 - nu^2)) times its stretch
     (contact,) rad    slope of the edge to the tooth centreline where it is largest; ISO 6336-3 takes 30 degrees
     """
-    mesh = gear_mesh(gear, {0: curvature_radius}, resolution=resolution, modelled_teeth=modelled_teeth)
+    mesh = gear_mesh(
+        gear, {0: curvature_radius}, resolution=resolution, modelled_teeth=modelled_teeth
+    )
     solution = _solve(mesh, _on_bore(gear, mesh), gear, curvature_radius, plane)
     edges = mesh.facets[:, mesh.boundary_facets()]
     middle = mesh.p[:, edges].mean(axis=1)
     junction = math.hypot(gear.base_radius, gear.junction_curvature_radius) / gear.normal_module
     bore = 0.5 * (gear.bore_radius + gear.root_radius) / gear.normal_module
     radius, angle = np.hypot(*middle), np.arctan2(middle[1], middle[0])
-    on_root = (radius > bore) & (radius < junction) & (angle > 0.0) & (angle < math.pi / gear.n_teeth)
+    on_root = (
+        (radius > bore) & (radius < junction) & (angle > 0.0) & (angle < math.pi / gear.n_teeth)
+    )
     first, second = edges[:, on_root]
     along = mesh.p[:, second] - mesh.p[:, first]
     along *= np.sign(along[0])  # outward
     length = np.hypot(*along)
     sign = np.sign(mesh.p[0, second] - mesh.p[0, first])
     dofs = solution.basis.nodal_dofs
-    moved = (solution.displacement[dofs[:, second]] - solution.displacement[dofs[:, first]]) * sign[None, :, None]
+    moved = (solution.displacement[dofs[:, second]] - solution.displacement[dofs[:, first]]) * sign[
+        None, :, None
+    ]
     stretch = np.einsum("ce,cel->el", along, moved) / length[:, None] ** 2
     nu = plane.material.poisson_ratio
     stress = stretch / (1.0 if plane.elasticity == "plane_stress" else 1.0 - nu**2)

@@ -46,7 +46,9 @@ class Resolution:
 
     def scaled(self, factor: float) -> Resolution:
         """All sizes times ``factor``."""
-        return Resolution(**{field.name: factor * getattr(self, field.name) for field in fields(self)})
+        return Resolution(
+            **{field.name: factor * getattr(self, field.name) for field in fields(self)}
+        )
 
     def near(self, crack: Crack | None, module: float) -> Resolution:
         """Sizes with which the root curve is fine enough for a crack."""
@@ -107,7 +109,11 @@ def tooth_mesh(gear: Gear, contacts: Array, *, resolution: Resolution | None = N
 
 
 def tooth_outline(
-    gear: Gear, contacts: Array, root_size: float, flank_size: float, root_knots: Sequence[float] = ()
+    gear: Gear,
+    contacts: Array,
+    root_size: float,
+    flank_size: float,
+    root_knots: Sequence[float] = (),
 ) -> Array:
     """Outline of tooth 0 from its -y root point over the tip to its +y root point, (2, node) in modules.
 
@@ -115,9 +121,13 @@ def tooth_outline(
     """
     tip = math.sqrt(gear.tip_radius**2 - gear.base_radius**2)
     gammas = [0.5 * math.pi, *sorted(root_knots, reverse=True), gear.pressure_angle]
-    radii = _distinct([gear.junction_curvature_radius, *np.sort(contacts), tip], 1e-6 * gear.normal_module)
+    radii = _distinct(
+        [gear.junction_curvature_radius, *np.sort(contacts), tip], 1e-6 * gear.normal_module
+    )
     root = _sample(lambda gamma: root_curve(gear, gamma), gammas, root_size * gear.normal_module)
-    flank = _sample(lambda radius: involute_point(gear, radius), radii, flank_size * gear.normal_module)
+    flank = _sample(
+        lambda radius: involute_point(gear, radius), radii, flank_size * gear.normal_module
+    )
     half = np.hstack([root[:, :-1], flank]) / gear.normal_module
     half_tip = gear.half_tooth_angle_at(gear.tip_radius)
     top = _arc(gear.tip_radius / gear.normal_module, -half_tip, half_tip, flank_size)
@@ -129,7 +139,9 @@ def crack_start_gamma(gear: Gear, start: str) -> float:
     """Parameter gamma of the root curve at the crack's start."""
     radius = math.hypot(*root_curve_point(gear, start))
     return brentq(
-        lambda gamma: math.hypot(*(float(value[0]) for value in root_curve(gear, np.array([gamma])))) - radius,
+        lambda gamma: (
+            math.hypot(*(float(value[0]) for value in root_curve(gear, np.array([gamma])))) - radius
+        ),
         gear.pressure_angle,
         0.5 * math.pi,
         xtol=1e-14,
@@ -166,7 +178,11 @@ def signed_tooth(tooth: int, n_teeth: int) -> int:
 
 
 def gear_outline(
-    gear: Gear, contacts: Mapping[int, Array], crack: Crack | None, sizes: Resolution, modelled_teeth: int
+    gear: Gear,
+    contacts: Mapping[int, Array],
+    crack: Crack | None,
+    sizes: Resolution,
+    modelled_teeth: int,
 ) -> Array:
     """Outline of the whole gear counter-clockwise, (2, node) in modules; arguments as in ``gear_mesh``."""
     z, module = gear.n_teeth, gear.normal_module
@@ -178,7 +194,9 @@ def gear_outline(
         flank_contacts = contacts.get(signed_tooth(tooth, z), np.empty(0))
         here = gear.root_half_angle
         if 2 * distance < modelled_teeth or z <= modelled_teeth:
-            outline = tooth_outline(gear, flank_contacts, root_size, size, knots if tooth == 0 else ())
+            outline = tooth_outline(
+                gear, flank_contacts, root_size, size, knots if tooth == 0 else ()
+            )
         else:
             outline = _arc(gear.root_radius / module, -here, here, size)
         gap = _arc(gear.root_radius / module, here, 2.0 * math.pi / z - here, root_size)
@@ -208,7 +226,9 @@ def _sample(curve: Curve, knots: Sequence[float], size: float) -> Array:
 
 
 def _arc(radius: float, start: float, end: float, size: float) -> Array:
-    return _sample(lambda polar: (radius * np.cos(polar), radius * np.sin(polar)), [start, end], size)
+    return _sample(
+        lambda polar: (radius * np.cos(polar), radius * np.sin(polar)), [start, end], size
+    )
 
 
 def circle(radius: float, size: float) -> Array:
@@ -243,7 +263,10 @@ class Polyline:
     def open(cls, points: Array, size: float) -> Polyline:
         """Open line; a single point gets ``size``."""
         edges = np.hypot(*np.diff(points, axis=1)) if points.shape[1] > 1 else np.array([size])
-        return cls(points, np.maximum(np.append(edges, edges[-1]), np.append(edges[0], edges))[: points.shape[1]])
+        return cls(
+            points,
+            np.maximum(np.append(edges, edges[-1]), np.append(edges[0], edges))[: points.shape[1]],
+        )
 
 
 def triangulate(loops: Sequence[Polyline], inner: Sequence[Array], inside_size: float) -> MeshTri:
@@ -315,7 +338,9 @@ def _start_gmsh() -> None:
 def _grow_inwards(inside_size: float) -> None:
     """Let the edge length grow from that of the nearest line to ``inside_size`` at ``INSIDE_DISTANCE``."""
     field = gmsh.model.mesh.field.add("Extend")
-    gmsh.model.mesh.field.setNumbers(field, "CurvesList", [tag for _, tag in gmsh.model.getEntities(1)])
+    gmsh.model.mesh.field.setNumbers(
+        field, "CurvesList", [tag for _, tag in gmsh.model.getEntities(1)]
+    )
     gmsh.model.mesh.field.setNumber(field, "DistMax", INSIDE_DISTANCE)
     gmsh.model.mesh.field.setNumber(field, "SizeMax", inside_size)
     gmsh.model.mesh.field.setAsBackgroundMesh(field)
@@ -335,7 +360,9 @@ def open_slit(mesh: MeshTri, slit: Array) -> MeshTri:
     nodes = [nearest_node(mesh, point) for point in slit.T[:-1]]
     copies = np.arange(mesh.nvertices)
     copies[nodes] = mesh.nvertices + np.arange(len(nodes))
-    return MeshTri(np.hstack([mesh.p, mesh.p[:, nodes]]), np.where(left_of(mesh, slit), copies[mesh.t], mesh.t))
+    return MeshTri(
+        np.hstack([mesh.p, mesh.p[:, nodes]]), np.where(left_of(mesh, slit), copies[mesh.t], mesh.t)
+    )
 
 
 def left_of(mesh: MeshTri, slit: Array) -> NDArray[np.bool_]:
@@ -350,5 +377,7 @@ def nearest_node(mesh: MeshTri, point: Array) -> int:
     distance = np.hypot(*(mesh.p[:2] - np.asarray(point)[:2, None]))
     node = int(np.argmin(distance))
     if distance[node] > 1e-6:
-        raise ValueError(f"no mesh node at {np.asarray(point)}; the nearest is {distance[node]:.2g} modules away")
+        raise ValueError(
+            f"no mesh node at {np.asarray(point)}; the nearest is {distance[node]:.2g} modules away"
+        )
     return node

@@ -112,12 +112,21 @@ def _gear_columns(case: str) -> Row:
     }
 
 
-def _contact_rows(head: Row, radii: Array, labels: Sequence[Row] | None = None, **compliances: Array) -> Iterator[Row]:
+def _contact_rows(
+    head: Row, radii: Array, labels: Sequence[Row] | None = None, **compliances: Array
+) -> Iterator[Row]:
     """One row per contact; compliances (contact,) in m/N become dimensionless. ``labels`` adds columns per contact."""
     for index, radius in enumerate(radii):
         label = labels[index] if labels else {}
-        values = {name: value[index] / STRAIN.unit_compliance for name, value in compliances.items()}
-        yield {**head, **label, "curvature_radius_over_module": radius / BASE.normal_module, **values}
+        values = {
+            name: value[index] / STRAIN.unit_compliance for name, value in compliances.items()
+        }
+        yield {
+            **head,
+            **label,
+            "curvature_radius_over_module": radius / BASE.normal_module,
+            **values,
+        }
 
 
 def healthy() -> Iterator[Row]:
@@ -128,10 +137,15 @@ def healthy() -> Iterator[Row]:
         plane = _plane(elasticity)
         for gear in (pair.pinion, pair.wheel):
             radii = _radii(pair, gear, np.array(list(named.values())))
-            total, clamped = structural_compliance(gear, radii, plane), tooth_compliance(gear, radii, plane)
+            total, clamped = (
+                structural_compliance(gear, radii, plane),
+                tooth_compliance(gear, radii, plane),
+            )
             head = {"gear": gear.name, "elasticity": elasticity}
             labels = [{"point": point} for point in named]
-            yield from _contact_rows(head, radii, labels, total=total, tooth=clamped, body=total - clamped)
+            yield from _contact_rows(
+                head, radii, labels, total=total, tooth=clamped, body=total - clamped
+            )
 
 
 def tooth() -> Iterator[Row]:
@@ -140,7 +154,9 @@ def tooth() -> Iterator[Row]:
         radii = contact_radii(gear, N_CONTACTS, tip_margin=TIP_MARGIN)
         total = structural_compliance(gear, radii, STRAIN)
         clamped = tooth_compliance(gear, radii, STRAIN)
-        yield from _contact_rows(_gear_columns(case), radii, total=total, tooth=clamped, body=total - clamped)
+        yield from _contact_rows(
+            _gear_columns(case), radii, total=total, tooth=clamped, body=total - clamped
+        )
 
 
 def crack() -> Iterator[Row]:
@@ -159,7 +175,9 @@ def crack() -> Iterator[Row]:
                     "depth_over_module": slit.depth / gear.normal_module,
                     "side": side,
                 }
-                yield from _contact_rows(head, radii, increment=crack_increment(gear, radii, STRAIN, slit))
+                yield from _contact_rows(
+                    head, radii, increment=crack_increment(gear, radii, STRAIN, slit)
+                )
 
 
 def _crack_families(case: str) -> Iterator[tuple[str, float, str]]:
@@ -209,8 +227,12 @@ def root_stress() -> Iterator[Row]:
         tip = math.sqrt(gear.tip_radius**2 - gear.base_radius**2)
         radii = tip - np.array(TIP_DISTANCES) * gear.base_pitch
         inside = radii > gear.junction_curvature_radius + TIP_MARGIN
-        factor, slope = root_stress_factor(gear, radii[inside], _plane("plane_stress"), resolution=FINE_ROOT)
-        for distance, value, angle in zip(np.array(TIP_DISTANCES)[inside], factor, np.degrees(slope), strict=True):
+        factor, slope = root_stress_factor(
+            gear, radii[inside], _plane("plane_stress"), resolution=FINE_ROOT
+        )
+        for distance, value, angle in zip(
+            np.array(TIP_DISTANCES)[inside], factor, np.degrees(slope), strict=True
+        ):
             yield _gear_columns(case) | {
                 "tip_distance_over_base_pitch": float(distance),
                 "stress_factor": float(value),
@@ -232,12 +254,23 @@ def _named_positions(pair: GearPair) -> dict[str, float]:
     """Positions s from A, m: start A and end E of contact, single zone B..D, pitch point C, midpoints."""
     end, pitch = pair.path_of_contact, pair.base_pitch
     b, c, d = end - pitch, pair.pitch_point, pitch
-    return {"A": 0.0, "AB": b / 2, "B": b, "BD": (b + d) / 2, "C": c, "D": d, "DE": (d + end) / 2, "E": end}
+    return {
+        "A": 0.0,
+        "AB": b / 2,
+        "B": b,
+        "BD": (b + d) / 2,
+        "C": c,
+        "D": d,
+        "DE": (d + end) / 2,
+        "E": end,
+    }
 
 
 def _radii(pair: GearPair, gear: Gear, position: Array) -> Array:
     """Curvature radii of one of the gears, kept on its involute against rounding."""
-    radii = pair.pinion_curvature(position) if gear is pair.pinion else pair.wheel_curvature(position)
+    radii = (
+        pair.pinion_curvature(position) if gear is pair.pinion else pair.wheel_curvature(position)
+    )
     return np.minimum(radii, math.sqrt(gear.tip_radius**2 - gear.base_radius**2))
 
 
@@ -245,7 +278,9 @@ def three_d_tables() -> dict[str, Iterable[Row]]:
     """Faults over a part of the face width of the reference pinion."""
     pair = _pair(9.0, 15.0)
     named = _named_positions(pair)
-    points = {point: float(_radii(pair, pair.pinion, np.array([named[point]]))[0]) for point in "CBDE"}
+    points = {
+        point: float(_radii(pair, pair.pinion, np.array([named[point]]))[0]) for point in "CBDE"
+    }
     return dict(three_d(pair.pinion, points, STEEL.poisson_ratio))
 
 
@@ -270,13 +305,20 @@ def write_table(path: Path, table: Iterable[Row]) -> int:
 
 
 def _rounded(row: Row) -> Row:
-    return {key: f"{value:.8g}" if isinstance(value, float) else value for key, value in row.items()}
+    return {
+        key: f"{value:.8g}" if isinstance(value, float) else value for key, value in row.items()
+    }
 
 
 def main(arguments: list[str] | None = None) -> None:
     """Command line: which tables to write."""
     parser = argparse.ArgumentParser(description=__doc__)
-    parser.add_argument("tables", nargs="*", metavar="table", help=f"one or more of {', '.join(TABLES)}; default all")
+    parser.add_argument(
+        "tables",
+        nargs="*",
+        metavar="table",
+        help=f"one or more of {', '.join(TABLES)}; default all",
+    )
     chosen = parser.parse_args(arguments).tables or list(TABLES)
     unknown = sorted(set(chosen) - set(TABLES))
     if unknown:

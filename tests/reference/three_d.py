@@ -42,13 +42,32 @@ N_STRIPS = 8  # of equal width, each under a uniform line load
 CRACK_DEPTHS = (0.5, 1.0)  # modules
 CRACK_EXTENTS = (0.25, 0.5, 1.0)  # of the face width, from the end face z = 0
 CRACK_START, CRACK_ANGLE = "arc_mid", math.radians(45.0)
-PIT_HEIGHT, PIT_DEPTH = 0.5, 0.25  # modules: along the tooth centreline, and in the thickness direction
+PIT_HEIGHT, PIT_DEPTH = (
+    0.5,
+    0.25,
+)  # modules: along the tooth centreline, and in the thickness direction
 PIT_STRIPS = range(2, 6)  # its extent: the middle half of the width
 SECTION = Resolution(
-    flank=0.25, root=0.2, neighbour=0.8, far=2.0, bore=1.5, crack_face=0.25, crack_tip=0.06, inside=2.2
+    flank=0.25,
+    root=0.2,
+    neighbour=0.8,
+    far=2.0,
+    bore=1.5,
+    crack_face=0.25,
+    crack_tip=0.06,
+    inside=2.2,
 )
 CELLS_AT_ONCE = 30_000  # bounds the memory of the assembly
-LAYERS = (2, 4, 4, 4, 4, 2, 2, 2)  # in each eighth of the width; the cracks end after the second and the fourth
+LAYERS = (
+    2,
+    4,
+    4,
+    4,
+    4,
+    2,
+    2,
+    2,
+)  # in each eighth of the width; the cracks end after the second and the fourth
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -63,7 +82,11 @@ class Fault:
 
 FAULTS = (
     Fault(name="sound"),
-    *(Fault(name="crack", crack_depth=depth, crack_extent=part) for depth in CRACK_DEPTHS for part in CRACK_EXTENTS),
+    *(
+        Fault(name="crack", crack_depth=depth, crack_extent=part)
+        for depth in CRACK_DEPTHS
+        for part in CRACK_EXTENTS
+    ),
     Fault(name="pit", pitted=True),
 )
 
@@ -85,21 +108,28 @@ class Extrusion:
         prism = np.stack([[*low, high[2]], [*low[:2], *high[1:]], [low[0], *high]], axis=1)
         cells = prism[:, None] + n_plane * np.arange(n_layers)[None, :, None, None]
         middle = 0.5 * (self.heights[1:] + self.heights[:-1]) / self.heights[-1]
-        points = np.vstack([np.tile(self.section.p, n_layers + 1), np.repeat(self.heights, n_plane)])
+        points = np.vstack(
+            [np.tile(self.section.p, n_layers + 1), np.repeat(self.heights, n_plane)]
+        )
         if fault.crack_depth > 0.0:
             points, cells = self._cracked(fault, points, cells, middle)
         strip = np.floor(middle * N_STRIPS)
         kept = ~(np.isin(strip, PIT_STRIPS)[:, None, None] & self.pit & fault.pitted)
         cells = cells[:, np.broadcast_to(kept, cells.shape[1:])]
         used, cells = np.unique(cells, return_inverse=True)
-        return MeshTet(np.ascontiguousarray(points[:, used]), np.ascontiguousarray(cells.reshape(4, -1)))
+        return MeshTet(
+            np.ascontiguousarray(points[:, used]), np.ascontiguousarray(cells.reshape(4, -1))
+        )
 
     def _cracked(
         self, fault: Fault, points: Array, cells: NDArray[np.int64], middle: Array
     ) -> tuple[Array, NDArray[np.int64]]:
         """Own nodes for the face on the left of the slit; those along the crack front stay shared."""
         reach = np.hypot(*(self.slit - self.slit[:, :1]))
-        opened = [nearest_node(self.section, point) for point in self.slit.T[reach < fault.crack_depth - 1e-6]]
+        opened = [
+            nearest_node(self.section, point)
+            for point in self.slit.T[reach < fault.crack_depth - 1e-6]
+        ]
         extent = fault.crack_extent * self.heights[-1]
         planes = np.flatnonzero((self.heights < extent - 1e-6) | (fault.crack_extent >= 1.0))
         nodes = (planes[:, None] * self.section.nvertices + np.array(opened)).ravel()
@@ -109,7 +139,9 @@ class Extrusion:
         return np.hstack([points, points[:, nodes]]), np.where(left, copies[cells], cells)
 
 
-def extrude(gear: Gear, radii: Array, *, sizes: Resolution = SECTION, layers: Sequence[int] = LAYERS) -> Extrusion:
+def extrude(
+    gear: Gear, radii: Array, *, sizes: Resolution = SECTION, layers: Sequence[int] = LAYERS
+) -> Extrusion:
     """The gear's section with nodes at contacts and on the centreline, and layers over its face width."""
     module = gear.normal_module
     crack = Crack(start=CRACK_START, angle=CRACK_ANGLE, depth=max(CRACK_DEPTHS) * module)
@@ -118,23 +150,33 @@ def extrude(gear: Gear, radii: Array, *, sizes: Resolution = SECTION, layers: Se
     outline = gear_outline(gear, {0: np.append(radii, ends)}, crack, sizes, modelled_teeth=3)
     floor = np.stack(involute_point(gear, ends)) / module - np.array([[0.0], [PIT_DEPTH]])
     wall = np.stack(involute_point(gear, ends)) / module
-    pit_line = np.hstack([wall[:, :1], np.linspace(floor[:, 0], floor[:, 1], 4, axis=1), wall[:, 1:]])
+    pit_line = np.hstack(
+        [wall[:, :1], np.linspace(floor[:, 0], floor[:, 1], 4, axis=1), wall[:, 1:]]
+    )
     crossings = [_crossing(gear, radius)[:, None] for radius in radii]
     bore = circle(gear.bore_radius / module, sizes.bore)
-    section = triangulate([Polyline.closed(outline), Polyline.closed(bore)], [slit, pit_line, *crossings], sizes.inside)
+    section = triangulate(
+        [Polyline.closed(outline), Polyline.closed(bore)],
+        [slit, pit_line, *crossings],
+        sizes.inside,
+    )
     centre = section.p[:, section.t].mean(axis=1)
     between = (wall[0, 0] < centre[0]) & (centre[0] < wall[0, 1])
     on_tooth = np.arctan2(centre[1], centre[0]) < math.pi / gear.n_teeth
     pit = on_tooth & between & (centre[1] > np.interp(centre[0], floor[0], floor[1]))
     width = gear.face_width / module
     edges = np.linspace(0.0, width, N_STRIPS + 1)
-    heights = np.concatenate([_graded(edges, index, count) for index, count in enumerate(layers)] + [[width]])
+    heights = np.concatenate(
+        [_graded(edges, index, count) for index, count in enumerate(layers)] + [[width]]
+    )
     return Extrusion(section=section, slit=slit, pit=pit, heights=heights)
 
 
 def _slit(gear: Gear, sizes: Resolution) -> Array:
     """Nodes of the deepest crack, refined at the tip of every depth."""
-    line = crack_line(gear, Crack(start=CRACK_START, angle=CRACK_ANGLE, depth=gear.normal_module), sizes)
+    line = crack_line(
+        gear, Crack(start=CRACK_START, angle=CRACK_ANGLE, depth=gear.normal_module), sizes
+    )
     mouth, direction = line[:, :1], line[:, -1:] - line[:, :1]
     first, *deeper = CRACK_DEPTHS
     along = [first - growing_steps(first, sizes.crack_tip * first, sizes.crack_face * first)[::-1]]
@@ -150,7 +192,9 @@ def _pit_ends(gear: Gear, pitch: float) -> Array:
     tip = math.sqrt(gear.tip_radius**2 - gear.base_radius**2)
 
     def beyond(radius: float, half: float) -> float:
-        return float(involute_point(gear, np.array([radius]))[0][0] - centre - half * gear.normal_module)
+        return float(
+            involute_point(gear, np.array([radius]))[0][0] - centre - half * gear.normal_module
+        )
 
     lower = brentq(beyond, gear.junction_curvature_radius, pitch, args=(-0.5 * PIT_HEIGHT,))
     return np.array([lower, brentq(beyond, pitch, tip, args=(0.5 * PIT_HEIGHT,))])
@@ -185,9 +229,14 @@ def solve(gear: Gear, radii: Array, mesh: MeshTet, poisson_ratio: float) -> Resp
     basis = Basis(mesh, ElementVector(ElementTetP2()), intorder=1)
     stiffness = _stiffness(mesh, basis.element_dofs, *lame_parameters(1.0, poisson_ratio))
     bore = np.hypot(*mesh.p[:2]) < gear.bore_radius / gear.normal_module + 1e-6
-    free = basis.complement_dofs(basis.get_dofs(facets=np.flatnonzero(bore[mesh.facets].all(axis=0))))
+    free = basis.complement_dofs(
+        basis.get_dofs(facets=np.flatnonzero(bore[mesh.facets].all(axis=0)))
+    )
     forces = [_force(gear, radius) for radius in radii]
-    flank = [np.stack(involute_point(gear, np.array([radius])))[:, 0] / gear.normal_module for radius in radii]
+    flank = [
+        np.stack(involute_point(gear, np.array([radius])))[:, 0] / gear.normal_module
+        for radius in radii
+    ]
     loads = np.hstack([_strip_means(basis, mesh, p, f) for p, f in zip(flank, forces, strict=True)])
     displacement = np.zeros_like(loads)
     displacement[free] = solve_definite(stiffness[free][:, free], loads[free])
@@ -198,30 +247,41 @@ def solve(gear: Gear, radii: Array, mesh: MeshTet, poisson_ratio: float) -> Resp
         crossing = _crossing(gear, radius)
         strips.append(_strip_means(basis, mesh, crossing, force).T @ moved)
         line = _line_nodes(mesh, crossing)
-        ends = [line[np.argmin(np.abs(mesh.p[2, line] - z))] for z in np.linspace(0.0, width, N_STRIPS + 1)]
+        ends = [
+            line[np.argmin(np.abs(mesh.p[2, line] - z))]
+            for z in np.linspace(0.0, width, N_STRIPS + 1)
+        ]
         profile.append(np.tensordot(force, moved.mean(axis=1)[basis.nodal_dofs[:2, ends]], axes=1))
     return Response(strips=np.stack(strips) * width, profile=np.stack(profile) * width)
 
 
-def _stiffness(mesh: MeshTet, dofs: NDArray[np.int64], lame_lambda: float, lame_mu: float) -> csr_matrix:
+def _stiffness(
+    mesh: MeshTet, dofs: NDArray[np.int64], lame_lambda: float, lame_mu: float
+) -> csr_matrix:
     """Stiffness of isotropic elasticity; ``dofs`` (3 x basis function, cell), components running fastest.
 
     With D[ia, jb] the integral of d_a phi_i d_b phi_j: lambda D[ia, jb] + mu D[ib, ja] + mu delta_ab D[ic, jc].
     """
     n_dofs, n_local = int(dofs.max()) + 1, len(dofs)
     total = csr_matrix((n_dofs, n_dofs))
-    for cells in np.array_split(np.arange(mesh.nelements), math.ceil(mesh.nelements / CELLS_AT_ONCE)):
+    for cells in np.array_split(
+        np.arange(mesh.nelements), math.ceil(mesh.nelements / CELLS_AT_ONCE)
+    ):
         scalar = Basis(mesh, ElementTetP2(), elements=cells, intorder=2)
         gradient = np.stack([shape[0].grad for shape in scalar.basis]) * np.sqrt(scalar.dx)
         gradient = gradient.transpose(2, 0, 1, 3).reshape(len(cells), n_local, -1)
-        products = (gradient @ gradient.transpose(0, 2, 1)).reshape(len(cells), n_local // 3, 3, n_local // 3, 3)
+        products = (gradient @ gradient.transpose(0, 2, 1)).reshape(
+            len(cells), n_local // 3, 3, n_local // 3, 3
+        )
         local = lame_lambda * products + lame_mu * products.swapaxes(2, 4)
         trace = lame_mu * np.einsum("eicjc->eij", products)
         for axis in range(3):
             local[:, :, axis, :, axis] += trace
         rows = np.broadcast_to(dofs.T[cells, :, None], (len(cells), n_local, n_local))
         columns = np.broadcast_to(dofs.T[cells, None, :], (len(cells), n_local, n_local))
-        total = total + csr_matrix((local.ravel(), (rows.ravel(), columns.ravel())), shape=total.shape)
+        total = total + csr_matrix(
+            (local.ravel(), (rows.ravel(), columns.ravel())), shape=total.shape
+        )
     return total
 
 
@@ -286,11 +346,16 @@ def rigid_compliance(strips: Array) -> float:
     return 1.0 / float(np.linalg.solve(strips, np.ones(len(strips))).sum())
 
 
-def summary_rows(fault: Fault, response: Response, points: dict[str, float], module: float) -> Iterator[Row]:
+def summary_rows(
+    fault: Fault, response: Response, points: dict[str, float], module: float
+) -> Iterator[Row]:
     """Means, profiles over the width and, at the pitch point C, the compliance of a rigid contact."""
     outside = [strip for strip in range(N_STRIPS) if strip not in PIT_STRIPS]
     for index, (point, radius) in enumerate(points.items()):
-        head = _fault_columns(fault) | {"point": point, "curvature_radius_over_module": radius / module}
+        head = _fault_columns(fault) | {
+            "point": point,
+            "curvature_radius_over_module": radius / module,
+        }
         whole, partial = response.strips[index], response.strips[index][np.ix_(outside, outside)]
         if not fault.pitted:
             yield head | _value("mean", 1.0, whole.mean())
@@ -309,7 +374,11 @@ def flexibility_rows(fault: Fault, response: Response) -> Iterator[Row]:
         for loaded in range(N_STRIPS):
             if not (fault.pitted and (measured in PIT_STRIPS or loaded in PIT_STRIPS)):
                 value = float(response.strips[0, measured, loaded])
-                yield _fault_columns(fault) | {"strip_measured": measured, "strip_loaded": loaded, "compliance": value}
+                yield _fault_columns(fault) | {
+                    "strip_measured": measured,
+                    "strip_loaded": loaded,
+                    "compliance": value,
+                }
 
 
 def _fault_columns(fault: Fault) -> Row:
@@ -322,4 +391,9 @@ def _fault_columns(fault: Fault) -> Row:
 
 def _value(quantity: str, loaded: float, compliance: float, place: float | None = None) -> Row:
     where = "" if place is None else place
-    return {"quantity": quantity, "loaded_over_width": loaded, "z_over_width": where, "compliance": float(compliance)}
+    return {
+        "quantity": quantity,
+        "loaded_over_width": loaded,
+        "z_over_width": where,
+        "compliance": float(compliance),
+    }

@@ -67,7 +67,12 @@ class TestRandomWalk:
         normed = (draws - 1.0) / WALK.scatter
         for lag in (1, 20, 40, 100):  # twentieths of the correlation time
             expected = math.exp(-lag / 20)
-            assert_allclose((normed[:, 0] * normed[:, lag]).mean(), expected, rtol=0, atol=4.5 / math.sqrt(every))
+            assert_allclose(
+                (normed[:, 0] * normed[:, lag]).mean(),
+                expected,
+                rtol=0,
+                atol=4.5 / math.sqrt(every),
+            )
 
     def test_it_stays_above_its_least_factor(self):
         wide = RandomWalk(scatter=0.2, correlation_time=0.02)
@@ -93,7 +98,9 @@ class TestRandomWalk:
             replace(WALK, **values)
 
     def test_too_many_points(self):
-        with pytest.raises(ConfigError, match=r"correlation_time_s = 0.02 needs 1002002 points for 1000 s") as caught:
+        with pytest.raises(
+            ConfigError, match=r"correlation_time_s = 0.02 needs 1002002 points for 1000 s"
+        ) as caught:
             walk(0, replace(WALK, correlation_time=0.02), duration=1000.0)
         least = float(re.search(r"give ([\d.]+) or more", str(caught.value))[1])
         assert len(walk(0, replace(WALK, correlation_time=least), duration=1000.0).times) > 90_000
@@ -121,7 +128,9 @@ class TestRipple:
         edges = [0.0, *(inside if time > 0 else inside[::-1]), time]
         expected = sum(quad(wave, a, b, limit=200)[0] for a, b in itertools.pairwise(edges))
         at = np.array([time, 0.0])
-        assert_allclose(ripple.gained(at, angle(at), set_speed, profile), [expected, 0.0], rtol=1e-8, atol=1e-10)
+        assert_allclose(
+            ripple.gained(at, angle(at), set_speed, profile), [expected, 0.0], rtol=1e-8, atol=1e-10
+        )
 
     @pytest.mark.parametrize("name", list(RIPPLES))
     def test_later_is_the_same_function_of_time(self, name):
@@ -144,7 +153,10 @@ class TestRipple:
             ({"share": 1.0, "order": 1.0}, "share = 1 must lie in 0..1, 1 not included"),
             ({"share": -0.1, "order": 1.0}, "share = -0.1 must lie in 0..1"),
             ({"share": 0.1}, "give order (of the pinion's turn) or frequency_hz, one of the two"),
-            ({"share": 0.1, "order": 1.0, "frequency": 5.0}, "give order (of the pinion's turn) or frequency_hz"),
+            (
+                {"share": 0.1, "order": 1.0, "frequency": 5.0},
+                "give order (of the pinion's turn) or frequency_hz",
+            ),
             ({"share": 0.1, "order": 0.0}, "order = 0 must be positive"),
             ({"share": 0.1, "frequency": -5.0}, "frequency_hz = -5 must be positive"),
         ],

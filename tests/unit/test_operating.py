@@ -19,13 +19,17 @@ from gensig.record.inputs import InputReader
 from gensig.systems.registry import read_system
 
 POINTS = ((-0.2, 0.5), (0.3, 0.8), (0.7, 1.0), (1.0, 0.25))
-PROFILE = Profile(times=tuple(time for time, _ in POINTS), factors=tuple(factor for _, factor in POINTS))
+PROFILE = Profile(
+    times=tuple(time for time, _ in POINTS), factors=tuple(factor for _, factor in POINTS)
+)
 
 
 @pytest.fixture
 def operating(xiamen):
     return replace(
-        xiamen.operating, speed_profile=PROFILE, torque_profile=Profile(times=(0.0, 2.0), factors=(0.0, 1.5))
+        xiamen.operating,
+        speed_profile=PROFILE,
+        torque_profile=Profile(times=(0.0, 2.0), factors=(0.0, 1.5)),
     )
 
 
@@ -68,16 +72,22 @@ class TestNominal:
     def test_whole_numbers_are_times_too(self, operating, xiamen):
         times = np.arange(3)
         for one in (operating, xiamen.operating):
-            assert_allclose(one.nominal(times).angle, one.nominal(times.astype(float)).angle, rtol=0, atol=0)
+            assert_allclose(
+                one.nominal(times).angle, one.nominal(times.astype(float)).angle, rtol=0, atol=0
+            )
             assert one.nominal(times).torque_factor.dtype == np.float64
 
     @given(profile=profiles(), time=st.floats(-5.0, 12.0))
     def test_the_angle_is_the_integral_of_the_speed_from_time_0(self, xiamen, profile, time):
         operating = replace(xiamen.operating, speed_profile=profile)
         inside = [knot for knot in profile.times if min(0.0, time) < knot < max(0.0, time)]
-        expected, _ = quad(lambda t: float(profile.curve()(t)), 0.0, time, points=inside or None, limit=100)
+        expected, _ = quad(
+            lambda t: float(profile.curve()(t)), 0.0, time, points=inside or None, limit=100
+        )
         found = operating.nominal(np.array([time, 0.0])).angle
-        assert_allclose(found, [operating.speed * expected, 0.0], rtol=1e-9, atol=1e-9 * operating.speed)
+        assert_allclose(
+            found, [operating.speed * expected, 0.0], rtol=1e-9, atol=1e-9 * operating.speed
+        )
 
     def test_the_angle_is_negative_before_time_0(self, operating):
         assert_allclose(operating.nominal(np.array([-0.4, -0.2])).angle / operating.speed,
@@ -87,8 +97,15 @@ class TestNominal:
         times, h = np.array([-0.3, 0.1, 0.5, 0.9, 1.4]), 1e-6
         before, at, after = (operating.nominal(times + shift) for shift in (-h, 0.0, h))
         assert_allclose(at.speed, (after.angle - before.angle) / (2 * h), rtol=1e-7, atol=0)
-        assert_allclose(at.acceleration, (after.speed - before.speed) / (2 * h), rtol=1e-6, atol=1e-6)
-        assert_allclose(at.torque_slope, (after.torque_factor - before.torque_factor) / (2 * h), rtol=1e-6, atol=1e-6)
+        assert_allclose(
+            at.acceleration, (after.speed - before.speed) / (2 * h), rtol=1e-6, atol=1e-6
+        )
+        assert_allclose(
+            at.torque_slope,
+            (after.torque_factor - before.torque_factor) / (2 * h),
+            rtol=1e-6,
+            atol=1e-6,
+        )
 
     def test_torque_follows_its_own_profile(self, operating):
         found = operating.nominal(np.array([-1.0, 0.5, 9.0]))
@@ -96,8 +113,13 @@ class TestNominal:
         assert_allclose(found.torque_slope, [0, 0.75, 0], rtol=1e-12, atol=0)
 
     def test_a_profile_of_ones_is_none(self, xiamen):
-        times, ones = np.linspace(-0.5, 2.0, 11), Profile(times=(0.0, 0.4, 1.0), factors=(1.0, 1.0, 1.0))
-        with_ones = replace(xiamen.operating, speed_profile=ones, torque_profile=ones).nominal(times)
+        times, ones = (
+            np.linspace(-0.5, 2.0, 11),
+            Profile(times=(0.0, 0.4, 1.0), factors=(1.0, 1.0, 1.0)),
+        )
+        with_ones = replace(xiamen.operating, speed_profile=ones, torque_profile=ones).nominal(
+            times
+        )
         plain = xiamen.operating.nominal(times)
         for name in ("angle", "speed", "acceleration", "torque_factor", "torque_slope"):
             assert_allclose(getattr(with_ones, name), getattr(plain, name), rtol=1e-14, atol=1e-13)
@@ -105,7 +127,10 @@ class TestNominal:
 
 class TestConfiguration:
     def test_profiles_compose_and_read(self):
-        words = ["operating.speed_profile=[[0,0.5],[1,1]]", "operating.torque_profile=[[0.1,0],[0.2,1.5],[1,1]]"]
+        words = [
+            "operating.speed_profile=[[0,0.5],[1,1]]",
+            "operating.torque_profile=[[0.1,0],[0.2,1.5],[1,1]]",
+        ]
         config = read_request(words).config
         assert config["operating"]["speed_profile"] == [[0, 0.5], [1, 1]]
         operating = read_system(config).operating
@@ -113,27 +138,41 @@ class TestConfiguration:
         assert operating.torque_profile == Profile(times=(0.1, 0.2, 1.0), factors=(0.0, 1.5, 1.0))
 
     def test_constant_by_default(self, xiamen, composed_config):
-        assert composed_config["operating"]["speed_profile"] is composed_config["operating"]["torque_profile"] is None
+        assert (
+            composed_config["operating"]["speed_profile"]
+            is composed_config["operating"]["torque_profile"]
+            is None
+        )
         assert xiamen.operating.speed_profile is xiamen.operating.torque_profile is None
 
     def test_a_drawn_speed_scales_the_profile(self, config_with):
         config = config_with({"operating.speed_profile": [[0, 0.5], [1, 1]]})
         slow, fast = (
-            InputReader(config).machine({"operating.speed_rpm": speed}).operating for speed in (600.0, 1200.0)
+            InputReader(config).machine({"operating.speed_rpm": speed}).operating
+            for speed in (600.0, 1200.0)
         )
         times = np.array([-0.3, 0.5, 2.0])
-        assert_allclose(slow.nominal(times).speed, 20 * math.pi * np.array([0.5, 0.75, 1.0]), rtol=1e-12, atol=0)
-        assert_allclose(fast.nominal(times).angle, 2 * slow.nominal(times).angle, rtol=1e-12, atol=0)
+        assert_allclose(
+            slow.nominal(times).speed, 20 * math.pi * np.array([0.5, 0.75, 1.0]), rtol=1e-12, atol=0
+        )
+        assert_allclose(
+            fast.nominal(times).angle, 2 * slow.nominal(times).angle, rtol=1e-12, atol=0
+        )
 
     def test_as_many_points_as_allowed(self):
-        many = read_profile("operating.speed_profile", [[place * 1e-3, 1.0] for place in range(MOST_POINTS)])
+        many = read_profile(
+            "operating.speed_profile", [[place * 1e-3, 1.0] for place in range(MOST_POINTS)]
+        )
         assert len(many.times) == MOST_POINTS
 
     @pytest.mark.parametrize("key", ["speed_profile", "torque_profile"])
     @pytest.mark.parametrize(
         ("value", "text"),
         [
-            (3, " = 3 is no list; give [time_s, factor] pairs, a group with a kind, or null for a constant"),
+            (
+                3,
+                " = 3 is no list; give [time_s, factor] pairs, a group with a kind, or null for a constant",
+            ),
             ("ramp", " = 'ramp' is no list; give [time_s, factor] pairs"),
             ({"a": 1}, ".kind = None; allowed: ramp, random_walk, file"),
             ({"kind": "sine"}, ".kind = 'sine'; allowed: ramp, random_walk, file"),
@@ -148,10 +187,19 @@ class TestConfiguration:
             ([[0, None], [1, 1]], ": point 0 = [0, None]; give two finite numbers"),
             ([[0, math.nan], [1, 1]], ": point 0 = [0, nan]; give two finite numbers"),
             ([[0, 1], [math.inf, 1]], ": point 1 = [inf, 1]; give two finite numbers"),
-            ([[0, 1], [2e6, 1]], ": point 1 = [2e+06, 1]; give a time within 1e+06 s and a finite factor"),
-            ([[0, 1], [0, 2]], ": the time 0 s follows 0 s; times must increase, by 0.001 s or more"),
+            (
+                [[0, 1], [2e6, 1]],
+                ": point 1 = [2e+06, 1]; give a time within 1e+06 s and a finite factor",
+            ),
+            (
+                [[0, 1], [0, 2]],
+                ": the time 0 s follows 0 s; times must increase, by 0.001 s or more",
+            ),
             ([[0, 1], [1, 1], [0.5, 1]], ": the time 0.5 s follows 1 s; times must increase"),
-            ([[0, 1], [1e-5, 1]], ": the time 1e-05 s follows 0 s; times must increase, by 0.001 s or more"),
+            (
+                [[0, 1], [1e-5, 1]],
+                ": the time 1e-05 s follows 0 s; times must increase, by 0.001 s or more",
+            ),
             ([[0, 1], [1, -0.5]], ": factor -0.5 must "),
         ],
     )
@@ -163,7 +211,9 @@ class TestConfiguration:
     def test_a_torque_may_fall_to_nothing_but_no_speed(self, machine):
         value = [[0, 1], [1, 0]]
         assert machine({"operating.torque_profile": value}).operating.torque_profile is not None
-        with pytest.raises(ConfigError, match=re.escape("operating.speed_profile: factor 0 must be positive")):
+        with pytest.raises(
+            ConfigError, match=re.escape("operating.speed_profile: factor 0 must be positive")
+        ):
             machine({"operating.speed_profile": value})
 
     def test_a_number_too_large_for_a_computer(self):

@@ -39,19 +39,31 @@ class TestKinds:
 
     def test_walks_of_speed_and_torque_are_different(self, operating):
         found = operating({SPEED: WALK, TORQUE: WALK})
-        one, other = (np.array(course.factors) for course in (found.speed_profile, found.torque_profile))
+        one, other = (
+            np.array(course.factors) for course in (found.speed_profile, found.torque_profile)
+        )
         assert abs(np.corrcoef(one, other)[0, 1]) < 0.5
         assert operating({SPEED: WALK, TORQUE: WALK}) == found
-        assert operating({SPEED: WALK, "operating.course_seed": 1}).speed_profile != found.speed_profile
+        assert (
+            operating({SPEED: WALK, "operating.course_seed": 1}).speed_profile
+            != found.speed_profile
+        )
         assert operating({SPEED: WALK}).speed_profile == found.speed_profile
 
     def test_the_options_compose(self):
-        ramp, drifting = (read_request([f"operating={name}"]).config for name in ("ramp", "drifting"))
+        ramp, drifting = (
+            read_request([f"operating={name}"]).config for name in ("ramp", "drifting")
+        )
         found = read_system(ramp).operating
         assert found.speed_profile == Profile(times=(0.0, 4.0), factors=(0.5, 1.0))
         assert found.torque_profile is None
         found = read_system(drifting).operating
-        assert None not in (found.speed_profile, found.torque_profile, found.speed_ripple, found.torque_ripple)
+        assert None not in (
+            found.speed_profile,
+            found.torque_profile,
+            found.speed_ripple,
+            found.torque_ripple,
+        )
         assert not found.is_steady
         assert read_system(read_request([]).config).operating.is_steady
 
@@ -71,22 +83,33 @@ class TestKinds:
     def test_a_file_of_speeds_and_one_of_torques(self, operating, tmp_path):
         own = saved(tmp_path, "time_s,speed_rpm\n0,900\n1,1500\n")
         for speed in (600.0, 1800.0):
-            found = operating({SPEED: own, "operating.speed_rpm": speed}).nominal(np.array([-1.0, 0.5, 1.0]))
-            assert_allclose(found.speed, np.array([900, 1200, 1500]) * math.pi / 30, rtol=1e-12, atol=0)
+            found = operating({SPEED: own, "operating.speed_rpm": speed}).nominal(
+                np.array([-1.0, 0.5, 1.0])
+            )
+            assert_allclose(
+                found.speed, np.array([900, 1200, 1500]) * math.pi / 30, rtol=1e-12, atol=0
+            )
         own = saved(tmp_path, "time_s,torque_nm\n0,10\n1,40\n")
         found = operating({TORQUE: own})
-        assert_allclose(found.torque * found.nominal(np.array([0.5])).torque_factor, 25, rtol=1e-12, atol=0)
+        assert_allclose(
+            found.torque * found.nominal(np.array([0.5])).torque_factor, 25, rtol=1e-12, atol=0
+        )
 
     def test_a_file_may_end_one_step_early(self, operating, tmp_path):
         rows = "".join(f"{k / 100},1\n" for k in range(100))
-        assert operating({SPEED: saved(tmp_path, "time_s,factor\n" + rows)}).speed_profile is not None
+        assert (
+            operating({SPEED: saved(tmp_path, "time_s,factor\n" + rows)}).speed_profile is not None
+        )
 
 
 class TestRefusals:
     @pytest.mark.parametrize(
         ("value", "text"),
         [
-            ({**RAMP, "slope": 1}, ": unknown key 'slope'; known: first_factor, last_factor, begin_s, end_s"),
+            (
+                {**RAMP, "slope": 1},
+                ": unknown key 'slope'; known: first_factor, last_factor, begin_s, end_s",
+            ),
             ({"kind": "ramp", "first_factor": 1}, ": missing last_factor"),
             ({**RAMP, "end": 1}, ": 'end' has the wrong unit; write it as 'end_s'"),
             ({**RAMP, "end_s": 0}, ": the time 0 s follows 0 s; times must increase"),
@@ -109,19 +132,37 @@ class TestRefusals:
     @pytest.mark.parametrize(
         ("text", "told"),
         [
-            ("time_s,rpm\n0,1\n1,1\n", "no column speed_rpm or factor; it must have time_s and one of the two"),
+            (
+                "time_s,rpm\n0,1\n1,1\n",
+                "no column speed_rpm or factor; it must have time_s and one of the two",
+            ),
             ("time_s,speed_hz\n0,1\n1,1\n", "no column speed_rpm or factor"),
-            ("time_s,speed_rpm,factor\n0,1,1\n1,1,1\n", "unknown column factor; it must have time_s, speed_rpm"),
+            (
+                "time_s,speed_rpm,factor\n0,1,1\n1,1,1\n",
+                "unknown column factor; it must have time_s, speed_rpm",
+            ),
             ("t,factor\n0,1\n1,1\n", "no column time_s; it must have time_s, factor"),
             ("time_s,factor\n0,1\n1,nan\n", "row 3, column factor is no finite number"),
             ("time_s,factor\n0,1\n1,fast\n", "give numbers under one header"),
             ("time_s,factor\n0,1\n1\n", "give numbers under one header"),
             ("time_s,factor\n0,1\n", "is too short: 1 rows, at least 2 are needed"),
             ("time_s,factor\n0,1\n2,1\n1,1\n", "the time 1 s follows 2 s; times must increase"),
-            ("time_s,factor\n0,1\n1e-4,1\n1,1\n", "the time 0.0001 s follows 0 s; times must increase, by 0.001 s"),
-            ("time_s,factor\n0,1\n0.2,1\n0.4,1\n", "is too short: it runs from 0 s to 0.4 s, the record from 0 to 1 s"),
-            ("time_s,factor\n0.1,1\n2,1\n", "is too short: it runs from 0.1 s to 2 s, the record from 0 to 1 s"),
-            ("time_s,speed_rpm\n0,100\n1,0\n", "operating.speed_profile: factor 0 must be positive"),
+            (
+                "time_s,factor\n0,1\n1e-4,1\n1,1\n",
+                "the time 0.0001 s follows 0 s; times must increase, by 0.001 s",
+            ),
+            (
+                "time_s,factor\n0,1\n0.2,1\n0.4,1\n",
+                "is too short: it runs from 0 s to 0.4 s, the record from 0 to 1 s",
+            ),
+            (
+                "time_s,factor\n0.1,1\n2,1\n",
+                "is too short: it runs from 0.1 s to 2 s, the record from 0 to 1 s",
+            ),
+            (
+                "time_s,speed_rpm\n0,100\n1,0\n",
+                "operating.speed_profile: factor 0 must be positive",
+            ),
         ],
     )
     def test_of_files(self, config_with, tmp_path, text, told):
@@ -138,8 +179,14 @@ class TestRefusals:
             ({"share": 0.1}, ": give order (of the pinion's turn) or frequency_hz"),
             ({"share": "x", "order": 1}, ".share = 'x' is not a number"),
             ({"share": 0.1, "orders": 1}, ": unknown key 'orders'; did you mean 'order'?"),
-            ({"share": 0.1, "frequency": 1}, ": 'frequency' has the wrong unit; write it as 'frequency_hz'"),
-            ({"share": 0.1, "frequency_hz": 151}, ": frequency_hz = 151 Hz, above 150 Hz; the course runs straight"),
+            (
+                {"share": 0.1, "frequency": 1},
+                ": 'frequency' has the wrong unit; write it as 'frequency_hz'",
+            ),
+            (
+                {"share": 0.1, "frequency_hz": 151},
+                ": frequency_hz = 151 Hz, above 150 Hz; the course runs straight",
+            ),
             ({"share": 0.1, "order": 6}, ": order 6 makes up to 180 Hz, above 150 Hz"),
         ],
     )
@@ -178,25 +225,38 @@ class TestRipple:
         assert_allclose(nominal.speed / found.speed, [1.1, 1.0, 0.9], rtol=1e-12, atol=0)
         assert_allclose(nominal.torque_factor, 1.0, rtol=0, atol=0)
 
-    @pytest.mark.parametrize("ripple", [{"share": 0.1, "order": 2}, {"share": 0.2, "frequency_hz": 9}])
+    @pytest.mark.parametrize(
+        "ripple", [{"share": 0.1, "order": 2}, {"share": 0.2, "frequency_hz": 9}]
+    )
     def test_speed_and_slopes_are_derivatives(self, operating, ripple):
         found = operating({SPEED: WALK, TORQUE: RAMP, "operating.speed_ripple": ripple,
                            "operating.torque_ripple": {**ripple, "phase_deg": 30}})  # fmt: skip
         times, h = np.array([-0.2512, 0.1013, 0.5017, 0.9123]), 1e-6
         before, at, after = (found.nominal(times + shift) for shift in (-h, 0.0, h))
         assert_allclose(at.speed, (after.angle - before.angle) / (2 * h), rtol=1e-7, atol=0)
-        assert_allclose(at.acceleration, (after.speed - before.speed) / (2 * h), rtol=1e-5, atol=1e-4)
-        assert_allclose(at.torque_slope, (after.torque_factor - before.torque_factor) / (2 * h), rtol=1e-5, atol=1e-5)
+        assert_allclose(
+            at.acceleration, (after.speed - before.speed) / (2 * h), rtol=1e-5, atol=1e-4
+        )
+        assert_allclose(
+            at.torque_slope,
+            (after.torque_factor - before.torque_factor) / (2 * h),
+            rtol=1e-5,
+            atol=1e-5,
+        )
 
     def test_the_order_follows_the_set_angle_of_both_shafts_courses(self, operating):
         """On a ramp a torque ripple of order 2 has two periods a turn of the pinion, whatever the speed."""
         found = operating({SPEED: RAMP, "operating.torque_ripple": {"share": 0.1, "order": 2}})
         times = np.linspace(0.0, 1.0, 2001)
         nominal = found.nominal(times)
-        assert_allclose(nominal.torque_factor, 1 + 0.1 * np.sin(2 * nominal.angle), rtol=0, atol=1e-9)
+        assert_allclose(
+            nominal.torque_factor, 1 + 0.1 * np.sin(2 * nominal.angle), rtol=0, atol=1e-9
+        )
 
 
-@pytest.mark.parametrize("ripple", [{"share": 0.02, "order": 2}, {"share": 0.02, "frequency_hz": 50, "phase_deg": 20}])
+@pytest.mark.parametrize(
+    "ripple", [{"share": 0.02, "order": 2}, {"share": 0.02, "frequency_hz": 50, "phase_deg": 20}]
+)
 def test_a_lead_in_shifts_all_courses_alike(machine, ripple):
     changes = {SPEED: WALK, TORQUE: WALK, "operating.speed_ripple": ripple, "operating.torque_ripple": ripple,
                "sensing.sensor.low_cutoff_hz": 2.0}  # fmt: skip

@@ -28,7 +28,14 @@ class Shaft:
     width: float | None = unit("mm", default=None)
 
 
-GOOD = {"length_mm": 12.5, "inertia_kg_m2": 2, "angle_deg": 90, "n_keys": 2, "hollow": True, "share": 0.5}
+GOOD = {
+    "length_mm": 12.5,
+    "inertia_kg_m2": 2,
+    "angle_deg": 90,
+    "n_keys": 2,
+    "hollow": True,
+    "share": 0.5,
+}
 
 
 def shaft(**changes):
@@ -84,13 +91,16 @@ def test_the_longest_suffix_wins(name, parts):
 
 def test_read_converts_and_fills():
     found = shaft(labels=["a", "b"])
-    assert_allclose([found.length, found.inertia, found.angle], [12.5e-3, 2.0, math.pi / 2], rtol=1e-14, atol=0)
+    assert_allclose(
+        [found.length, found.inertia, found.angle], [12.5e-3, 2.0, math.pi / 2], rtol=1e-14, atol=0
+    )
     assert (found.name, found.n_keys, found.hollow, found.labels) == ("shaft", 2, True, ("a", "b"))
     assert shaft(angle_deg=None).angle is None
 
 
 @pytest.mark.parametrize(
-    ("value", "expected"), [(3, 3), ("all", "all"), ([3], (3,)), ([1, 5], (1, 5)), ((1, 5), (1, 5)), ([], ())]
+    ("value", "expected"),
+    [(3, 3), ("all", "all"), ([3], (3,)), ([1, 5], (1, 5)), ((1, 5), (1, 5)), ([], ())],
 )
 def test_a_number_a_word_or_a_list(value, expected):
     found = shaft(places=value).places
@@ -118,7 +128,11 @@ def test_a_unit_with_a_default():
         ("length", 1, "gear.shaft: 'length' has the wrong unit; write it as 'length_mm'"),
         ("share_mm", 1, "gear.shaft: 'share_mm' has the wrong unit; write it as 'share'"),
         ("name", "x", "gear.shaft: unknown key 'name'"),
-        ("zzz", 1, "gear.shaft: unknown key 'zzz'; known: length_mm, inertia_kg_m2, angle_deg, n_keys"),
+        (
+            "zzz",
+            1,
+            "gear.shaft: unknown key 'zzz'; known: length_mm, inertia_kg_m2, angle_deg, n_keys",
+        ),
         ("length_mm", "long", "gear.shaft.length_mm = 'long' is not a number"),
         ("length_mm", True, "gear.shaft.length_mm = True is not a number"),
         ("length_mm", math.nan, "gear.shaft.length_mm = nan is not finite"),
@@ -133,16 +147,40 @@ def test_a_unit_with_a_default():
         ("labels", ["a", 1], "gear.shaft.labels = ['a', 1] is not a list of names"),
         ("labels", None, "gear.shaft.labels is null; give a value"),
         ("seats_mm", [1, "x"], "gear.shaft.seats_mm = [1, 'x'] is not a list of numbers or null"),
-        ("seats_mm", [1, math.nan], "gear.shaft.seats_mm = [1, nan] is not a list of numbers or null"),
+        (
+            "seats_mm",
+            [1, math.nan],
+            "gear.shaft.seats_mm = [1, nan] is not a list of numbers or null",
+        ),
         ("seats_mm", 3, "gear.shaft.seats_mm = 3 is not a list of numbers or null"),
         ("seats", [1], "gear.shaft: 'seats' has the wrong unit; write it as 'seats_mm'"),
         ("angle_deg", "x", "gear.shaft.angle_deg = 'x' is not a number or null"),
         ("angle_deg", math.inf, "gear.shaft.angle_deg = inf is not finite"),
-        ("places", 1.5, "gear.shaft.places = 1.5 is not a whole number or text or a list of whole numbers"),
-        ("places", True, "gear.shaft.places = True is not a whole number or text or a list of whole numbers"),
-        ("places", [1, True], "gear.shaft.places = [1, True] is not a whole number or text or a list"),
-        ("places", ["all"], "gear.shaft.places = ['all'] is not a whole number or text or a list of whole numbers"),
-        ("places", {"a": 1}, "gear.shaft.places = {'a': 1} is not a whole number or text or a list of whole numbers"),
+        (
+            "places",
+            1.5,
+            "gear.shaft.places = 1.5 is not a whole number or text or a list of whole numbers",
+        ),
+        (
+            "places",
+            True,
+            "gear.shaft.places = True is not a whole number or text or a list of whole numbers",
+        ),
+        (
+            "places",
+            [1, True],
+            "gear.shaft.places = [1, True] is not a whole number or text or a list",
+        ),
+        (
+            "places",
+            ["all"],
+            "gear.shaft.places = ['all'] is not a whole number or text or a list of whole numbers",
+        ),
+        (
+            "places",
+            {"a": 1},
+            "gear.shaft.places = {'a': 1} is not a whole number or text or a list of whole numbers",
+        ),
     ],
 )
 def test_mistakes_are_answered(key, value, text):
@@ -152,4 +190,9 @@ def test_mistakes_are_answered(key, value, text):
 
 def test_missing_keys_are_named():
     with pytest.raises(ConfigError, match=r"gear.shaft: missing length_mm, n_keys"):
-        read(Shaft, {k: v for k, v in GOOD.items() if k not in ("length_mm", "n_keys")}, "gear.shaft", name="shaft")
+        read(
+            Shaft,
+            {k: v for k, v in GOOD.items() if k not in ("length_mm", "n_keys")},
+            "gear.shaft",
+            name="shaft",
+        )

@@ -49,7 +49,9 @@ def plot_dampers(
         )
     first = states["before"]
     rpm = from_si("speed_rpm", first.load.speed)
-    axes[0, 0].set(title="Largest tooth force of a cycle", xlabel="speed of the crank, r/min", ylabel="kN")
+    axes[0, 0].set(
+        title="Largest tooth force of a cycle", xlabel="speed of the crank, r/min", ylabel="kN"
+    )
     axes[0, 0].set_ylim(0.0, None)
     axes[0, 1].axhline(0.0, color=GREY, linewidth=0.8)
     axes[0, 1].set(
@@ -61,7 +63,10 @@ def plot_dampers(
     )
     axes[0, 1].set_ylim(None, 1.35 * first.load.greatest / 1e3)  # room for the legend
     axes[1, 0].set(
-        title=f"Tooth force by orders at {rpm:g} r/min", xlabel="order", ylabel="amplitude, kN", xlim=(0, 60)
+        title=f"Tooth force by orders at {rpm:g} r/min",
+        xlabel="order",
+        ylabel="amplitude, kN",
+        xlim=(0, 60),
     )
     gear = first.root.strength.decisive
     axes[1, 1].set(

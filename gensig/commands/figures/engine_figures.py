@@ -27,7 +27,9 @@ def plot_response(line: EngineLine, found: ResponseResult, path: Path) -> None:
     blocks |= {"roots": 1 if found.roots else 0, "sweep": 3 if found.sweep else 0}
     blocks |= {"linear": 0 if turns_evenly(line) else 1}
     n_rows = 1 + sum(blocks.values())
-    figure, axes = pyplot.subplots(n_rows, 2, figsize=(12, 3.7 * n_rows), layout="constrained", squeeze=False)
+    figure, axes = pyplot.subplots(
+        n_rows, 2, figsize=(12, 3.7 * n_rows), layout="constrained", squeeze=False
+    )
     if isinstance(line.engine, Engine):
         _cycle(axes[0, 0], line.engine, found)
         _orders(axes[0, 1], line, line.engine, found)
@@ -86,7 +88,10 @@ def _orders(axes: Any, line: EngineLine, engine: Engine, found: ResponseResult) 
     on = found.torques.on(line.drive.numbers)
     numbers, throws = line.drive.numbers, list(engine.throw_nodes)
     plungers = list(engine.plunger_nodes.values())
-    rows = [("one throw", on[numbers.index(throws[0])]), ("all throws together", _sum(on, numbers, throws))]
+    rows = [
+        ("one throw", on[numbers.index(throws[0])]),
+        ("all throws together", _sum(on, numbers, throws)),
+    ]
     if plungers:
         rows.append(("all plungers together", _sum(on, numbers, plungers)))
     for (name, row), colour, width in zip(rows, COLOURS, (0.4, 0.22, 0.1), strict=False):
@@ -94,7 +99,12 @@ def _orders(axes: Any, line: EngineLine, engine: Engine, found: ResponseResult) 
         orders = np.arange(1, SHOWN_ORDERS + 1) / 2.0
         shown = np.abs(amplitude) > 1e-6 * np.abs(amplitude).max()
         axes.bar(orders[shown], np.abs(amplitude)[shown], width=width, color=colour, label=name)
-    axes.set(title="Torques by orders of the crank", xlabel="order", ylabel="amplitude, N m", yscale="log")
+    axes.set(
+        title="Torques by orders of the crank",
+        xlabel="order",
+        ylabel="amplitude, N m",
+        yscale="log",
+    )
     axes.set_ylim(1.0, None)
     axes.legend()
 
@@ -118,7 +128,12 @@ def _speeds(axes: Any, line: EngineLine, found: ResponseResult) -> None:
             linewidth=1.1,
             label=f"{_name(line, node)}: +- {rpm * half[place]:.1f}",
         )
-    axes.set(title="Speed less its mean", xlabel=f"angle of the {turner(line)}, degrees", ylabel="r/min", xlim=(0, 720))
+    axes.set(
+        title="Speed less its mean",
+        xlabel=f"angle of the {turner(line)}, degrees",
+        ylabel="r/min",
+        xlim=(0, 720),
+    )
     axes.set_xticks(range(0, 721, 90))
     axes.margins(y=0.25)
     axes.legend(loc="upper right", fontsize=8)
@@ -131,8 +146,15 @@ def _spectra(axes: Any, line: EngineLine, found: ResponseResult) -> None:
     for node, colour, marker in zip(found.nodes, COLOURS, "osD^v<", strict=False):
         amplitude = np.degrees(np.abs(found.response.angle[line.drive.numbers.index(node)]))
         axes.vlines(hz[shown], 1e-7, amplitude[shown], color=colour, linewidth=0.7)
-        axes.plot(hz[shown], amplitude[shown], marker, color=colour, markersize=3, label=_name(line, node))
-    axes.set(title="Angular displacement", xlabel="frequency, Hz", ylabel="amplitude, degrees", yscale="log")
+        axes.plot(
+            hz[shown], amplitude[shown], marker, color=colour, markersize=3, label=_name(line, node)
+        )
+    axes.set(
+        title="Angular displacement",
+        xlabel="frequency, Hz",
+        ylabel="amplitude, degrees",
+        yscale="log",
+    )
     top = np.degrees(np.abs(found.response.angle[:, shown]).max())
     axes.set_ylim(1e-5 * top, 30.0 * top)
     axes.legend(fontsize=8)
@@ -144,7 +166,9 @@ def _waterfall(figure: Any, axes: Any, line: EngineLine, node: int, run: Waterfa
     rpm = from_si("speed_rpm", 1.0) * run.speeds
     spectra = np.degrees(run.spectra(hz))
     # a line is one bin wide: spread it so that it shows in print
-    spread = np.maximum(spectra, np.maximum(np.roll(spectra, 1, axis=1), np.roll(spectra, -1, axis=1)))
+    spread = np.maximum(
+        spectra, np.maximum(np.roll(spectra, 1, axis=1), np.roll(spectra, -1, axis=1))
+    )
     top = spread.max()
     level = np.log10(np.maximum(spread, 1e-4 * top))
     image = axes.pcolormesh(hz, rpm, level, cmap="magma", shading="nearest", rasterized=True)
@@ -152,7 +176,12 @@ def _waterfall(figure: Any, axes: Any, line: EngineLine, node: int, run: Waterfa
     for order in (0.5, 1.0, 2.5, 5.0, 10.0):
         if order * rpm[-1] / 60.0 < WATERFALL_HZ:
             axes.annotate(
-                f"{order:g}", (order * rpm[-1] / 60.0, rpm[-1]), color="white", fontsize=8, ha="center", va="top"
+                f"{order:g}",
+                (order * rpm[-1] / 60.0, rpm[-1]),
+                color="white",
+                fontsize=8,
+                ha="center",
+                va="top",
             )
     axes.set(
         title=f"Run of speeds, {_name(line, node)}",

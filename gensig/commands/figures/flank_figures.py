@@ -28,22 +28,36 @@ def plot_transmission_error(system: SlicedPair, result: TransmissionError, path:
     save(figure, path)
 
 
-def plot_front(system: SlicedPair, before: Optimum, chosen: Optimum, front: Sequence[Optimum], path: Path) -> None:
+def plot_front(
+    system: SlicedPair, before: Optimum, chosen: Optimum, front: Sequence[Optimum], path: Path
+) -> None:
     """The front, and transmission error and load over the flank before and after."""
     figure, axes = pyplot.subplots(2, 2, figsize=(11, 7.6), layout="constrained")
     ripple = [one.ripple * 1e6 for one in front]
-    axes[0, 0].plot(ripple, [one.line_load * 1e-3 for one in front], "o-", color=SOUND, label="front")
-    for one, marker, colour, name in ((before, "s", GREY, "before"), (chosen, "D", COLOURS[1], "chosen")):
+    axes[0, 0].plot(
+        ripple, [one.line_load * 1e-3 for one in front], "o-", color=SOUND, label="front"
+    )
+    for one, marker, colour, name in (
+        (before, "s", GREY, "before"),
+        (chosen, "D", COLOURS[1], "chosen"),
+    ):
         axes[0, 0].plot(one.ripple * 1e6, one.line_load * 1e-3, marker, color=colour, label=name)
     axes[0, 0].set(
-        title="Worst of all cases", xlabel="transmission error, peak to peak, um", ylabel="largest line load, N/mm"
+        title="Worst of all cases",
+        xlabel="transmission error, peak to peak, um",
+        ylabel="largest line load, N/mm",
     )
     axes[0, 0].legend()
-    for place, one, colour, name in ((0, before, GREY, "before"), (1, chosen, COLOURS[1], "chosen")):
+    for place, one, colour, name in (
+        (0, before, GREY, "before"),
+        (1, chosen, COLOURS[1], "chosen"),
+    ):
         changed = replace(system, modification=one.modification)
         result = changed.transmission_error()
         phase = np.arange(2 * len(result.error)) / len(result.error)
-        axes[0, 1].plot(phase, np.tile(result.error - result.error.mean(), 2) * 1e6, color=colour, label=name)
+        axes[0, 1].plot(
+            phase, np.tile(result.error - result.error.mean(), 2) * 1e6, color=colour, label=name
+        )
         _load_map(figure, axes[1, place], changed, result)
         axes[1, place].set_title(f"Load over the flank, {name}")
     axes[0, 1].set(title="Transmission error less its mean", xlabel="mesh periods", ylabel="um")
@@ -69,7 +83,9 @@ def plot_sliced_stiffness(
     figure, axes = pyplot.subplots(1, 2, figsize=(11, 4.2), layout="constrained")
     axes[0].plot(position / system.pair.base_pitch, single / 1e9, color=SOUND, label="sound")
     if faulty is not None:
-        axes[0].plot(position / system.pair.base_pitch, faulty / 1e9, color=COLOURS[1], label="faulty")
+        axes[0].plot(
+            position / system.pair.base_pitch, faulty / 1e9, color=COLOURS[1], label="faulty"
+        )
         axes[0].legend()
     axes[0].set(
         title="One pair, slices on the path",
@@ -79,7 +95,9 @@ def plot_sliced_stiffness(
     stiffness = result.contact.stiffness
     if faulty is not None:
         without = np.resize(sound.contact.stiffness, stiffness.shape) / 1e9
-        axes[1].plot(*_over_periods(system, result, without), color=GREY, linewidth=0.8, label="sound")
+        axes[1].plot(
+            *_over_periods(system, result, without), color=GREY, linewidth=0.8, label="sound"
+        )
     colour, label = (SOUND, "sound") if faulty is None else (COLOURS[1], "faulty")
     axes[1].plot(*_over_periods(system, result, stiffness / 1e9), color=colour, label=label)
     if faulty is not None:
@@ -98,7 +116,9 @@ def _title(system: SlicedPair) -> str:
     )
 
 
-def _over_periods(system: SlicedPair, result: TransmissionError, values: Array) -> tuple[Array, Array]:
+def _over_periods(
+    system: SlicedPair, result: TransmissionError, values: Array
+) -> tuple[Array, Array]:
     """Mesh periods of roll and values: one period twice, or all that see a fault."""
     if result.n_periods > 1:
         return result.contact.roll / system.pair.base_pitch, values
@@ -131,14 +151,25 @@ def _load_map(figure: Any, axes: Any, system: SlicedPair, result: TransmissionEr
     column = np.broadcast_to(np.arange(grid.shape[1]), row.shape)
     inside = (row >= 0) & (row < len(grid))
     if result.odd_pairs is not None:
-        inside &= ((contact.pair_index >= result.odd_pairs[0]) & (contact.pair_index <= result.odd_pairs[1]))[..., None]
+        inside &= (
+            (contact.pair_index >= result.odd_pairs[0])
+            & (contact.pair_index <= result.odd_pairs[1])
+        )[..., None]
     np.maximum.at(grid, (row[inside], column[inside]), contact.line_load[inside] * 1e-3)
     image = axes.pcolormesh(
-        result.slice_edges * 1e3, edges, np.where(grid > 0.0, grid, np.nan), cmap="cividis", vmin=0.0
+        result.slice_edges * 1e3,
+        edges,
+        np.where(grid > 0.0, grid, np.nan),
+        cmap="cividis",
+        vmin=0.0,
     )
     for end in (0.0, system.pair.transverse_contact_ratio):
         axes.axhline(end, color=GREY, linestyle=":")
-    whose = "the flank (dotted: ends of the path of contact)" if result.odd_pairs is None else "the faulty flanks"
+    whose = (
+        "the flank (dotted: ends of the path of contact)"
+        if result.odd_pairs is None
+        else "the faulty flanks"
+    )
     axes.set(
         title=f"Load over {whose}",
         xlabel="place across the face from the end that enters first, mm",
@@ -158,7 +189,9 @@ def _sharing(axes: Any, system: SlicedPair, result: TransmissionError) -> None:
     share = result.load_share.T
     axes.plot(place.ravel() - 1.0, share.ravel(), color=SOUND, label="one pair")
     for shift, colour in zip((-1, 1), COLOURS[1:], strict=False):
-        axes.plot(place.ravel() - 1.0 + shift, share.ravel(), ":", color=colour, label=f"pair {shift:+d}")
+        axes.plot(
+            place.ravel() - 1.0 + shift, share.ravel(), ":", color=colour, label=f"pair {shift:+d}"
+        )
     axes.set(
         title="Load sharing", xlabel="roll since the first slice passed A, base pitches", ylabel="share of the load",
         xlim=(-0.5, n_pairs - 1.0),

@@ -24,7 +24,11 @@ def plot_heat(report: HeatReport, path: Path) -> None:
     if APPARENT in report.variants and report.variants[APPARENT].mesh.max() < top:
         drawn = report.variants
     for colour, (name, one) in zip((GREY, *COLOURS), drawn.items(), strict=False):
-        style: dict[str, Any] = {"color": colour, "label": NAMES[name], "linestyle": "--" if name == COLD else "-"}
+        style: dict[str, Any] = {
+            "color": colour,
+            "label": NAMES[name],
+            "linestyle": "--" if name == COLD else "-",
+        }
         axes[1, 0].plot(one.position, one.single / 1e9, **style)
         phase = np.arange(2 * len(one.mesh)) / len(one.mesh)
         axes[1, 1].plot(phase, np.tile(one.mesh, 2) / 1e9, **style)
@@ -34,7 +38,11 @@ def plot_heat(report: HeatReport, path: Path) -> None:
         ylabel="stiffness, 10$^9$ N/m",
     )
     left_out = set(report.variants) - set(drawn)
-    beyond = f" (apparent, mean {report.variants[APPARENT].mesh.mean() / 1e9:.3g}: beyond)" if left_out else ""
+    beyond = (
+        f" (apparent, mean {report.variants[APPARENT].mesh.mean() / 1e9:.3g}: beyond)"
+        if left_out
+        else ""
+    )
     axes[1, 1].set(title=f"Mesh{beyond}", xlabel="mesh periods", ylabel="stiffness, 10$^9$ N/m")
     axes[1, 0].legend(loc="lower center")
     duty = report.duty
@@ -47,11 +55,18 @@ def plot_heat(report: HeatReport, path: Path) -> None:
 
 def _bulk(axes: Any, report: HeatReport) -> None:
     state, heat = report.state, report.duty.heat
-    for colour, (name, body) in zip(COLOURS, (("pinion", state.pinion), ("wheel", state.wheel)), strict=False):
+    for colour, (name, body) in zip(
+        COLOURS, (("pinion", state.pinion), ("wheel", state.wheel)), strict=False
+    ):
         share = (body.radius - body.radius[0]) / (body.radius[-1] - body.radius[0])
-        label = f"{name}, bore radius {body.radius[0] * 1e3:.4g}, root {body.radius[-1] * 1e3:.4g} mm"
+        label = (
+            f"{name}, bore radius {body.radius[0] * 1e3:.4g}, root {body.radius[-1] * 1e3:.4g} mm"
+        )
         axes.plot(share, body.temperature, color=colour, label=label)
-    for value, style, name in ((heat.oil_temperature, ":", "oil"), (heat.housing_temperature, "--", "housing")):
+    for value, style, name in (
+        (heat.oil_temperature, ":", "oil"),
+        (heat.housing_temperature, "--", "housing"),
+    ):
         axes.axhline(value, color=GREY, linestyle=style, label=name)
     axes.set(
         title="Bulk temperature; the teeth have that of the root",

@@ -25,7 +25,12 @@ ENVELOPE_BAND_HZ = (5000.0, 19000.0)
 
 
 def plot_stiffness(
-    system: Machine, curves: StiffnessCurves, faults: Sequence[Fault], path: Path, *, sound: StiffnessCurves
+    system: Machine,
+    curves: StiffnessCurves,
+    faults: Sequence[Fault],
+    path: Path,
+    *,
+    sound: StiffnessCurves,
 ) -> None:
     """Single pair, mesh over one revolution and as it is when ``sound``, load sharing and compliance terms."""
     figure, axes = pyplot.subplots(2, 2, figsize=(11, 7.2), layout="constrained")
@@ -43,7 +48,9 @@ def plot_stiffness(
 
 
 def _single_pair(axes: Any, curves: StiffnessCurves, faults: Sequence[Fault]) -> None:
-    axes.plot(curves.contact_position, curves.single_pair_stiffness / 1e8, color=SOUND, label="sound pair")
+    axes.plot(
+        curves.contact_position, curves.single_pair_stiffness / 1e8, color=SOUND, label="sound pair"
+    )
     if curves.faulty_pair_stiffness is not None:
         axes.plot(
             curves.contact_position,
@@ -64,7 +71,13 @@ def _single_pair(axes: Any, curves: StiffnessCurves, faults: Sequence[Fault]) ->
     axes.legend()
 
 
-def _mesh(axes: Any, system: Machine, curves: StiffnessCurves, faults: Sequence[Fault], sound: StiffnessCurves) -> None:
+def _mesh(
+    axes: Any,
+    system: Machine,
+    curves: StiffnessCurves,
+    faults: Sequence[Fault],
+    sound: StiffnessCurves,
+) -> None:
     angle = np.degrees(curves.roll_angle)
     if faults:
         # A sound mesh has the period of a tooth, so that its turn of the pinion fits a turn of the wheel too.
@@ -84,15 +97,28 @@ def _mesh(axes: Any, system: Machine, curves: StiffnessCurves, faults: Sequence[
     )
 
 
-def _load_sharing(axes: Any, system: Machine, curves: StiffnessCurves, faults: Sequence[Fault]) -> None:
+def _load_sharing(
+    axes: Any, system: Machine, curves: StiffnessCurves, faults: Sequence[Fault]
+) -> None:
     pitch_angle = 360.0 / _n_teeth(system, faults)
     begin = _fault_angle(system, faults[0]) - pitch_angle if faults else 0.0
     angle = np.degrees(curves.roll_angle)
     shown = (angle >= begin) & (angle < begin + 4.0 * pitch_angle)
     names = ("pair about to enter", "newest pair", "pair before it", "pair before that")
     for k, name in enumerate(names):
-        axes.plot(angle[shown], curves.load_share[shown, k], ".", markersize=3, color=COLOURS[k], label=name)
-    axes.set(title="Load sharing at static equilibrium", xlabel="roll angle, degrees", ylabel="share of the load")
+        axes.plot(
+            angle[shown],
+            curves.load_share[shown, k],
+            ".",
+            markersize=3,
+            color=COLOURS[k],
+            label=name,
+        )
+    axes.set(
+        title="Load sharing at static equilibrium",
+        xlabel="roll angle, degrees",
+        ylabel="share of the load",
+    )
     axes.set_ylim(-0.05, 1.35)
     axes.legend(fontsize="small", ncols=2, loc="upper center")
 
@@ -103,7 +129,13 @@ def _terms(axes: Any, curves: StiffnessCurves) -> None:
         for colour, (name, values) in zip(COLOURS, terms.items(), strict=True):
             if not values.any():
                 continue
-            axes.plot(curves.contact_position, values * 1e12, styles[gear], color=colour, label=f"{gear} {name}")
+            axes.plot(
+                curves.contact_position,
+                values * 1e12,
+                styles[gear],
+                color=colour,
+                label=f"{gear} {name}",
+            )
     axes.set(
         title="Compliance terms",
         xlabel="contact position, base pitches",
@@ -139,7 +171,9 @@ def plot_record(
     figure, axes = pyplot.subplots(3, 1, figsize=(11, 8.5), layout="constrained")
     shown = min(len(signal), int(5.0 * rate / shaft))
     axes[0].plot(np.arange(shown) / rate, signal[:shown], color=SOUND, linewidth=0.5)
-    axes[0].set(title=f"{channel}, first turns of the pinion", xlabel="time, s", ylabel=f"{what}, {unit}")
+    axes[0].set(
+        title=f"{channel}, first turns of the pinion", xlabel="time, s", ylabel=f"{what}, {unit}"
+    )
     frequency, amplitude = amplitude_spectrum(signal, rate)
     axes[1].semilogy(frequency / 1e3, np.maximum(amplitude, 1e-9), color=SOUND, linewidth=0.5)
     for harmonic in range(1, int(0.39 * rate / mesh) + 1):
@@ -174,7 +208,11 @@ def save(figure: Any, path: Path) -> None:
 
 
 def _n_teeth(system: Machine, faults: Sequence[Fault]) -> int:
-    return system.pair.wheel.n_teeth if faults and faults[0].gear == "wheel" else system.pair.pinion.n_teeth
+    return (
+        system.pair.wheel.n_teeth
+        if faults and faults[0].gear == "wheel"
+        else system.pair.pinion.n_teeth
+    )
 
 
 def _fault_angle(system: Machine, fault: Fault) -> float:

@@ -27,14 +27,19 @@ def plot_modes(line: DriveLine, found: Modes, path: Path) -> None:
         draw = _energies if line.lateral else _angles
         draw(axes, line, found, mode)
         axes.set_title(
-            f"mode {mode}: {found.frequency[mode]:.2f} Hz, damping {found.damping_ratio[mode]:.3f}", fontsize=9
+            f"mode {mode}: {found.frequency[mode]:.2f} Hz, damping {found.damping_ratio[mode]:.3f}",
+            fontsize=9,
         )
         axes.axhline(0.0, color=GREY, linewidth=0.6)
         axes.set_ylim(-1.15, 1.15)
         axes.tick_params(labelsize=7)
         if mode < elastic[-1]:
             axes.set_xticklabels([])
-    what = "signed root of the kinetic energy share" if line.lateral else "angle on the own shaft, largest 1"
+    what = (
+        "signed root of the kinetic energy share"
+        if line.lateral
+        else "angle on the own shaft, largest 1"
+    )
     dashed = "" if line.lateral else " (dashed: gear meshes)"
     size = f"inertias {len(line.line.nodes)}, gear meshes {len(line.line.meshes)}"
     figure.suptitle(f"{line.name}: {size}; shapes: {what}{dashed}")
@@ -48,7 +53,9 @@ def _shown(found: Modes) -> range:
 
 def _campbell(axes: Any, line: DriveLine, found: Modes) -> None:
     """Natural frequencies across the speeds, rays of the orders, dots where they meet."""
-    low, high = (from_si("speed_rpm", speed) for speed in (line.campbell.low_speed, line.campbell.high_speed))
+    low, high = (
+        from_si("speed_rpm", speed) for speed in (line.campbell.low_speed, line.campbell.high_speed)
+    )
     top = 1.08 * max(line.campbell_orders) * high / 60.0
     shown = [(mode, hz) for mode, hz in enumerate(found.frequency) if 0.0 < hz < top]
     speeds = np.array([low, high])
@@ -68,7 +75,12 @@ def _campbell(axes: Any, line: DriveLine, found: Modes) -> None:
     for mode, hz in shown:
         axes.axhline(hz, color=SOUND, linewidth=1.2)
         axes.annotate(
-            f"{mode}", (low, hz), xytext=(3, 2 if mode % 2 else -9), textcoords="offset points", color=SOUND, fontsize=8
+            f"{mode}",
+            (low, hz),
+            xytext=(3, 2 if mode % 2 else -9),
+            textcoords="offset points",
+            color=SOUND,
+            fontsize=8,
         )
     axes.set(
         title="Campbell diagram: modes (blue), orders (grey, at the right end)",
@@ -102,9 +114,16 @@ def _energies(axes: Any, line: DriveLine, found: Modes, mode: int) -> None:
     motion = matrices.expand @ found.shapes[mode]
     height = np.sign(motion) * np.sqrt(found.kinetic_share[mode])
     place = np.arange(len(height))
-    axes.bar(place, height, color=[THIRD if name[-2:] in (" x", " y") else SOUND for name in matrices.coordinate_names])
+    axes.bar(
+        place,
+        height,
+        color=[THIRD if name[-2:] in (" x", " y") else SOUND for name in matrices.coordinate_names],
+    )
     if len(height) <= MOST_BARS:
-        names = [name if name[-2:] in (" x", " y") else f"{name} turns" for name in matrices.coordinate_names]
+        names = [
+            name if name[-2:] in (" x", " y") else f"{name} turns"
+            for name in matrices.coordinate_names
+        ]
         axes.set_xticks(place, names)
     if mode == _shown(found)[-1]:
         axes.set_xlabel("degree of freedom: rotations (blue), then x and y of every gear (green)")

@@ -26,7 +26,11 @@ def motor_rows(axes: Any, line: EngineLine, found: ResponseResult) -> None:
     names = [f"{number}" for number in line.drive.numbers]
     axes[0].bar(names, mean, color=[FAULTY if value < 0.0 else SOUND for value in mean])
     axes[0].axhline(0.0, color=GREY, linewidth=0.8)
-    axes[0].set(title="Mean torques: given (blue) and taken (red)", xlabel="node", ylabel="N m, on its own shaft")
+    axes[0].set(
+        title="Mean torques: given (blue) and taken (red)",
+        xlabel="node",
+        ylabel="N m, on its own shaft",
+    )
     force = found.response.element_forces(line.linear()[1])[0]
     axes[1].bar(list(line.mesh_names), force / 1e3, color=SOUND, width=0.4)
     evenly = " (no torque ripple: even in the linear line)" if turns_evenly(line) else ""

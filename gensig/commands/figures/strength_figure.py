@@ -17,7 +17,9 @@ from gensig.life.root.tooth_root import TANGENT, root_loading, root_section, vir
 from gensig.systems.root_strength import GearStress, RootHistory, RootStrength
 
 
-def plot_root_stress(system: RootStrength, gears: dict[str, GearStress], history: RootHistory, path: Path) -> None:
+def plot_root_stress(
+    system: RootStrength, gears: dict[str, GearStress], history: RootHistory, path: Path
+) -> None:
     """Root stress of both gears over the mesh, the load share of the pair, and the tooth of the decisive gear."""
     figure, axes = pyplot.subplots(1, 2, figsize=(11, 4.8), layout="constrained")
     _stress(axes[0], system, gears, history)
@@ -30,21 +32,36 @@ def plot_root_stress(system: RootStrength, gears: dict[str, GearStress], history
     save(figure, path)
 
 
-def _stress(axis: Any, system: RootStrength, gears: dict[str, GearStress], history: RootHistory) -> None:
+def _stress(
+    axis: Any, system: RootStrength, gears: dict[str, GearStress], history: RootHistory
+) -> None:
     roll = np.degrees(history.roll / system.pair.pinion.base_radius)
     for (name, values), colour in zip(history.stress.items(), (SOUND, FAULTY), strict=True):
         axis.plot(roll, values * 1e-6, color=colour, label=f"{name}, through the mesh")
         axis.axhline(
-            gears[name].stress * 1e-6, color=colour, linestyle="--", linewidth=1.0, label=f"{name}, ISO 6336-3"
+            gears[name].stress * 1e-6,
+            color=colour,
+            linestyle="--",
+            linewidth=1.0,
+            label=f"{name}, ISO 6336-3",
         )
-    axis.set(title="Root stress of one tooth pair", xlabel="roll of the pinion since contact begins, deg", ylabel="MPa")
-    highest = max(max(values.max() for values in history.stress.values()), max(one.stress for one in gears.values()))
+    axis.set(
+        title="Root stress of one tooth pair",
+        xlabel="roll of the pinion since contact begins, deg",
+        ylabel="MPa",
+    )
+    highest = max(
+        max(values.max() for values in history.stress.values()),
+        max(one.stress for one in gears.values()),
+    )
     axis.set_ylim(0.0, 1.45e-6 * highest)  # room for the legend
     share = axis.twinx()
     share.plot(roll, history.share, color=GREY, linestyle=":", label="load share of the pair")
     share.set(ylabel="share of the load", ylim=(0.0, 1.45))
     lines = [line for side in (axis, share) for line in side.get_lines()]
-    axis.legend(lines, [line.get_label() for line in lines], loc="upper center", ncols=2, fontsize=8)
+    axis.legend(
+        lines, [line.get_label() for line in lines], loc="upper center", ncols=2, fontsize=8
+    )
 
 
 def _tooth(axis: Any, system: RootStrength, found: GearStress) -> None:
@@ -58,7 +75,12 @@ def _tooth(axis: Any, system: RootStrength, found: GearStress) -> None:
     for side in (-1.0, 1.0):
         axis.plot(side * x, y, color="black", linewidth=1.5)
     half, height = 0.5e3 * section.thickness, (section.height - floor) * 1e3
-    axis.plot([-half, half], [height, height], color=FAULTY, label=f"critical section, {2.0 * half:.3g} mm")
+    axis.plot(
+        [-half, half],
+        [height, height],
+        color=FAULTY,
+        label=f"critical section, {2.0 * half:.3g} mm",
+    )
     reach = half / math.tan(TANGENT)
     for side in (-1.0, 1.0):
         axis.plot(
@@ -68,14 +90,22 @@ def _tooth(axis: Any, system: RootStrength, found: GearStress) -> None:
     at_tip = system.strength.load_point == "tip"
     pitch = math.pi * real.normal_module * math.cos(real.pressure_angle)
     loading = root_loading(
-        real, 0.0 if at_tip else pitch * (normal_contact_ratio(system.pair) - 1.0), allow_extrapolation=True
+        real,
+        0.0 if at_tip else pitch * (normal_contact_ratio(system.pair) - 1.0),
+        allow_extrapolation=True,
     )
     top, slope = height + float(loading.lever_arm[0]) * 1e3, math.tan(float(loading.load_angle[0]))
     axis.annotate(
         "", xy=(0.0, top), xytext=(1.6 * half, top + 1.6 * half * slope),
         arrowprops={"arrowstyle": "->", "color": SOUND, "linewidth": 1.8},
     )  # fmt: skip
-    axis.plot([0.0, 0.0], [height, top], color=GREY, linestyle="--", label=f"lever arm, {top - height:.3g} mm")
+    axis.plot(
+        [0.0, 0.0],
+        [height, top],
+        color=GREY,
+        linestyle="--",
+        label=f"lever arm, {top - height:.3g} mm",
+    )
     axis.set(
         title=f"Tooth of the {system.decisive}: Y_F {found.factors.form_factor:.3f}, Y_S "
         f"{found.factors.stress_correction_factor:.3f}\nsafety {found.safety.paper:.2f} (paper), "

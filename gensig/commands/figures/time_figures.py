@@ -52,26 +52,41 @@ def root_row(axes: Any, line: EngineLine, found: ResponseResult) -> None:
         passes, label = root.passes[gear] * 1e-6, name.replace("_", " ")
         roll = np.degrees(root.history.roll / root.strength.pair.pinion.base_radius)
         largest = passes.max(axis=1)
-        axes[0].plot(roll, passes[int(largest.argmax())], color=colour, linestyle=style, label=label)
+        axes[0].plot(
+            roll, passes[int(largest.argmax())], color=colour, linestyle=style, label=label
+        )
         whole = len(largest) // in_cycle
         by_pair = largest[: whole * in_cycle].reshape(whole, in_cycle)
         axes[1].plot(np.median(by_pair, axis=0), color=colour, linestyle=style, label=label)
         if whole > 1:
             axes[1].fill_between(
-                range(in_cycle), by_pair.min(axis=0), by_pair.max(axis=0), color=colour, alpha=0.15, linewidth=0.0
+                range(in_cycle),
+                by_pair.min(axis=0),
+                by_pair.max(axis=0),
+                color=colour,
+                alpha=0.15,
+                linewidth=0.0,
             )
     mesh = line.mesh_names[found.mesh]
     axes[0].set(
-        title=f"Root stress of the pair that bears most, {mesh}", xlabel="roll of the pinion, deg", ylabel="MPa"
+        title=f"Root stress of the pair that bears most, {mesh}",
+        xlabel="roll of the pinion, deg",
+        ylabel="MPa",
     )
-    axes[1].set(title="Largest of each pair: median of the cycles, range", xlabel="pair of the cycle", ylabel="MPa")
+    axes[1].set(
+        title="Largest of each pair: median of the cycles, range",
+        xlabel="pair of the cycle",
+        ylabel="MPa",
+    )
     for one in axes:
         one.set_ylim(0.0, None)
         one.margins(y=0.25)
         one.legend(fontsize=8, loc="upper right")
 
 
-def sweep_rows(figure: Any, axes: Any, line: EngineLine, found: ResponseResult, sweep: Sweep) -> None:
+def sweep_rows(
+    figure: Any, axes: Any, line: EngineLine, found: ResponseResult, sweep: Sweep
+) -> None:
     """Three rows, up, down and how both differ, for the first two nodes, (3, 2) axes."""
     for column in range(2):
         if column >= len(found.nodes):
@@ -97,8 +112,20 @@ def _speeds(axes: Any, line: EngineLine, found: ResponseResult, response: TimeRe
     cycle = np.linspace(0.0, 720.0 * TRACE_CYCLES, 2880 * TRACE_CYCLES, endpoint=False)
     for row, node in enumerate(found.nodes[: len(COLOURS)]):
         place, colour = line.drive.numbers.index(node), COLOURS[row]
-        axes.plot(cycle, np.tile(rpm * linear[place], TRACE_CYCLES), color=colour, linewidth=0.7, linestyle=":")
-        axes.plot(angle[shown], rpm * response.speed[row, shown], color=colour, linewidth=0.9, label=_name(line, node))
+        axes.plot(
+            cycle,
+            np.tile(rpm * linear[place], TRACE_CYCLES),
+            color=colour,
+            linewidth=0.7,
+            linestyle=":",
+        )
+        axes.plot(
+            angle[shown],
+            rpm * response.speed[row, shown],
+            color=colour,
+            linewidth=0.9,
+            label=_name(line, node),
+        )
     axes.set(
         title="Speed less its mean, in time (dotted: linear)",
         xlabel=f"angle of the {turner(line)}, degrees",
@@ -112,15 +139,27 @@ def _spectra(axes: Any, line: EngineLine, found: ResponseResult, response: TimeR
     """Angular displacement by frequency; grey lines at the half orders, or the mesh frequencies where none fires."""
     rate = found.response.speed / (2.0 * np.pi)
     of_motor = turner(line) == "motor"
-    orders = np.multiply.outer((1.0, 2.0), line.drive.mesh_orders).ravel() if of_motor else np.arange(0.5, 1e3, 0.5)
+    orders = (
+        np.multiply.outer((1.0, 2.0), line.drive.mesh_orders).ravel()
+        if of_motor
+        else np.arange(0.5, 1e3, 0.5)
+    )
     highest = min(1.1 * rate * float(orders.max()), FLAT_HZ) if of_motor else SHOWN_HZ
     frequencies, spectra = amplitude_spectra(response.angle, highest)
     shown = frequencies <= highest
     for order in orders[orders * rate < highest]:
-        axes.axvline(order * rate, color=GREY, linewidth=0.3, linestyle="-" if order % 1.0 == 0.0 else ":")
+        axes.axvline(
+            order * rate, color=GREY, linewidth=0.3, linestyle="-" if order % 1.0 == 0.0 else ":"
+        )
     for row, node in enumerate(found.nodes[: len(COLOURS)]):
         label = _name(line, node)
-        axes.plot(frequencies[shown], np.degrees(spectra[row, shown]), color=COLOURS[row], linewidth=0.8, label=label)
+        axes.plot(
+            frequencies[shown],
+            np.degrees(spectra[row, shown]),
+            color=COLOURS[row],
+            linewidth=0.8,
+            label=label,
+        )
     axes.set(
         title=f"Angular displacement in time ({'grey: meshes, doubles' if of_motor else 'dotted: half orders'})",
         xlabel="frequency, Hz",
@@ -140,14 +179,32 @@ def _loads(axes: Any, line: EngineLine, linear: Any, response: TimeResponse) -> 
         ("in time, a cycle's", least, greatest, FAULTY, 0.2),
     )
     for label, low, high, colour, aside in ranges:
-        axes.bar(places + aside, (high - low) / 1e3, bottom=low / 1e3, width=0.36, color=colour, label=label)
+        axes.bar(
+            places + aside,
+            (high - low) / 1e3,
+            bottom=low / 1e3,
+            width=0.36,
+            color=colour,
+            label=label,
+        )
     axes.plot(places, linear.mean(axis=1) / 1e3, "k_", markersize=18, label="mean")
     axes.axhline(0.0, color=GREY, linewidth=0.8)
     axes.set_xticks(
-        places, [f"{name}\n{apart:.0%}" for name, apart in zip(line.mesh_names, response.contact_loss, strict=True)]
+        places,
+        [
+            f"{name}\n{apart:.0%}"
+            for name, apart in zip(line.mesh_names, response.contact_loss, strict=True)
+        ],
     )
-    axes.set(title="Tooth force of the meshes, least to greatest", xlabel="mesh, share of time apart", ylabel="kN")
-    lowest, highest = (float(end) / 1e3 for end in (min(least.min(), linear.min()), max(greatest.max(), linear.max())))
+    axes.set(
+        title="Tooth force of the meshes, least to greatest",
+        xlabel="mesh, share of time apart",
+        ylabel="kN",
+    )
+    lowest, highest = (
+        float(end) / 1e3
+        for end in (min(least.min(), linear.min()), max(greatest.max(), linear.max()))
+    )
     axes.set_ylim(1.1 * min(lowest, 0.0), 1.3 * max(highest, 0.0))
     axes.legend(fontsize=8)
 
@@ -156,10 +213,22 @@ def _course(axes: Any, line: EngineLine, mesh: int, linear: Any, response: TimeR
     name, force = line.mesh_names[mesh], response.mesh_force[mesh]
     shown = response.crank_angle < TRACE_CYCLES * CYCLE
     cycle = np.linspace(0.0, 720.0 * TRACE_CYCLES, TRACE_CYCLES * len(linear), endpoint=False)
-    axes.plot(np.degrees(response.crank_angle[shown]), force[shown] / 1e3, color=FAULTY, linewidth=0.7, label="in time")
-    axes.plot(cycle, np.tile(linear, TRACE_CYCLES) / 1e3, color=SOUND, linewidth=0.9, label="linear")
+    axes.plot(
+        np.degrees(response.crank_angle[shown]),
+        force[shown] / 1e3,
+        color=FAULTY,
+        linewidth=0.7,
+        label="in time",
+    )
+    axes.plot(
+        cycle, np.tile(linear, TRACE_CYCLES) / 1e3, color=SOUND, linewidth=0.9, label="linear"
+    )
     axes.axhline(0.0, color=GREY, linewidth=0.8)
-    axes.set(title=f"Tooth force of mesh {name}", xlabel=f"angle of the {turner(line)}, degrees", ylabel="kN")
+    axes.set(
+        title=f"Tooth force of mesh {name}",
+        xlabel=f"angle of the {turner(line)}, degrees",
+        ylabel="kN",
+    )
     axes.margins(y=0.2)
     axes.legend(fontsize=8, loc="upper right")
 
@@ -170,14 +239,26 @@ def _waterfall(figure: Any, axes: Any, way: SweepWay, column: int, top: float) -
     level = np.log10(np.degrees(np.maximum(way.spectra[column], 1e-4 * top)))
     high = np.log10(np.degrees(top))
     image = axes.pcolormesh(
-        way.frequencies, rpm, level, cmap="magma", shading="nearest", rasterized=True, vmin=high - 4.0, vmax=high
+        way.frequencies,
+        rpm,
+        level,
+        cmap="magma",
+        shading="nearest",
+        rasterized=True,
+        vmin=high - 4.0,
+        vmax=high,
     )
     figure.colorbar(image, ax=axes, label="log10 of the amplitude in degrees")
     for order in MARKED_ORDERS:
         if order * rpm[-1] / 60.0 < way.frequencies[-1]:
             axes.plot(order * rpm / 60.0, rpm, color="white", linewidth=0.4, linestyle=":")
             axes.annotate(
-                f"{order:g}", (order * rpm[-1] / 60.0, rpm[-1]), color="white", fontsize=8, ha="center", va="top"
+                f"{order:g}",
+                (order * rpm[-1] / 60.0, rpm[-1]),
+                color="white",
+                fontsize=8,
+                ha="center",
+                va="top",
             )
     axes.set_xlabel("frequency, Hz")
 
@@ -186,12 +267,24 @@ def _both_ways(axes: Any, found: ResponseResult, sweep: Sweep, column: int) -> N
     """Fluctuation up and down with three standard errors, and the linear one where there is a run."""
     factor = from_si("speed_rpm", 1.0)
     for way, colour, label in ((sweep.up, SOUND, "up"), (sweep.down, FAULTY, "down")):
-        rpm, mean, error = factor * way.speeds, factor * way.fluctuation[column], factor * way.scatter[column]
+        rpm, mean, error = (
+            factor * way.speeds,
+            factor * way.fluctuation[column],
+            factor * way.scatter[column],
+        )
         axes.plot(rpm, mean, color=colour, label=f"{label}, in {sweep.seconds:g} s")
-        axes.fill_between(rpm, mean - 3.0 * error, mean + 3.0 * error, color=colour, alpha=0.15, linewidth=0.0)
+        axes.fill_between(
+            rpm, mean - 3.0 * error, mean + 3.0 * error, color=colour, alpha=0.15, linewidth=0.0
+        )
     if found.run:
         run = found.run[column]
-        axes.plot(factor * run.speeds, factor * run.fluctuation, color=GREY, linewidth=0.9, label="linear, steady")
+        axes.plot(
+            factor * run.speeds,
+            factor * run.fluctuation,
+            color=GREY,
+            linewidth=0.9,
+            label="linear, steady",
+        )
     axes.set_ylabel("plus or minus, r/min")
     axes.set_ylim(0.0, None)
     axes.legend(fontsize=8)

@@ -26,11 +26,17 @@ from gensig.life.wear.wear_life import WearLife
 Array = NDArray[np.float64]
 
 TALLEST = 1.6  # times the largest radius of new flanks; flatter and hollow places are left out
-ENDED_BY = {"depth": "", "transmission_error": ", limit of the transmission error", "vibration": ", limit of vibration"}
+ENDED_BY = {
+    "depth": "",
+    "transmission_error": ", limit of the transmission error",
+    "vibration": ", limit of vibration",
+}
 SHOWN = (10, 20, 30, 40)  # snapshots: quarters of the life
 
 
-def plot_wear_life(life: WearLife, speed: float, content: Mapping[str, Any], lives: LifeMap | None, path: Path) -> None:
+def plot_wear_life(
+    life: WearLife, speed: float, content: Mapping[str, Any], lives: LifeMap | None, path: Path
+) -> None:
     """Six panels; the last is the map of lives where there is one, else the greatest depths over time."""
     figure, axes = pyplot.subplots(2, 3, figsize=(15, 8), layout="constrained")
     place = np.array(content["position_mm"])
@@ -64,7 +70,13 @@ def _sliding(axes: Any, place: Array, content: Mapping[str, Any]) -> None:
 
 def _pressure(axes: Any, place: Array, content: Mapping[str, Any]) -> None:
     axes.plot(place, content["contact_pressure_mpa"], color=SOUND, label="new flanks")
-    axes.plot(place, content["contact_pressure_at_end_mpa"], "--", color=FAULTY, label="at the end of the life")
+    axes.plot(
+        place,
+        content["contact_pressure_at_end_mpa"],
+        "--",
+        color=FAULTY,
+        label="at the end of the life",
+    )
     axes.set(title="Largest contact pressure", ylabel="MPa")
     axes.set_ylim(bottom=0.0)
     axes.legend()
@@ -83,7 +95,13 @@ def _depth(axes: Any, place: Array, life: WearLife) -> None:
         for number, snapshot in enumerate(SHOWN):
             depth = life.depth[snapshot, side].max(axis=0) * 1e6
             last = number == len(SHOWN) - 1
-            axes.plot(place, depth, color=colour, linewidth=0.5 + 0.5 * number, label=name if last else None)
+            axes.plot(
+                place,
+                depth,
+                color=colour,
+                linewidth=0.5 + 0.5 * number,
+                label=name if last else None,
+            )
     axes.invert_yaxis()
     axes.set(title="Worn off at each quarter of the life", ylabel="depth normal to the flank, um")
     axes.legend()
@@ -93,13 +111,24 @@ def _radii(axes: Any, place: Array, content: Mapping[str, Any]) -> None:
     highest = 0.0
     for name, colour in zip(SIDES, COLOURS, strict=False):
         new = np.array(content[f"{name}_curvature_radius_new_mm"])
-        worn = np.array([math.nan if one is None else one for one in content[f"{name}_curvature_radius_worn_mm"]])
+        worn = np.array(
+            [
+                math.nan if one is None else one
+                for one in content[f"{name}_curvature_radius_worn_mm"]
+            ]
+        )
         shown = np.where((worn > 0.0) & (worn < TALLEST * new.max()), worn, np.nan)
         highest = max(highest, new.max())
         axes.plot(place, new, color=colour, label=f"{name}, new")
         axes.plot(place, shown, "--", color=colour, label=f"{name}, worn profile")
-        axes.plot(place, content[f"{name}_curvature_radius_by_eq_22_mm"], ":", color=THIRD, label=None)
-    axes.set(title="Curvature radius (green: eq. 22 of the paper)", ylabel="mm", ylim=(0.0, TALLEST * highest))
+        axes.plot(
+            place, content[f"{name}_curvature_radius_by_eq_22_mm"], ":", color=THIRD, label=None
+        )
+    axes.set(
+        title="Curvature radius (green: eq. 22 of the paper)",
+        ylabel="mm",
+        ylim=(0.0, TALLEST * highest),
+    )
     axes.legend(fontsize="small")
 
 
@@ -114,7 +143,9 @@ def _history(axes: Any, content: Mapping[str, Any]) -> None:
         beside = axes.twinx()
         loudest = np.array(vibration["rms_m_per_s2"]).max(axis=1)
         shown = np.array(vibration["hours"]) <= content["life_hours"] * 1.001
-        beside.plot(np.array(vibration["hours"])[shown], loudest[shown], ":o", color=GREY, markersize=3)
+        beside.plot(
+            np.array(vibration["hours"])[shown], loudest[shown], ":o", color=GREY, markersize=3
+        )
         beside.set_ylabel("RMS of the loudest sensor (dotted), m/s2")
         beside.set_ylim(bottom=0.0)
     elif error[0] is not None:

@@ -51,7 +51,9 @@ def transmission_error(arguments: Namespace) -> int:
     print(f"largest line load          {content['max_line_load_n_per_mm']:.2f} N/mm")
     print(f"largest contact pressure   {content['max_contact_pressure_mpa']:.1f} MPa")
     if faults:
-        print(f"mesh periods               {result.n_periods}, the first faulty tooth enters at roll 0")
+        print(
+            f"mesh periods               {result.n_periods}, the first faulty tooth enters at roll 0"
+        )
         print(f"the fault adds             {_span(content['fault_adds_um'], '.4g')} um")
     return 0
 
@@ -128,7 +130,9 @@ def sliced_stiffness(config: Configuration, arguments: Namespace) -> int:
         from gensig.commands.figures.heat_figures import plot_heat
 
         if hot is None:
-            plot_sliced_stiffness(system, result, position, single, path, faulty=faulty, sound=sound)
+            plot_sliced_stiffness(
+                system, result, position, single, path, faulty=faulty, sound=sound
+            )
         else:
             plot_heat(hot, path)
 
@@ -140,7 +144,9 @@ def sliced_stiffness(config: Configuration, arguments: Namespace) -> int:
     print(f"single pair, highest       {highest(single, faulty)}")
     if faulty is not None:
         lost = 1e2 * (1.0 - stiffness / np.tile(sound.contact.stiffness, result.n_periods))
-        print(f"mesh periods               {result.n_periods}, the first faulty tooth enters at roll 0")
+        print(
+            f"mesh periods               {result.n_periods}, the first faulty tooth enters at roll 0"
+        )
         print(f"the mesh loses             {_span(lost.tolist(), '.3g')} %")
         near = single > LEAST_SHARE * single.max()
         loss = 1e2 * (1.0 - faulty[near] / single[near])

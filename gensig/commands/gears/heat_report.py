@@ -54,7 +54,9 @@ def heat_content(report: HeatReport) -> dict[str, Any]:
     """The key ``heat`` of ``gensig stiffness --json``."""
     duty, state, pair = report.duty, report.state, report.duty.system.pair
     pinion_strain, wheel_strain = state.growth.pitch_strains(pair)
-    housing = duty.heat.expansion * (duty.heat.housing_temperature - duty.heat.reference_temperature)
+    housing = duty.heat.expansion * (
+        duty.heat.housing_temperature - duty.heat.reference_temperature
+    )
     return {
         "friction_heat_w": state.friction_heat,
         "bulk": {
@@ -95,7 +97,9 @@ def print_heat(report: HeatReport) -> None:
     state = report.state
     print(f"friction heat              {state.friction_heat / 1e3:.3f} kW")
     for name, body in (("pinion", state.pinion), ("wheel", state.wheel)):
-        print(f"{name + ', bore to teeth':<27}{body.temperature[0]:.1f} .. {body.tooth:.1f} degrees Celsius")
+        print(
+            f"{name + ', bore to teeth':<27}{body.temperature[0]:.1f} .. {body.tooth:.1f} degrees Celsius"
+        )
     print(f"flash temperature          up to {state.flash.max():.1f} K above the teeth's")
     cold = report.variants[COLD]
     print(f"{'':<27}{'contact ratio':>13}{'mesh, mean':>18}{'single, highest':>28}")
@@ -104,7 +108,9 @@ def print_heat(report: HeatReport) -> None:
             print(f"{name:<27}{_variant_line(report.variants[key], cold)}")
     thermal = state.growth.teeth_alone(report.duty.system.pair)
     if APPARENT in report.variants:
-        print(f"{'':<27}apparent: force over the approach less {thermal * 1e6:.1f} um of tooth growth; no stiffness")
+        print(
+            f"{'':<27}apparent: force over the approach less {thermal * 1e6:.1f} um of tooth growth; no stiffness"
+        )
     elif report.duty.heat.growth:
         print(f"{NAMES[APPARENT]:<27}none: teeth grow {thermal * 1e6:.1f} um, more than the approach of "
               f"{cold.approach.mean() * 1e6:.1f} um")  # fmt: skip
@@ -113,7 +119,8 @@ def print_heat(report: HeatReport) -> None:
 def _variant_line(variant: Variant, cold: Variant) -> str:
     mesh, single = float(variant.mesh.mean()), float(np.max(variant.single))
     changes = [
-        100.0 * (value / float(of) - 1.0) for value, of in ((mesh, cold.mesh.mean()), (single, cold.single.max()))
+        100.0 * (value / float(of) - 1.0)
+        for value, of in ((mesh, cold.mesh.mean()), (single, cold.single.max()))
     ]
     return (
         f"{variant.transverse_contact_ratio:>13.4f}{mesh:>14.4e} N/m {changes[0]:>+8.2f} %"

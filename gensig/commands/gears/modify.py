@@ -25,7 +25,9 @@ GROUP = "modification"
 def modify_flank(arguments: Namespace) -> int:
     """Search, print the front, write the chosen modification as an option of the group ``modification``."""
     if arguments.points < 1:
-        raise ConfigError(f"--points {arguments.points}: give 1 for the least ripple alone, 3 or more for a front")
+        raise ConfigError(
+            f"--points {arguments.points}: give 1 for the least ripple alone, 3 or more for a front"
+        )
     check_outputs(arguments)
     target = option_file(arguments.out, GROUP, force=arguments.force)
     config = read_configuration(arguments)
@@ -40,7 +42,11 @@ def modify_flank(arguments: Namespace) -> int:
         before = judge(system, plain, cases)
         front = optimise(system, cases, n_front=arguments.points, seed=arguments.seed, on_done=_say)
     chosen = _chosen(front, before)
-    content = {"before": _content(before), "chosen": _content(chosen), "front": [_content(one) for one in front]}
+    content = {
+        "before": _content(before),
+        "chosen": _content(chosen),
+        "front": [_content(one) for one in front],
+    }
 
     def draw(path: Path) -> None:
         from gensig.commands.figures.flank_figures import plot_front
@@ -49,7 +55,10 @@ def modify_flank(arguments: Namespace) -> int:
 
     write_outputs(arguments, content, draw)
     print(f"{'':<12}{'peak to peak':>14}{'line load':>16}   worst of {_cases(cases)}")
-    for name, one in (("before", before), *((("chosen" if one is chosen else "front"), one) for one in front)):
+    for name, one in (
+        ("before", before),
+        *((("chosen" if one is chosen else "front"), one) for one in front),
+    ):
         print(f"{name:<12}{one.ripple * 1e6:>11.4f} um{one.line_load * 1e-3:>11.2f} N/mm")
     write_option(target, option_text(chosen, system, cases))
     return 0
@@ -61,7 +70,10 @@ def _say(done: int, total: int) -> None:
 
 def _chosen(front: Sequence[Optimum], before: Optimum) -> Optimum:
     """The point nearest to none of both, each counted by its value before: the knee of the front."""
-    return min(front, key=lambda one: (one.ripple / before.ripple) ** 2 + (one.line_load / before.line_load) ** 2)
+    return min(
+        front,
+        key=lambda one: (one.ripple / before.ripple) ** 2 + (one.line_load / before.line_load) ** 2,
+    )
 
 
 def _cases(cases: Cases) -> str:
@@ -92,7 +104,9 @@ def _keys(modification: PairModification) -> dict[str, dict[str, Any]]:
             suffix = field.metadata.get("unit")
             key = field.name if suffix is None else f"{field.name}_{suffix}"
             value = getattr(side, field.name)
-            values[key] = value if suffix is None else round(from_si(key, value), {"um": 3, "mm": 4}[suffix])
+            values[key] = (
+                value if suffix is None else round(from_si(key, value), {"um": 3, "mm": 4}[suffix])
+            )
         sides[name] = values
     return sides
 

@@ -11,7 +11,14 @@ import numpy as np
 from numpy.typing import NDArray
 
 from gensig.commands.console import replaced_file
-from gensig.commands.output import FIGURE_TYPES, check_file, check_new, check_outputs, highest, write_outputs
+from gensig.commands.output import (
+    FIGURE_TYPES,
+    check_file,
+    check_new,
+    check_outputs,
+    highest,
+    write_outputs,
+)
 from gensig.commands.request import read_configuration
 from gensig.errors import ConfigError
 from gensig.faults.registry import read_faults, without_vary
@@ -56,7 +63,9 @@ def stiffness(arguments: Namespace) -> int:
     def draw(path: Path) -> None:
         from gensig.commands.figures.machine_figures import plot_stiffness
 
-        plot_stiffness(system, curves, faults, path, sound=system.stiffness_curves() if faults else curves)
+        plot_stiffness(
+            system, curves, faults, path, sound=system.stiffness_curves() if faults else curves
+        )
 
     write_outputs(arguments, content, draw)
     _print_stiffness(content, curves)
@@ -79,7 +88,8 @@ def stiffness_content(system: Machine, curves: StiffnessCurves) -> dict[str, Any
         if system.mesh.law == "paper"
         else "tangent dF/d(approach) at static equilibrium",
         "compliance_m_per_n": {
-            gear: {name: values.tolist() for name, values in terms.items()} for gear, terms in curves.compliance.items()
+            gear: {name: values.tolist() for name, values in terms.items()}
+            for gear, terms in curves.compliance.items()
         },
         "shared_body_compliance_m_per_n": table.shared_compliance,
     }
@@ -90,7 +100,10 @@ def stiffness_content(system: Machine, curves: StiffnessCurves) -> dict[str, Any
     ):
         relief = system.long_relief()
         content["long_tip_relief"] = {
-            name: {"tip_relief_um": side.tip_relief * 1e6, "tip_relief_height_mm": side.tip_relief_height * 1e3}
+            name: {
+                "tip_relief_um": side.tip_relief * 1e6,
+                "tip_relief_height_mm": side.tip_relief_height * 1e3,
+            }
             for name, side in (("pinion", relief.pinion), ("wheel", relief.wheel))
         }
     if curves.faulty_pair_stiffness is not None and curves.faulty_pair_gap is not None:
@@ -103,8 +116,12 @@ def _print_stiffness(content: dict[str, Any], curves: StiffnessCurves) -> None:
     print(f"transverse contact ratio   {content['transverse_contact_ratio']:.5f}")
     print(f"base pitch                 {content['base_pitch_mm']:.5f} mm")
     print(f"mesh stiffness, mean       {content['mesh_stiffness_mean_n_per_m']:.4e} N/m")
-    print(f"mesh stiffness, range      {curves.mesh_stiffness.min():.4e} .. {curves.mesh_stiffness.max():.4e} N/m")
-    print(f"single pair, highest       {highest(curves.single_pair_stiffness, curves.faulty_pair_stiffness)}")
+    print(
+        f"mesh stiffness, range      {curves.mesh_stiffness.min():.4e} .. {curves.mesh_stiffness.max():.4e} N/m"
+    )
+    print(
+        f"single pair, highest       {highest(curves.single_pair_stiffness, curves.faulty_pair_stiffness)}"
+    )
     if (relief := content.get("long_tip_relief")) is not None:
         sides = (
             f"{name} {side['tip_relief_um']:.2f} um over {side['tip_relief_height_mm']:.2f} mm"
@@ -139,7 +156,13 @@ def simulate(arguments: Namespace) -> int:
     request = read_request(arguments.overrides, config_dir=arguments.config_dir)
     config = request.config
     name = config["fault"]["kind"]
-    one: dict[str, Any] = {"n_records": 1, "n_units": 1, "n_gearboxes": 1, "conditions_per_unit": None, "n_repeats": 1}
+    one: dict[str, Any] = {
+        "n_records": 1,
+        "n_units": 1,
+        "n_gearboxes": 1,
+        "conditions_per_unit": None,
+        "n_repeats": 1,
+    }
     config = config.with_keys("plan", **one, classes=[name], design="latin_hypercube", vary={})
     config = config.with_entries(classes={name: without_vary(config["fault"])})
     row = make_plan(config).record(0)
@@ -152,7 +175,9 @@ def _simulate_again(arguments: Namespace) -> int:
     from gensig.record.simulate import simulate_record
 
     if arguments.overrides or arguments.config_dir:
-        raise ConfigError("--from takes everything from the data set; give no overrides and no --config-dir with it")
+        raise ConfigError(
+            "--from takes everything from the data set; give no overrides and no --config-dir with it"
+        )
     if arguments.record is None:
         raise ConfigError("--from needs --record I, the number or id of a record")
     config, row = recorded_row(Path(arguments.folder), arguments.record)
@@ -161,7 +186,9 @@ def _simulate_again(arguments: Namespace) -> int:
     return _show(config, record, arguments, name)
 
 
-def _show(config: Configuration, record: Record, arguments: Namespace, name: str | None = None) -> int:
+def _show(
+    config: Configuration, record: Record, arguments: Namespace, name: str | None = None
+) -> int:
     """Write, plot and describe one record, by its class and severity where it has no other name."""
     if record.values.get("status") == "failed":
         print(f"gensig: {record.values['status_reason']}", file=sys.stderr)
@@ -185,26 +212,48 @@ def _write_record(config: Configuration, system: Machine, record: Record, output
     if path.suffix != ".csv":
         from gensig.production.folder import open_shard
 
-        params = [name.removeprefix("params/") for name in record.values if name.startswith("params/")]
+        params = [
+            name.removeprefix("params/") for name in record.values if name.startswith("params/")
+        ]
         with replaced_file(path) as temporary, open_shard(temporary, config, 1, params) as writer:
             writer.write(0, record.signals, record.values)
     else:
         acceleration = record.signals["acceleration"]
         time = np.arange(acceleration.shape[1]) / system.sensing.sampling_rate
-        units = (channel_unit(name).replace("/", "_per_").replace("^", "") for name in system.sensing.channel_names)
-        names = (f"{name}_{unit}" for name, unit in zip(system.sensing.channel_names, units, strict=True))
+        units = (
+            channel_unit(name).replace("/", "_per_").replace("^", "")
+            for name in system.sensing.channel_names
+        )
+        names = (
+            f"{name}_{unit}" for name, unit in zip(system.sensing.channel_names, units, strict=True)
+        )
         header = ",".join(["time_s", *names])
         with replaced_file(path) as temporary:
-            np.savetxt(temporary, np.column_stack([time, *acceleration]), "%.9g", ",", header=header, comments="")
+            np.savetxt(
+                temporary,
+                np.column_stack([time, *acceleration]),
+                "%.9g",
+                ",",
+                header=header,
+                comments="",
+            )
 
 
-def _print_record(system: Machine, acceleration: NDArray[np.float32], values: dict[str, Any]) -> None:
+def _print_record(
+    system: Machine, acceleration: NDArray[np.float32], values: dict[str, Any]
+) -> None:
     from gensig.signals.indicators import crest_factor, kurtosis, rms
 
-    print(f"speed {values['speed_rpm']:.3f} r/min, mesh frequency {values['mesh_frequency_hz']:.2f} Hz")
+    print(
+        f"speed {values['speed_rpm']:.3f} r/min, mesh frequency {values['mesh_frequency_hz']:.2f} Hz"
+    )
     print(f"{'channel':<16}{'RMS':>12} {'':<8}{'kurtosis':>12}{'crest':>12}")
     table = zip(
-        system.sensing.channel_names, rms(acceleration), kurtosis(acceleration), crest_factor(acceleration), strict=True
+        system.sensing.channel_names,
+        rms(acceleration),
+        kurtosis(acceleration),
+        crest_factor(acceleration),
+        strict=True,
     )
     for name, level, fourth, crest in table:
         unit = channel_unit(name).replace("^", "")

@@ -44,7 +44,9 @@ def root_stress(arguments: Namespace) -> int:
     return 0
 
 
-def root_stress_content(system: RootStrength, gears: dict[str, GearStress], history: RootHistory) -> dict[str, Any]:
+def root_stress_content(
+    system: RootStrength, gears: dict[str, GearStress], history: RootHistory
+) -> dict[str, Any]:
     """The keys of ``gensig root-stress --json``; at the top those of the gear with the higher stress."""
     pair, strength = system.pair, system.strength
     by_gear = {name: _gear_content(gears[name], history.stress[name]) for name in gears}
@@ -94,10 +96,14 @@ def _gear_content(gear: GearStress, stress: np.ndarray[Any, Any]) -> dict[str, A
 
 def _print(system: RootStrength, gears: dict[str, GearStress], content: dict[str, Any]) -> None:
     strength = system.strength
-    print(f"tangential force           {content['tangential_force_n']:.1f} N, {content['torque_nm']:.2f} N m")
+    print(
+        f"tangential force           {content['tangential_force_n']:.1f} N, {content['torque_nm']:.2f} N m"
+    )
     if "tangential_force_over_mesh_n" in content:
         print(f"over the mesh it takes     {content['tangential_force_over_mesh_n']:.1f} N")
-    print(f"load point                 {strength.load_point.replace('_', ' ')}, ISO 6336-3:{strength.edition}")
+    print(
+        f"load point                 {strength.load_point.replace('_', ' ')}, ISO 6336-3:{strength.edition}"
+    )
     heads = "".join(f"{name:>16}" for name in gears)
     print(f"{'':<27}{heads}")
     for label, key, form in (

@@ -30,14 +30,19 @@ from gensig.systems.wear import read_wear_case, wear_fault
 Array = NDArray[np.float64]
 
 GROUP = "fault"
-MAP_TORQUES, MAP_SPEEDS = np.geomspace(0.25, 1.5, 6), np.geomspace(0.25, 2.0, 7)  # over the configured
+MAP_TORQUES, MAP_SPEEDS = (
+    np.geomspace(0.25, 1.5, 6),
+    np.geomspace(0.25, 2.0, 7),
+)  # over the configured
 YIELD_SHARE = 0.6  # of the hardness: a line contact yields below its surface (Johnson, Contact Mechanics, 1985)
 
 
 def wear_life_verb(arguments: Namespace) -> int:
     """Life and wear to JSON, a figure, an option for records, or a summary."""
     check_outputs(arguments)
-    target = None if arguments.out is None else option_file(arguments.out, GROUP, force=arguments.force)
+    target = (
+        None if arguments.out is None else option_file(arguments.out, GROUP, force=arguments.force)
+    )
     config = read_configuration(arguments)
     with one_line_warnings("gensig"):
         case = read_wear_case(config)
@@ -64,11 +69,15 @@ def wear_life_verb(arguments: Namespace) -> int:
     return 0
 
 
-def _lives(case: WearCase, speed: float, arguments: Namespace) -> tuple[LifeMap | None, tuple[FittedLaw, ...]]:
+def _lives(
+    case: WearCase, speed: float, arguments: Namespace
+) -> tuple[LifeMap | None, tuple[FittedLaw, ...]]:
     if not (arguments.map or arguments.torques or arguments.speeds):
         return None, ()
     torques = arguments.torques or case.torque * MAP_TORQUES
-    speeds = speed * MAP_SPEEDS if not arguments.speeds else np.array(arguments.speeds) * math.pi / 30.0
+    speeds = (
+        speed * MAP_SPEEDS if not arguments.speeds else np.array(arguments.speeds) * math.pi / 30.0
+    )
     lives = life_map(case, list(torques), list(speeds))
     return lives, fitted_laws(lives, case.torque, speed)
 
@@ -82,7 +91,13 @@ def wear_life_content(
 ) -> dict[str, Any]:
     """The keys of ``gensig wear-life --json``; where there are several slices, the greatest of them."""
     case = life.case
-    path, pair, options, new, worn = case.path, case.pair, case.options, case.new_flanks(), life.depth[-1]
+    path, pair, options, new, worn = (
+        case.path,
+        case.pair,
+        case.options,
+        case.new_flanks(),
+        life.depth[-1],
+    )
     load = case.line_load(new)
     per_mesh = case.wear_per_mesh(new)
     deepest = np.unravel_index(_judged(case, worn).argmax(), worn.shape)
@@ -116,7 +131,9 @@ def wear_life_content(
         "sliding_velocity_mm_per_s": _list(path.sliding * speed * 1e3),
         "line_load_n_per_mm": _list(load.max(axis=0) * 1e-3),
         "contact_pressure_mpa": _list(case.pressure(load, new).max(axis=0) * 1e-6),
-        "contact_pressure_at_end_mpa": _list(case.pressure(case.line_load(worn), worn).max(axis=0) * 1e-6),
+        "contact_pressure_at_end_mpa": _list(
+            case.pressure(case.line_load(worn), worn).max(axis=0) * 1e-6
+        ),
         "pair_wear_per_mesh_nm": _list(per_mesh.sum(axis=0).max(axis=0) * 1e9),
     }
     for side, name in enumerate(SIDES):
@@ -124,13 +141,17 @@ def wear_life_content(
         content[f"{name}_depth_um"] = _list(worn[side].max(axis=0) * 1e6)
         if case.shape[1] > 1:
             content[f"{name}_depth_by_slice_um"] = (worn[side] * 1e6).tolist()
-        for key, values in flank_radii(path, worn.mean(axis=1), load.mean(axis=0), case.material).items():
+        for key, values in flank_radii(
+            path, worn.mean(axis=1), load.mean(axis=0), case.material
+        ).items():
             content[f"{name}_curvature_radius_{key}_mm"] = _list(values[side] * 1e3)
     content["history"] = {
         "hours": _list(np.array([hours(turns, speed) for turns in life.turns])),
         "pinion_depth_um": _list(life.depth[:, 0].max(axis=(1, 2)) * 1e6),
         "wheel_depth_um": _list(life.depth[:, 1].max(axis=(1, 2)) * 1e6),
-        "transmission_error_peak_to_peak_um": _list(np.array([case.error_range(one) for one in life.depth]) * 1e6),
+        "transmission_error_peak_to_peak_um": _list(
+            np.array([case.error_range(one) for one in life.depth]) * 1e6
+        ),
     }
     if vibration is not None:
         content["vibration"] = _vibration_content(vibration, options, speed)
@@ -147,16 +168,25 @@ def wear_life_content(
 def _torque_exponent(case: WearCase) -> float | None:
     try:
         return torque_exponent(case)
-    except (ConfigError, SimulationError):  # at 5 % more torque new flanks may be at the limit already
+    except (
+        ConfigError,
+        SimulationError,
+    ):  # at 5 % more torque new flanks may be at the limit already
         return None
 
 
 def _judged(case: WearCase, depth: Array) -> Array:
     """What is compared with the threshold, in the shape of ``depth``."""
-    return np.broadcast_to(depth.sum(axis=0), depth.shape) if case.options.criterion == "sum" else depth
+    return (
+        np.broadcast_to(depth.sum(axis=0), depth.shape)
+        if case.options.criterion == "sum"
+        else depth
+    )
 
 
-def _vibration_content(vibration: WornVibration, options: WearOptions, speed: float) -> dict[str, Any]:
+def _vibration_content(
+    vibration: WornVibration, options: WearOptions, speed: float
+) -> dict[str, Any]:
     return {
         "limit_m_per_s2": options.vibration_limit_m_per_s2,
         "rise_limit_db": options.vibration_rise,
@@ -191,7 +221,11 @@ def _list(values: Array) -> list[float | None]:
 
 
 def _warn_of_interruption(case: WearCase) -> None:
-    one = "one pair carries everything on its path" if case.loads is None else "tips' corners help along"
+    one = (
+        "one pair carries everything on its path"
+        if case.loads is None
+        else "tips' corners help along"
+    )
     print(
         f"gensig: WARNING: the transverse contact ratio {case.pair.transverse_contact_ratio:.4f} is below 1: the drive "
         f"is interrupted at every tooth, and no gears run like this; the wear here is quasi-static, {one}",
@@ -217,22 +251,36 @@ def _print(content: Mapping[str, Any], lives: LifeMap | None, laws: tuple[Fitted
         values = content[key]
         return f"{values[0]:.4g} .. {values[-1]:.4g}"
 
-    print(f"rule                       {content['rule']}, sharing {content['sharing']}, geometry {content['geometry']}")
+    print(
+        f"rule                       {content['rule']}, sharing {content['sharing']}, geometry {content['geometry']}"
+    )
     print(f"contact ratio              {content['transverse_contact_ratio']:.4f}")
     print(f"pressure angle, A to E     {ends('pressure_angle_deg')} deg on the pinion")
-    print(f"sliding, A to E            {ends('sliding_velocity_mm_per_s')} mm/s, 0 at the pitch point")
+    print(
+        f"sliding, A to E            {ends('sliding_velocity_mm_per_s')} mm/s, 0 at the pitch point"
+    )
     print(f"contact pressure, A to E   {ends('contact_pressure_mpa')} MPa, new flanks")
     for name in SIDES:
-        print(f"{name:<6} wear, A to E       {ends(f'{name}_wear_per_mesh_nm')} nm a mesh, new flanks")
+        print(
+            f"{name:<6} wear, A to E       {ends(f'{name}_wear_per_mesh_nm')} nm a mesh, new flanks"
+        )
     where = content["deepest"]
-    print(f"life                       {content['life_hours']:.5g} h, {content['life_turns']:.5g} turns of the pinion")
+    print(
+        f"life                       {content['life_hours']:.5g} h, {content['life_turns']:.5g} turns of the pinion"
+    )
     print(f"ended by                   {content['ended_by'].replace('_', ' ')}, {content['threshold_um']:.4g} um "
           f"({where['gear']}, {where['position_mm']:.3f} mm from A)")  # fmt: skip
     _print_limits(content)
     if content["torque_exponent"] is not None:
-        print(f"local law                  life ~ torque^-{content['torque_exponent']:.3f} speed^-1")
+        print(
+            f"local law                  life ~ torque^-{content['torque_exponent']:.3f} speed^-1"
+        )
     if lives is not None:
-        print(f"{'life, h':<10}" + "".join(f"{speed * 30.0 / math.pi:>11.4g}" for speed in lives.speed) + " r/min")
+        print(
+            f"{'life, h':<10}"
+            + "".join(f"{speed * 30.0 / math.pi:>11.4g}" for speed in lives.speed)
+            + " r/min"
+        )
         for torque, row in zip(lives.torque, lives.hours, strict=True):
             print(f"{torque:>6.4g} N m" + "".join(f"{value:>11.4g}" for value in row))
     for law in laws:
@@ -246,7 +294,10 @@ def _refusal(law: FittedLaw) -> str:
 
 def _print_limits(content: Mapping[str, Any]) -> None:
     """How near the life came to limits that did not end it, and how the machine shakes."""
-    limit, error = content["transmission_error_limit_um"], content["history"]["transmission_error_peak_to_peak_um"]
+    limit, error = (
+        content["transmission_error_limit_um"],
+        content["history"]["transmission_error_peak_to_peak_um"],
+    )
     if limit is not None and content["ended_by"] != "transmission_error":
         print(f"transmission error         {error[-1]:.4g} um from peak to peak at the end; limit of {limit:g} um not "
               "reached")  # fmt: skip

@@ -25,7 +25,11 @@ WITHOUT = "_without_dampers"
 
 
 def simulate_time(
-    line: EngineLine, config: Configuration, torques: LineTorques, nodes: Sequence[int], duration: float
+    line: EngineLine,
+    config: Configuration,
+    torques: LineTorques,
+    nodes: Sequence[int],
+    duration: float,
 ) -> TimeResponse:
     """An operating point integrated in time, its spur meshes by tables of their teeth."""
     if not 0.0 < duration <= LONGEST_TIME:
@@ -67,10 +71,13 @@ def time_content(response: TimeResponse) -> dict[str, Any]:
     least, greatest = typical_extremes(response.mesh_force, response.crank_angle)
     return {
         "time_speed_fluctuation_rpm": rpm * response.fluctuation,
-        "time_typical_fluctuation_rpm": rpm * np.median(fluctuations(response.speed, response.crank_angle), axis=1),
+        "time_typical_fluctuation_rpm": rpm
+        * np.median(fluctuations(response.speed, response.crank_angle), axis=1),
         "time_mean_cycle_fluctuation_rpm": rpm * response.cycle_fluctuation,
         "time_orders": 0.5 * np.arange(1, TIME_ORDERS + 1),
-        "time_angle_deg": np.degrees(order_amplitudes(response.angle, response.crank_angle, TIME_ORDERS)),
+        "time_angle_deg": np.degrees(
+            order_amplitudes(response.angle, response.crank_angle, TIME_ORDERS)
+        ),
         "time_contact_loss_fraction": response.contact_loss,
         "time_back_contact_fraction": response.back_contact,
         "time_least_tooth_force_n": response.least_force,
@@ -120,9 +127,15 @@ def root_content(line: EngineLine, mesh: int, root: DynamicRootStress) -> dict[s
         "greatest_tooth_force_n": root.strength.flanks.mesh_force,
         "iso_root_stress_mpa": from_si("stress_mpa", gear.stress),
         "largest_root_stress_mpa": from_si("stress_mpa", typical_largest(passes, in_cycle)),
-        "roll_angle_deg": np.degrees(root.history.roll / root.strength.pair.pinion.base_radius).tolist(),
-        "root_stress_mpa": (from_si("stress_mpa", 1.0) * passes[int(passes.max(axis=1).argmax())]).tolist(),
-        "largest_root_stress_of_passes_mpa": (from_si("stress_mpa", 1.0) * passes.max(axis=1)).tolist(),
+        "roll_angle_deg": np.degrees(
+            root.history.roll / root.strength.pair.pinion.base_radius
+        ).tolist(),
+        "root_stress_mpa": (
+            from_si("stress_mpa", 1.0) * passes[int(passes.max(axis=1).argmax())]
+        ).tolist(),
+        "largest_root_stress_of_passes_mpa": (
+            from_si("stress_mpa", 1.0) * passes.max(axis=1)
+        ).tolist(),
         "safety_factor_paper": gear.safety.paper,
         "reliability_paper": reliability(gear.safety.paper),
         "safety_factor_iso": gear.safety.iso,
@@ -136,9 +149,15 @@ def print_in_time(content: Mapping[str, Any]) -> None:
     kinds = ("typical_fluctuation_rpm", "speed_fluctuation_rpm", "mean_cycle_fluctuation_rpm")
     nodes = zip(content["shown_nodes"], *(content[f"time_{kind}"] for kind in kinds), strict=True)
     for node, typical, whole, cycle in nodes:
-        print(f"  node {node:>3} +- {typical:.2f} r/min in a cycle, {whole:.2f} in all, {cycle:.2f} of the mean cycle")
+        print(
+            f"  node {node:>3} +- {typical:.2f} r/min in a cycle, {whole:.2f} in all, {cycle:.2f} of the mean cycle"
+        )
     ends = ("typical_least", "typical_greatest", "least", "greatest")
-    keys = (*(f"{end}_tooth_force_n" for end in ends), "contact_loss_fraction", "back_contact_fraction")
+    keys = (
+        *(f"{end}_tooth_force_n" for end in ends),
+        "contact_loss_fraction",
+        "back_contact_fraction",
+    )
     rows = zip(content["meshes"], *(content[f"time_{key}"] for key in keys), strict=True)
     for name, least, greatest, low, high, apart, back in rows:
         print(

@@ -56,14 +56,20 @@ def forced_response(arguments: Namespace) -> int:
     line = read_engine_line(config)
     found = _find(line, arguments, config["seed"])
     if (arguments.time, arguments.sweep) != (None, None) and line.engine.pressure_decides_torque:
-        raise ConfigError("excitation.pressure.file decides the torque; leave --time and --sweep out")
+        raise ConfigError(
+            "excitation.pressure.file decides the torque; leave --time and --sweep out"
+        )
     if arguments.time is not None:
-        found = replace(found, in_time=simulate_time(line, config, found.torques, found.nodes, arguments.time))
+        found = replace(
+            found, in_time=simulate_time(line, config, found.torques, found.nodes, arguments.time)
+        )
     if arguments.mesh is not None:
         found = replace(found, mesh=mesh_between(line, arguments.mesh))
         found = replace(found, roots=_roots(line, config, found, arguments.time))
     if arguments.sweep is not None:
-        sweep = simulate_sweep(line, config, found.nodes, arguments.sweep, arguments.run_torque, RUN_ORDERS)
+        sweep = simulate_sweep(
+            line, config, found.nodes, arguments.sweep, arguments.run_torque, RUN_ORDERS
+        )
         found = replace(found, sweep=sweep)
     content = response_content(line, found)
 
@@ -90,9 +96,13 @@ def response_content(line: EngineLine, found: ResponseResult) -> dict[str, Any]:
         "torque_nm": torques.brake_torque,
         "node_numbers": list(numbers),
         "nodes": [node.name for node in line.drive.line.nodes],
-        "mean_speed_rpm": [line.ratios[number] * from_si("speed_rpm", response.speed) for number in numbers],
+        "mean_speed_rpm": [
+            line.ratios[number] * from_si("speed_rpm", response.speed) for number in numbers
+        ],
         "speed_fluctuation_rpm": from_si("speed_rpm", 1.0) * response.fluctuation()[: len(numbers)],
-        "toothed_wheel_fluctuation_rpm": {name: from_si("speed_rpm", value) for name, value in found.seen.items()},
+        "toothed_wheel_fluctuation_rpm": {
+            name: from_si("speed_rpm", value) for name, value in found.seen.items()
+        },
         "orders": response.orders,
         "shown_nodes": list(found.nodes),
         "angle_deg": np.degrees(np.abs(response.angle[places])),
@@ -117,10 +127,14 @@ def response_content(line: EngineLine, found: ResponseResult) -> dict[str, Any]:
         content |= sweep_content(found.sweep)
     if found.mesh is not None:
         content["root_stress_mesh"] = line.mesh_names[found.mesh]
-        content["root_stress"] = {name: root_content(line, found.mesh, root) for name, root in found.roots.items()}
+        content["root_stress"] = {
+            name: root_content(line, found.mesh, root) for name, root in found.roots.items()
+        }
     if found.run:
         content["run_speeds_rpm"] = from_si("speed_rpm", 1.0) * found.run[0].speeds
-        content["run_speed_fluctuation_rpm"] = [from_si("speed_rpm", 1.0) * one.fluctuation for one in found.run]
+        content["run_speed_fluctuation_rpm"] = [
+            from_si("speed_rpm", 1.0) * one.fluctuation for one in found.run
+        ]
         content["run_angle_deg"] = [np.degrees(one.angle) for one in found.run]
     return {key: plain(value) for key, value in content.items()}
 
@@ -132,14 +146,18 @@ def _roots(
     mesh = found.mesh
     assert mesh is not None
     strength = read_mesh_strength(config, line, mesh)
-    roots = {"linear": dynamic_root_stress(strength, line, mesh, tooth_load(line, mesh, found.response))}
+    roots = {
+        "linear": dynamic_root_stress(strength, line, mesh, tooth_load(line, mesh, found.response))
+    }
     if found.in_time is not None:
         roots["in_time"] = root_stress_in_time(strength, line, mesh, found.in_time)
     if not config["system"]["dampers"]:
         return roots
     bare, torques = without_dampers(config), found.torques
     response = bare.response(torques.speed, torques.brake_torque)
-    roots["linear_without_dampers"] = dynamic_root_stress(strength, bare, mesh, tooth_load(bare, mesh, response))
+    roots["linear_without_dampers"] = dynamic_root_stress(
+        strength, bare, mesh, tooth_load(bare, mesh, response)
+    )
     if duration is not None:
         undamped = simulate_time(bare, config, torques, found.nodes, duration)
         roots["in_time_without_dampers"] = root_stress_in_time(strength, bare, mesh, undamped)
@@ -150,14 +168,22 @@ def _find(line: EngineLine, arguments: Namespace, seed: int) -> ResponseResult:
     reference, ratios = line.engine.reference, line.ratios
     speed = reference.speed if arguments.speed is None else to_si("speed_rpm", arguments.speed)
     measured = line.engine.pressure_decides_torque
-    torque = None if measured else reference.torque if arguments.torque is None else arguments.torque
+    torque = (
+        None if measured else reference.torque if arguments.torque is None else arguments.torque
+    )
     if measured and (arguments.torque is not None or arguments.run is not None):
-        raise ConfigError("excitation.pressure.file decides the torque; leave --torque and --run out")
+        raise ConfigError(
+            "excitation.pressure.file decides the torque; leave --torque and --run out"
+        )
     measured_nodes = tuple(wheel.node for wheel in line.wheels.values())
-    nodes = tuple(arguments.nodes or measured_nodes or (line.engine.driving_nodes[0], line.engine.load_node))
+    nodes = tuple(
+        arguments.nodes or measured_nodes or (line.engine.driving_nodes[0], line.engine.load_node)
+    )
     for node in nodes:
         if node not in ratios:
-            raise ConfigError(f"--nodes {node}: the shaft line has no such node; it has {min(ratios)} to {max(ratios)}")
+            raise ConfigError(
+                f"--nodes {node}: the shaft line has no such node; it has {min(ratios)} to {max(ratios)}"
+            )
     torques = line.torques(speed, torque)
     linear, _ = line.linear()
     places = [line.drive.numbers.index(node) for node in nodes]
@@ -171,18 +197,27 @@ def _find(line: EngineLine, arguments: Namespace, seed: int) -> ResponseResult:
         low, high, step = (to_si("speed_rpm", value) for value in arguments.run)
         if not (0.0 < low < high and step > 0.0 and (high - low) / step < MOST_SPEEDS):
             given = " ".join(f"{value:g}" for value in arguments.run)
-            raise ConfigError(f"--run {given}: give low, high and step in r/min, fewer than {MOST_SPEEDS} speeds")
+            raise ConfigError(
+                f"--run {given}: give low, high and step in r/min, fewer than {MOST_SPEEDS} speeds"
+            )
         speeds = np.arange(low, high + 0.5 * step, step)
         run = run_of_speeds(
             linear,
-            lambda one: line.on_line(line.torques(one, line.load_at(arguments.run_torque, one / reference.speed))),
+            lambda one: line.on_line(
+                line.torques(one, line.load_at(arguments.run_torque, one / reference.speed))
+            ),
             speeds,
             places,
             n_orders=RUN_ORDERS,
         )
     response, rng = line.response(speed, torque), np.random.default_rng(seed)
-    seen = {name: 0.5 * float(np.ptp(line.seen_by(wheel, response, rng))) for name, wheel in line.wheels.items()}
-    return ResponseResult(torques=torques, response=response, seen=seen, nodes=nodes, run=tuple(run))
+    seen = {
+        name: 0.5 * float(np.ptp(line.seen_by(wheel, response, rng)))
+        for name, wheel in line.wheels.items()
+    }
+    return ResponseResult(
+        torques=torques, response=response, seen=seen, nodes=nodes, run=tuple(run)
+    )
 
 
 def _print(content: dict[str, Any]) -> None:
@@ -192,7 +227,9 @@ def _print(content: dict[str, Any]) -> None:
             f"{content['indicated_torque_nm']:.5g} N m indicated, peak {content['peak_pressure_mpa']:.4g} MPa"
         )
     else:
-        print(f"{content['speed_rpm']:g} r/min, {content['torque_nm']:.6g} N m of the load at the motor")
+        print(
+            f"{content['speed_rpm']:g} r/min, {content['torque_nm']:.6g} N m of the load at the motor"
+        )
     by_number = dict(zip(content["node_numbers"], range(len(content["nodes"])), strict=True))
     for node in content["shown_nodes"]:
         place = by_number[node]

@@ -95,9 +95,13 @@ def _print_modes(line: DriveLine, found: Modes, content: Mapping[str, Any]) -> N
         "loops": content["n_loops"],
         "rigid mode(s)": content["n_rigid_modes"],
     }
-    print(f"{content['system']}: " + ", ".join(f"{count} {what}" for what, count in counts.items() if count))
+    print(
+        f"{content['system']}: "
+        + ", ".join(f"{count} {what}" for what, count in counts.items() if count)
+    )
     motions = [
-        f"{name} rotation" if n_lateral and k < n_nodes else name for k, name in enumerate(matrices.coordinate_names)
+        f"{name} rotation" if n_lateral and k < n_nodes else name
+        for k, name in enumerate(matrices.coordinate_names)
     ]
     print(f"{'mode':>4} {'Hz':>10} {'damping':>8}  kinetic energy")
     for mode, frequency in enumerate(content["natural_frequencies_hz"][:SHOWN]):
@@ -106,7 +110,11 @@ def _print_modes(line: DriveLine, found: Modes, content: Mapping[str, Any]) -> N
         where = ", ".join(f"{share[place]:.0%} {motions[place]}" for place in most)
         strain = max(content["mesh_strain_energy_share"][mode], default=0.0)
         where += (
-            "; turns freely" if frequency == 0.0 else f"; {strain:.0%} of the strain in a mesh" if strain > 0.5 else ""
+            "; turns freely"
+            if frequency == 0.0
+            else f"; {strain:.0%} of the strain in a mesh"
+            if strain > 0.5
+            else ""
         )
         print(f"{mode:>4} {frequency:>10.2f} {content['damping_ratio'][mode]:>8.4f}  {where}")
     if len(content["natural_frequencies_hz"]) > SHOWN:

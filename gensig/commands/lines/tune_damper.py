@@ -43,21 +43,34 @@ def tune_damper(arguments: Namespace) -> int:
     config = read_configuration(arguments)
     line = read_engine_line(config)
     if line.engine.pressure_decides_torque:
-        raise ConfigError("excitation.pressure.file is of one operating point; tune-damper runs over a range of speeds")
+        raise ConfigError(
+            "excitation.pressure.file is of one operating point; tune-damper runs over a range of speeds"
+        )
     mesh, nodes = mesh_between(line, arguments.mesh), tuple(arguments.nodes or arguments.mesh)
     speeds = _speeds(line, arguments.run)
     reference = line.engine.reference
     torque = reference.torque if arguments.torque is None else arguments.torque
     seen = seen_by_dampers(line, mesh, nodes, speeds, torque)
-    own = {number: node.inertia for number, node in zip(line.drive.numbers, line.drive.line.nodes, strict=True)}
-    most = [own[node] if arguments.most_inertia is None else arguments.most_inertia for node in nodes]
-    print(f"searching for dampers on nodes {', '.join(map(str, nodes))}; this takes a minute", file=sys.stderr)
+    own = {
+        number: node.inertia
+        for number, node in zip(line.drive.numbers, line.drive.line.nodes, strict=True)
+    }
+    most = [
+        own[node] if arguments.most_inertia is None else arguments.most_inertia for node in nodes
+    ]
+    print(
+        f"searching for dampers on nodes {', '.join(map(str, nodes))}; this takes a minute",
+        file=sys.stderr,
+    )
     found = tune_dampers(seen, most, viscous=arguments.viscous, seed=arguments.seed)
     dampers = tuple(_rounded(one) for one in found)
     strength = read_mesh_strength(config, line, mesh)
     states = {
         name: _state(one, mesh, strength, torque, seen.largest_force(added))
-        for name, one, added in (("before", line, ()), ("after", with_own_dampers(line, dampers), dampers))
+        for name, one, added in (
+            ("before", line, ()),
+            ("after", with_own_dampers(line, dampers), dampers),
+        )
     }
     content = tuning_content(states, dampers, mesh, speeds, torque)
 
@@ -93,7 +106,9 @@ def tuning_content(
     }
 
 
-def option_text(machine: Mapping[str, Any], dampers: Sequence[TorsionalDamper], content: Mapping[str, Any]) -> str:
+def option_text(
+    machine: Mapping[str, Any], dampers: Sequence[TorsionalDamper], content: Mapping[str, Any]
+) -> str:
     """The whole machine as YAML that the group ``system`` takes, the new dampers behind those that it had."""
     low, high = content["run_speeds_rpm"][0], content["run_speeds_rpm"][-1]
     head = (
@@ -108,11 +123,17 @@ def option_text(machine: Mapping[str, Any], dampers: Sequence[TorsionalDamper], 
 def _speeds(line: EngineLine, run: Sequence[float] | None) -> NDArray[np.float64]:
     """Speeds of the crank, rad/s: as given, or the range of the Campbell diagram in 25 r/min."""
     campbell = line.drive.campbell
-    given = run or (from_si("speed_rpm", campbell.low_speed), from_si("speed_rpm", campbell.high_speed), 25.0)
+    given = run or (
+        from_si("speed_rpm", campbell.low_speed),
+        from_si("speed_rpm", campbell.high_speed),
+        25.0,
+    )
     low, high, step = given
     if not (0.0 < low < high and step > 0.0 and (high - low) / step < MOST_SPEEDS):
         text = " ".join(f"{value:g}" for value in given)
-        raise ConfigError(f"--run {text}: give low, high and step in r/min, fewer than {MOST_SPEEDS} speeds")
+        raise ConfigError(
+            f"--run {text}: give low, high and step in r/min, fewer than {MOST_SPEEDS} speeds"
+        )
     return np.asarray(to_si("speed_rpm", 1.0) * np.arange(low, high + 0.5 * step, step))
 
 
@@ -120,7 +141,9 @@ def _rounded(damper: TorsionalDamper) -> TorsionalDamper:
     """Sizes as they are written."""
     sizes = (damper.ring_inertia, damper.damping, damper.stiffness)
     inertia, damping, stiffness = (float(f"{value:.{DIGITS}g}") for value in sizes)
-    return TorsionalDamper(node=damper.node, ring_inertia=inertia, damping=damping, stiffness=stiffness)
+    return TorsionalDamper(
+        node=damper.node, ring_inertia=inertia, damping=damping, stiffness=stiffness
+    )
 
 
 def _keys(damper: TorsionalDamper) -> dict[str, Any]:
@@ -156,8 +179,12 @@ def _state_content(state: DamperState) -> dict[str, Any]:
         "decisive_gear": name,
         "iso_root_stress_mpa": from_si("stress_mpa", gear.stress),
         "largest_root_stress_mpa": from_si("stress_mpa", float(root.history.stress[name].max())),
-        "roll_angle_deg": np.degrees(root.history.roll / root.strength.pair.pinion.base_radius).tolist(),
-        "root_stress_mpa": (from_si("stress_mpa", 1.0) * passes[int(passes.max(axis=1).argmax())]).tolist(),
+        "roll_angle_deg": np.degrees(
+            root.history.roll / root.strength.pair.pinion.base_radius
+        ).tolist(),
+        "root_stress_mpa": (
+            from_si("stress_mpa", 1.0) * passes[int(passes.max(axis=1).argmax())]
+        ).tolist(),
         "safety_factor_paper": gear.safety.paper,
         "reliability_paper": reliability(gear.safety.paper),
         "safety_factor_iso": gear.safety.iso,

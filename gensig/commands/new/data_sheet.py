@@ -59,7 +59,9 @@ class DataSheet:
             if wrong := [value for value in values if not (value > 0.0 and math.isfinite(value))]:
                 raise ConfigError(f"{flag} {wrong[0]:g} must be positive")
         if not MODULES[0] <= self.module <= MODULES[1]:
-            raise ConfigError(f"--module {self.module:g} must lie in {MODULES[0]:g} to {MODULES[1]:g}: it is in mm")
+            raise ConfigError(
+                f"--module {self.module:g} must lie in {MODULES[0]:g} to {MODULES[1]:g}: it is in mm"
+            )
 
     @property
     def is_helical(self) -> bool:
@@ -83,7 +85,11 @@ class GearOption:
 
     def text(self) -> str:
         """The option as a file."""
-        system = "\n# Helical: take it with system=helical_pair gear=" + self.gear["name"] if self.is_helical else ""
+        system = (
+            "\n# Helical: take it with system=helical_pair gear=" + self.gear["name"]
+            if self.is_helical
+            else ""
+        )
         head = (
             f"# Written by gensig new gearbox. What is not given is derived or assumed, as each line says; put in what "
             f"you know.{system}\n"
@@ -92,7 +98,9 @@ class GearOption:
 
     def bearings(self) -> dict[str, str]:
         """The bearings beside each gear."""
-        return {side: bearing_for(2.0 * self.gear[side]["bore_radius_mm"]).describes for side in SIDES}
+        return {
+            side: bearing_for(2.0 * self.gear[side]["bore_radius_mm"]).describes for side in SIDES
+        }
 
     def derived(self) -> dict[str, float | None]:
         """What follows from the sheet, by key with its unit; None where there is none.
@@ -178,11 +186,16 @@ def gear_option(sheet: DataSheet) -> GearOption:
         for axis, value in zip("xy", stiffness, strict=True):
             gear[side]["support"] |= {
                 f"stiffness_{axis}_n_per_m": _short(value),
-                f"damping_{axis}_ns_per_m": _short(2.0 * DAMPING_RATIO * math.sqrt(value * body.mass)),
+                f"damping_{axis}_ns_per_m": _short(
+                    2.0 * DAMPING_RATIO * math.sqrt(value * body.mass)
+                ),
             }
     machine = read_system(_config(sheet, gear, on_bearings=False))
     return GearOption(
-        gear=gear, remarks=_remarks(sheet, machine, bearings), machine=machine, is_helical=sheet.is_helical
+        gear=gear,
+        remarks=_remarks(sheet, machine, bearings),
+        machine=machine,
+        is_helical=sheet.is_helical,
     )
 
 
@@ -207,7 +220,9 @@ def tip_rounding(pressure_angle_deg: float, addendum: float = ADDENDUM) -> float
         return LARGEST_ROUNDING
     room = 1.0 - math.sin(alpha)
     middle = (math.pi / 4.0 - (addendum + CLEARANCE) * math.tan(alpha)) * math.cos(alpha) / room
-    return max(0.01, min(LARGEST_ROUNDING, math.floor(100.1 * min(CLEARANCE / room, middle)) / 100.0))
+    return max(
+        0.01, min(LARGEST_ROUNDING, math.floor(100.1 * min(CLEARANCE / room, middle)) / 100.0)
+    )
 
 
 def _bores(sheet: DataSheet) -> tuple[float, float]:
@@ -219,7 +234,12 @@ def _bores(sheet: DataSheet) -> tuple[float, float]:
 def _no_support(is_helical: bool) -> dict[str, float | None]:
     keys = [f"{name}_{axis}_{unit}" for name, unit in (("stiffness", "n_per_m"), ("damping", "ns_per_m"))
             for axis in "xy"]  # fmt: skip
-    axial = ("stiffness_z_n_per_m", "damping_z_ns_per_m", "stiffness_tilt_nm_per_rad", "damping_tilt_nms_per_rad")
+    axial = (
+        "stiffness_z_n_per_m",
+        "damping_z_ns_per_m",
+        "stiffness_tilt_nm_per_rad",
+        "damping_tilt_nms_per_rad",
+    )
     return {**dict.fromkeys(keys, 1.0), **(dict.fromkeys(axial) if is_helical else {})}
 
 
@@ -239,7 +259,10 @@ def _config(sheet: DataSheet, gear: Mapping[str, Any], *, on_bearings: bool) -> 
     config = config.with_entries(gear=gear)
     config = config.with_keys("system", supports="bearings" if on_bearings else "as_given")
     config = config.with_keys("operating", speed_rpm=sheet.speed, torque_nm=sheet.torque)
-    limits = {"support_damping_ratio_low": DAMPING_RATIO, "support_damping_ratio_high": DAMPING_RATIO}
+    limits = {
+        "support_damping_ratio_low": DAMPING_RATIO,
+        "support_damping_ratio_high": DAMPING_RATIO,
+    }
     return config.with_keys("quality", **limits)
 
 
@@ -247,30 +270,42 @@ def _short(value: float) -> float:
     return float(f"{value:.4g}")
 
 
-def _remarks(sheet: DataSheet, machine: GearPairMachine, bearings: Sequence[BearingSize]) -> dict[str, str]:
+def _remarks(
+    sheet: DataSheet, machine: GearPairMachine, bearings: Sequence[BearingSize]
+) -> dict[str, str]:
     remarks = {
         "rated_speed_rpm": "given; of the pinion",
         "rated_torque_nm": "given; of the pinion",
         "normal_module_mm": GIVEN,
-        "pressure_angle_deg": "assumed, basic rack of ISO 53" if sheet.pressure_angle is None else GIVEN,
+        "pressure_angle_deg": "assumed, basic rack of ISO 53"
+        if sheet.pressure_angle is None
+        else GIVEN,
         "helix_angle_deg": "given; of the pinion, right-handed; the wheel's is the opposite"
         if sheet.is_helical
         else "spur",
-        "addendum_coefficient": "assumed, basic rack of ISO 53-A" if sheet.addendum is None else GIVEN,
+        "addendum_coefficient": "assumed, basic rack of ISO 53-A"
+        if sheet.addendum is None
+        else GIVEN,
         "clearance_coefficient": "assumed, basic rack of ISO 53-A",
         "cutter_tip_radius_coefficient": "assumed, basic rack of ISO 53-A, or what its tip has room for",
         "backlash_um": "assumed, along the line of action: ISO/TR 10064-2, 2/3 (0.06 + 0.0005 a + 0.03 m) mm",
     }
     for index, side in enumerate(SIDES):
         body = getattr(machine, side)
-        held = "derived from bearing and shaft at the rated torque" if sheet.supports is None else GIVEN
+        held = (
+            "derived from bearing and shaft at the rated torque"
+            if sheet.supports is None
+            else GIVEN
+        )
         bore = f"assumed: a shaft of {BORE_SHARE:g} pitch diameters of the pinion" if index == 0 else (
             "assumed: a shaft twisted to the same stress as the pinion's"
         )  # fmt: skip
         own = {
             "n_teeth": GIVEN,
             "profile_shift": "assumed" if sheet.profile_shifts is None else GIVEN,
-            "face_width_mm": f"assumed: {WIDTH_IN_MODULES:g} modules" if sheet.widths is None else GIVEN,
+            "face_width_mm": f"assumed: {WIDTH_IN_MODULES:g} modules"
+            if sheet.widths is None
+            else GIVEN,
             "bore_radius_mm": bore if sheet.bores is None else GIVEN,
             "mass_kg": f"null: of a steel disc, rho pi (r^2 - r_bore^2) b = {body.mass:.4g} kg",
             "inertia_kg_m2": f"null: m (r^2 + r_bore^2) / 2 = {body.inertia:.4g} kg m2",

@@ -39,7 +39,10 @@ class Wishes:
     def __post_init__(self) -> None:
         if self.sensors is not None and self.base == PLAIN:
             raise ConfigError(f"--sensors are on a housing: add --experiment {REALISTIC}")
-        for flag, shares in (("--speed-range", self.speed_range), ("--torque-range", self.torque_range)):
+        for flag, shares in (
+            ("--speed-range", self.speed_range),
+            ("--torque-range", self.torque_range),
+        ):
             if shares is not None and not 0.0 < shares[0] < shares[1] <= LARGEST_SHARE:
                 raise ConfigError(
                     f"{flag} {shares[0]:g} {shares[1]:g}: give shares of the rated value, lowest first, for instance "
@@ -107,7 +110,9 @@ def _origin(given: object) -> str:
 def _operating(option: GearOption, wishes: Wishes) -> list[str]:
     slowest = (wishes.speed_range or SPEED_SHARES)[0] * option.gear["rated_speed_rpm"]
     least = LEAST_TURNS * 60.0 / slowest
-    duration = max(1.0, math.ceil(10.0 * least) / 10.0) if wishes.duration is None else wishes.duration
+    duration = (
+        max(1.0, math.ceil(10.0 * least) / 10.0) if wishes.duration is None else wishes.duration
+    )
     if not (math.isfinite(duration) and duration > 0.0):
         raise ConfigError(f"--duration {duration:g} must be positive")
     derived = f"derived: at least {LEAST_TURNS} turns of the pinion at the slowest speed"
@@ -178,7 +183,10 @@ def _housing(wishes: Wishes) -> list[str]:
     if band[1] > 0.5 * rate:
         lines += [
             "  noise:",
-            _line(f"    band_hz: [{band[0]:g}, {0.5 * rate:g}]", f"assumed, {band[1]:g} cut to half the rate"),
+            _line(
+                f"    band_hz: [{band[0]:g}, {0.5 * rate:g}]",
+                f"assumed, {band[1]:g} cut to half the rate",
+            ),
         ]
     return lines
 
@@ -207,14 +215,18 @@ def _plan(option: GearOption, wishes: Wishes, classes: list[str], n_records: int
     shards = [
         "dataset:",
         _line(
-            f"  records_per_shard: {4 * len(classes)}", "whole groups; small shards keep two workers busy to the end"
+            f"  records_per_shard: {4 * len(classes)}",
+            "whole groups; small shards keep two workers busy to the end",
         ),
     ]
     return [
         "plan:",
         _line(f"  n_records: {n_records}", "assumed: one of each class and unit"),
         _line(f"  n_units: {N_UNITS}", "assumed; a unit is one set of gears in one housing"),
-        _line("  n_gearboxes: null", "about the square root of n_units; 1: all sets of gears in one housing, yours"),
+        _line(
+            "  n_gearboxes: null",
+            "about the square root of n_units; 1: all sets of gears in one housing, yours",
+        ),
         _line(f"  classes: [{', '.join(classes)}]", _origin(wishes.classes)),
         "  vary:",
         *ranges,

@@ -61,7 +61,9 @@ def new(arguments: Namespace) -> int:
         content |= {"bearings": option.bearings(), "next": commands}
         print(json.dumps(content))
     else:
-        print(f"wrote {' and '.join(str(file) for file in files.values())}; each line there says where it is from")
+        print(
+            f"wrote {' and '.join(str(file) for file in files.values())}; each line there says where it is from"
+        )
         print("with the gears as given it follows:")
         for key, value in option.derived().items():
             print(f"  {key:<32}{'-' if value is None else format(value, '.4g')}")
@@ -78,7 +80,9 @@ def _check_name(name: str, files: Any) -> None:
         )
     for group in ("gear", "experiment"):
         if name in options(group):
-            raise ConfigError(f"{group}={name} comes with gensig and would hide yours; choose another name")
+            raise ConfigError(
+                f"{group}={name} comes with gensig and would hide yours; choose another name"
+            )
     for file in files:
         if file.exists():
             raise ConfigError(f"{file} is there already; choose another name or --dir, or edit it")
@@ -86,7 +90,9 @@ def _check_name(name: str, files: Any) -> None:
 
 def _complete(arguments: Namespace) -> None:
     """Ask for what was left out, on a terminal; elsewhere name all that is missing."""
-    missing = [name for name, _, _, needed in QUESTIONS if needed and getattr(arguments, name) is None]
+    missing = [
+        name for name, _, _, needed in QUESTIONS if needed and getattr(arguments, name) is None
+    ]
     if not missing:
         return
     if not sys.stdin.isatty():
@@ -101,7 +107,9 @@ def _complete(arguments: Namespace) -> None:
             setattr(arguments, name, answer[0] if answer and count == 1 else answer)
 
 
-def _ask(question: str, count: int, kind: Callable[[str], float], *, needed: bool) -> list[float] | None:
+def _ask(
+    question: str, count: int, kind: Callable[[str], float], *, needed: bool
+) -> list[float] | None:
     hint = "" if needed else " (empty: assumed)"
     while True:
         words = input(f"{question}{hint}: ").replace(",", " ").split()
@@ -122,7 +130,9 @@ def _sheet(arguments: Namespace) -> DataSheet:
 
     for name in ("widths", "bores", "supports", "profile_shifts"):
         if (given := getattr(arguments, name)) is not None and len(given) > 2:
-            raise ConfigError(f"--{name.replace('_', '-')} takes one number for both gears, or two: pinion and wheel")
+            raise ConfigError(
+                f"--{name.replace('_', '-')} takes one number for both gears, or two: pinion and wheel"
+            )
     return DataSheet(
         name=arguments.name,
         teeth=(arguments.teeth[0], arguments.teeth[1]),
@@ -142,14 +152,20 @@ def _sheet(arguments: Namespace) -> DataSheet:
 def doubts(option: GearOption) -> list[str]:
     """What no pair of steel gears has, or what gensig will not simulate: perhaps another unit was meant."""
     told, found = option.derived(), []
-    ratio, speed, torque = told["transverse_contact_ratio"], option.gear["rated_speed_rpm"], told["wheel_torque_nm"]
+    ratio, speed, torque = (
+        told["transverse_contact_ratio"],
+        option.gear["rated_speed_rpm"],
+        told["wheel_torque_nm"],
+    )
     if ratio is not None and ratio < 1.0:
         found.append(
             f"the transverse contact ratio {ratio:.3f} is below 1: the drive is interrupted at every tooth. gensig "
             "stiffness takes these gears, records are refused; use more teeth or another profile shift"
         )
     if speed < SLOWEST:
-        found.append(f"--speed {speed:g}: the pinion turns slower than {SLOWEST:g} r/min; is it r/min, not Hz?")
+        found.append(
+            f"--speed {speed:g}: the pinion turns slower than {SLOWEST:g} r/min; is it r/min, not Hz?"
+        )
     line_speed, (slow, fast) = told["pitch_line_speed_m_per_s"], PITCH_LINE_SPEEDS
     if line_speed is not None and not slow <= line_speed <= fast:
         found.append(
@@ -164,7 +180,11 @@ def doubts(option: GearOption) -> list[str]:
             )
     stress = told["nominal_root_stress_mpa"]
     if stress is not None and not SLACK <= stress <= STRONGEST:
-        why = f"no steel bears more than about {STRONGEST:g}" if stress > STRONGEST else "gears that do no work"
+        why = (
+            f"no steel bears more than about {STRONGEST:g}"
+            if stress > STRONGEST
+            else "gears that do no work"
+        )
         found.append(
             f"a nominal root stress of {stress:.3g} MPa: {why}; are --torque in N m of the pinion (the wheel has "
             f"{torque:.4g}) and --widths in mm?"

@@ -44,7 +44,9 @@ def generate(arguments: Namespace) -> int:
     executors = [read_executor(request.config["executor"]) for request in requests]
     if not executors[0].closes:
         if arguments.multirun:
-            raise ConfigError("-m makes several data sets; an array job makes one: plan each with --freeze")
+            raise ConfigError(
+                "-m makes several data sets; an array job makes one: plan each with --freeze"
+            )
         return _generate_share(executors[0], arguments)
     parent = Path(str(requests[0].config["out"])).expanduser()
     refuse_used(parent)
@@ -65,14 +67,25 @@ def _generate_one(request: Request, out: Path, executor: Executor, arguments: Na
         note(*request.notes, *plan_notes(request.config, table))
     n_records = table.n_records
     if not arguments.quiet:
-        print(f"{out}: making {n_records} records in {table.n_shards} shard(s)", file=sys.stderr, flush=True)
+        print(
+            f"{out}: making {n_records} records in {table.n_shards} shard(s)",
+            file=sys.stderr,
+            flush=True,
+        )
     with _progress(arguments, executor, n_records, table.n_shards) as progress:
         outcome = run_folder(out, executor=executor, on_shard=progress)
     return _closing_line(out, outcome, n_records, time.monotonic() - begin, arguments)
 
 
-def _progress(arguments: Namespace, executor: Executor, n_records: int, n_shards: int) -> ShardProgress:
-    return ShardProgress(quiet=arguments.quiet, n_records=n_records, n_shards=n_shards, n_at_work=executor.n_processes)
+def _progress(
+    arguments: Namespace, executor: Executor, n_records: int, n_shards: int
+) -> ShardProgress:
+    return ShardProgress(
+        quiet=arguments.quiet,
+        n_records=n_records,
+        n_shards=n_shards,
+        n_at_work=executor.n_processes,
+    )
 
 
 def _generate_share(executor: Executor, arguments: Namespace) -> int:
@@ -90,20 +103,29 @@ def _generate_share(executor: Executor, arguments: Namespace) -> int:
     n_records = sum(manifest.shards[index].rows for index in mine)
     with _progress(arguments, executor, n_records, len(mine)) as progress:
         n_failed, problems = run_folder(
-            out, executor=executor, on_shard=progress, asked=_asked(out, arguments.overrides, arguments.config_dir)
+            out,
+            executor=executor,
+            on_shard=progress,
+            asked=_asked(out, arguments.overrides, arguments.config_dir),
         )
     for problem in problems:
         print(f"gensig: {problem}", file=sys.stderr)
     if problems:
-        print("gensig: this task's share is incomplete; the same command tries again", file=sys.stderr)
+        print(
+            "gensig: this task's share is incomplete; the same command tries again", file=sys.stderr
+        )
         return 1
     _say_failed(out, n_failed, n_records)
     if not arguments.quiet:
-        print(f"{out}: {n_records} records of this task in {time.monotonic() - begin:.1f} s; gensig finalize {out}")
+        print(
+            f"{out}: {n_records} records of this task in {time.monotonic() - begin:.1f} s; gensig finalize {out}"
+        )
     return 0
 
 
-def _asked(out: Path, overrides: Sequence[str], config_dir: str | None = None) -> Configuration | None:
+def _asked(
+    out: Path, overrides: Sequence[str], config_dir: str | None = None
+) -> Configuration | None:
     """The configuration that a folder's own words and those typed now make; None where they ask for no other bits."""
     words = [word for word in overrides if not _is_free(word)]
     if not words:
@@ -190,7 +212,10 @@ def _closing_line(
     for problem in problems:
         print(f"gensig: {problem}", file=sys.stderr)
     if problems:
-        print(f"gensig: {out} is incomplete; gensig resume {out} tries the missing shards again", file=sys.stderr)
+        print(
+            f"gensig: {out} is incomplete; gensig resume {out} tries the missing shards again",
+            file=sys.stderr,
+        )
         return 1
     _say_failed(out, n_failed, n_records)
     if not arguments.quiet:
@@ -201,7 +226,10 @@ def _closing_line(
 def _say_failed(out: Path, n_failed: int, n_records: int) -> None:
     if n_failed:
         why = f": {commonest(reasons)}" if (reasons := failure_reasons(out)) else ""
-        print(f"gensig: {n_failed} of {n_records} records failed and are marked so in {out}{why}", file=sys.stderr)
+        print(
+            f"gensig: {n_failed} of {n_records} records failed and are marked so in {out}{why}",
+            file=sys.stderr,
+        )
 
 
 def plan(arguments: Namespace) -> int:
@@ -214,13 +242,21 @@ def plan(arguments: Namespace) -> int:
     out = request.config["out"]
     if arguments.freeze:
         if out is None:
-            raise ConfigError("--freeze makes a folder: give out=DIR, one that does not exist or is empty")
+            raise ConfigError(
+                "--freeze makes a folder: give out=DIR, one that does not exist or is empty"
+            )
         begin_folder(request.config, request.overrides, Path(str(out)).expanduser())
-        print(f"{out} is planned; gensig resume {out} makes it here, tasks with executor=slurm as an array job")
+        print(
+            f"{out} is planned; gensig resume {out} makes it here, tasks with executor=slurm as an array job"
+        )
 
     def say(table: Plan, n_timed: int) -> None:
         note(*request.notes, *plan_notes(request.config, table))
-        print(f"making {n_timed} of {table.n_records} records to time them", file=sys.stderr, flush=True)
+        print(
+            f"making {n_timed} of {table.n_records} records to time them",
+            file=sys.stderr,
+            flush=True,
+        )
 
     for name, value in predict(request.config, on_plan=say).items():
         print(f"{name:<11}{value}")
@@ -237,7 +273,11 @@ def reproduce(arguments: Namespace) -> int:
     found = reproduce_records(Path(arguments.folder), arguments.records)
     for name, (recorded, present) in found.other.items():
         print(f"made with {name} {recorded or 'unknown'}, here is {present or 'unknown'}")
-    again = f"; {found.n_failed} failed again for the same reason and hold no signal" if found.n_failed else ""
+    again = (
+        f"; {found.n_failed} failed again for the same reason and hold no signal"
+        if found.n_failed
+        else ""
+    )
     print(f"{found.n_equal} of {found.n_records} records have the same bits{again}")
     if found.worst:
         print(f"largest difference {found.largest:.2g} of the record's RMS, in {found.worst}")
@@ -262,5 +302,7 @@ def verify(arguments: Namespace) -> int:
         return 1
     depth = "sizes and manifest" if arguments.quick else "every byte"
     failed = f", {result.n_failed} marked failed" if result.n_failed else ""
-    print(f"{arguments.folder} is whole and unaltered ({depth} checked): {result.n_records} records{failed}")
+    print(
+        f"{arguments.folder} is whole and unaltered ({depth} checked): {result.n_records} records{failed}"
+    )
     return 0

@@ -47,7 +47,13 @@ def twin(arguments: Namespace) -> int:
     _tell("simulating healthy records of the twin")
     found = check(read_request(words, config_dir=out).config, held_out, motion, fitted_part, teeth)
     assumed = {f"gear.{key}": text for key, text in remarks.items() if text != "fitted"}
-    typed = [arguments.recording, "--teeth", *map(str, arguments.teeth), "--speed", f"{arguments.speed:g}"]
+    typed = [
+        arguments.recording,
+        "--teeth",
+        *map(str, arguments.teeth),
+        "--speed",
+        f"{arguments.speed:g}",
+    ]
     text = report_text(name, fitted, found, assumed, held_out_name, teeth.driving, typed)
     (out / "report.md").write_text(text, encoding="utf-8")
     from gensig.commands.figures.twin_figure import plot_twin
@@ -56,7 +62,9 @@ def twin(arguments: Namespace) -> int:
     _print(fitted, teeth)
     print(*check_summary(found), sep="\n")
     print(verdict(found))
-    print(f"{out}/report.md has it all; gensig generate --config-dir {out} experiment={name} out=runs/{name}")
+    print(
+        f"{out}/report.md has it all; gensig generate --config-dir {out} experiment={name} out=runs/{name}"
+    )
     return 0
 
 
@@ -71,14 +79,22 @@ def _tell(text: str) -> None:
 
 def _read(file: str, arguments: Namespace) -> Recording:
     return read_recording(
-        file, rate=arguments.rate, unit=arguments.unit, channels=arguments.channels, array=arguments.array
+        file,
+        rate=arguments.rate,
+        unit=arguments.unit,
+        channels=arguments.channels,
+        array=arguments.array,
     )
 
 
 def _split(recording: Recording, arguments: Namespace) -> tuple[Recording, Recording, str]:
     """What is fitted to, what is held out, and how to name that."""
     if arguments.check is None:
-        return recording.part(0.0, 0.5), recording.part(0.5, 1.0), "The second half of the recording"
+        return (
+            recording.part(0.0, 0.5),
+            recording.part(0.5, 1.0),
+            "The second half of the recording",
+        )
     held_out = _read(arguments.check, arguments)
     if held_out.sensors != recording.sensors:
         raise ConfigError(
@@ -97,11 +113,17 @@ def _gear(arguments: Namespace, name: str) -> tuple[dict[str, Any], dict[str, st
     """The group ``gear`` of the machine, and where each value that was not fitted is from."""
     n_driving, n_driven = arguments.teeth
     module = 2.0 if arguments.module is None else arguments.module
-    for key, value in (("--speed", arguments.speed), ("--module", module), ("--torque", arguments.torque)):
+    for key, value in (
+        ("--speed", arguments.speed),
+        ("--module", module),
+        ("--torque", arguments.torque),
+    ):
         if value is not None and not (value > 0.0 and math.isfinite(value)):
             raise ConfigError(f"{key} {value:g} must be positive")
     if wrong := [word for word in arguments.overrides if not word.startswith(GEAR_WORD)]:
-        raise ConfigError(f"{wrong[0]}: twin takes overrides of the gears only, such as gear.pinion.face_width_mm=15")
+        raise ConfigError(
+            f"{wrong[0]}: twin takes overrides of the gears only, such as gear.pinion.face_width_mm=15"
+        )
     typed = {word.partition("=")[0] for word in arguments.overrides}
     for key, flag in (("gear.pinion.n_teeth", "--teeth"), ("gear.wheel.n_teeth", "--teeth"),
                       ("gear.normal_module_mm", "--module")):  # fmt: skip
@@ -124,7 +146,9 @@ def _gear(arguments: Namespace, name: str) -> tuple[dict[str, Any], dict[str, st
 
 def _remarks(gear: dict[str, Any], typed: set[str], knows_module: bool) -> dict[str, str]:
     remarks = {
-        key: "assumed, the default's" for key in gear if key not in ("name", "pinion", "wheel", "normal_module_mm")
+        key: "assumed, the default's"
+        for key in gear
+        if key not in ("name", "pinion", "wheel", "normal_module_mm")
     }
     remarks["normal_module_mm"] = "given" if knows_module else "assumed"
     for side in ("pinion", "wheel"):
@@ -137,7 +161,9 @@ def _remarks(gear: dict[str, Any], typed: set[str], knows_module: bool) -> dict[
             f"{side}.inertia_kg_m2": "derived from a solid disc",
         }
         for part in ("support", "bearing", "shaft"):
-            remarks |= {f"{side}.{part}.{key}": "assumed, the default's" for key in gear[side][part]}
+            remarks |= {
+                f"{side}.{part}.{key}": "assumed, the default's" for key in gear[side][part]
+            }
     return {key: "given" if f"gear.{key}" in typed else text for key, text in remarks.items()}
 
 
@@ -148,7 +174,9 @@ def _torque(arguments: Namespace, gear: dict[str, Any]) -> tuple[float, str]:
     default = read_request([]).config["gear"].plain()
 
     def size(one: dict[str, Any]) -> float:
-        return float(one["pinion"]["n_teeth"] * one["normal_module_mm"] ** 2 * one["pinion"]["face_width_mm"])
+        return float(
+            one["pinion"]["n_teeth"] * one["normal_module_mm"] ** 2 * one["pinion"]["face_width_mm"]
+        )
 
     torque = round(default["rated_torque_nm"] * size(gear) / size(default), 3)
     return torque, "assumed: tooth load over module and face width as the default machine has it"

@@ -34,8 +34,22 @@ for training. `croissant.json` describes the files for machines.
 """
 
 # Limits that the Hugging Face hub knows; above the last one a card says more.
-SIZES = ((10**3, "n<1K"), (10**4, "1K<n<10K"), (10**5, "10K<n<100K"), (10**6, "100K<n<1M"), (10**7, "1M<n<10M"))
-TAGS = ("vibration", "gear", "fault-diagnosis", "condition-monitoring", "time-series", "synthetic", "simulation")
+SIZES = (
+    (10**3, "n<1K"),
+    (10**4, "1K<n<10K"),
+    (10**5, "10K<n<100K"),
+    (10**6, "100K<n<1M"),
+    (10**7, "1M<n<10M"),
+)
+TAGS = (
+    "vibration",
+    "gear",
+    "fault-diagnosis",
+    "condition-monitoring",
+    "time-series",
+    "synthetic",
+    "simulation",
+)
 
 LICENCE = """Data licence: CC BY 4.0 (https://creativecommons.org/licenses/by/4.0/): free to use, name the source.
 """
@@ -70,7 +84,9 @@ def card_text(data: Dataset, pictures: Mapping[str, str] | None = None) -> str:
     sections = [
         front_matter(data),
         f"# {escape(data.folder.resolve().name)}",
-        "Gear vibration, simulated and labelled by gensig " + escape(data.manifest.generator_version) + ".",
+        "Gear vibration, simulated and labelled by gensig "
+        + escape(data.manifest.generator_version)
+        + ".",
         _table(("fact", "value"), _facts(data)),
         "## Classes",
         _table(("class", "records", "severity"), _classes(data)),
@@ -92,7 +108,9 @@ def _gallery(pictures: Mapping[str, str]) -> str:
     if not pictures:
         return ""
     shown = [f"![{escape(name)}]({path})" for name, path in pictures.items()]
-    return "\n\n".join(["The record of median severity of each class, noise included, on the same axes:", *shown])
+    return "\n\n".join(
+        ["The record of median severity of each class, noise included, on the same axes:", *shown]
+    )
 
 
 def front_matter(data: Dataset) -> str:
@@ -104,7 +122,9 @@ def front_matter(data: Dataset) -> str:
         "task_categories": ["tabular-classification"],
         "tags": [*TAGS, f"gensig-{plain(data.manifest.generator_version)}"],
         "size_categories": [size],
-        "configs": [{"config_name": "default", "data_files": [{"split": "train", "path": f"{SHARDS}/*.h5"}]}],
+        "configs": [
+            {"config_name": "default", "data_files": [{"split": "train", "path": f"{SHARDS}/*.h5"}]}
+        ],
     }
     return f"---\n{yaml.safe_dump(content, sort_keys=False, allow_unicode=True)}---"
 
@@ -127,18 +147,27 @@ def _table(header: tuple[str, ...], rows: list[tuple[object, ...]]) -> str:
 
 def _facts(data: Dataset) -> list[tuple[object, ...]]:
     units = data.attributes.get("channel_units", ["m/s^2"] * len(data.channel_names))
-    channels = ", ".join(f"{name} ({unit})" for name, unit in zip(data.channel_names, units, strict=False))
+    channels = ", ".join(
+        f"{name} ({unit})" for name, unit in zip(data.channel_names, units, strict=False)
+    )
     n_failed = int(np.count_nonzero(~data.usable))
     rows: list[tuple[object, ...]] = [
         ("records", f"{data.n_records}" + (f", of which {n_failed} failed" if n_failed else "")),
-        ("duration of a record", f"{data.n_samples / data.sampling_rate:g} s ({data.n_samples} samples)"),
+        (
+            "duration of a record",
+            f"{data.n_samples / data.sampling_rate:g} s ({data.n_samples} samples)",
+        ),
         ("sampling rate", f"{data.sampling_rate:g} Hz"),
         ("channels", channels),
     ]
     rows += [(name, rounded(data.attributes[name])) for name in GEOMETRY if name in data.attributes]
     rows += [
         (name, len(np.unique(data.column(column))))
-        for name, column in (("units", "unit_id"), ("specimens", "specimen_id"), ("gearboxes", "gearbox_id"))
+        for name, column in (
+            ("units", "unit_id"),
+            ("specimens", "specimen_id"),
+            ("gearboxes", "gearbox_id"),
+        )
     ]
     rows += [
         ("speed of the driving shaft", value_range(data.column("speed_rpm"), "r/min")),
@@ -147,9 +176,19 @@ def _facts(data: Dataset) -> list[tuple[object, ...]]:
     if "snr_db" in data.column_names:
         rows.append(("signal-to-noise ratio", value_range(data.column("snr_db"), "dB")))
     if data.sample_type == "int16":
-        rows.append(("acceleration in the shards", "int16; times acceleration_scale of record and channel it is m/s^2"))
+        rows.append(
+            (
+                "acceleration in the shards",
+                "int16; times acceleration_scale of record and channel it is m/s^2",
+            )
+        )
     if data.compression != "none":
-        rows.append(("compression", data.compression + " (read with hdf5plugin)" * (data.compression == "blosc2")))
+        rows.append(
+            (
+                "compression",
+                data.compression + " (read with hdf5plugin)" * (data.compression == "blosc2"),
+            )
+        )
     rows += [("seed", data.manifest.seed), ("identity", data.manifest.identity)]
     return rows
 
@@ -158,7 +197,10 @@ def _classes(data: Dataset) -> list[tuple[object, ...]]:
     names, severity = data.column("label_name"), data.column("severity")
     order = [name for name in data.class_names if (names == name).any()]
     order += sorted(set(names.tolist()) - set(order))
-    return [(name, int((names == name).sum()), value_range(severity[names == name], "")) for name in order]
+    return [
+        (name, int((names == name).sum()), value_range(severity[names == name], ""))
+        for name in order
+    ]
 
 
 def _splits(data: Dataset) -> list[tuple[object, ...]]:
@@ -166,7 +208,13 @@ def _splits(data: Dataset) -> list[tuple[object, ...]]:
     for protocol in data.protocols:
         parts = data.split(protocol)
         rows.append(
-            (protocol, *(f"{sum(stop - start for _, start, stop in part):g} records" for part in parts.values()))
+            (
+                protocol,
+                *(
+                    f"{sum(stop - start for _, start, stop in part):g} records"
+                    for part in parts.values()
+                ),
+            )
         )
     return rows
 

@@ -55,8 +55,12 @@ def write_class_figures(data: Dataset) -> dict[str, str]:
         return {}
     channel = FIRST_CHOICE if FIRST_CHOICE in data.channel_names else data.channel_names[0]
     units = data.attributes.get("channel_units", [])
-    unit = dict(zip(data.channel_names, units, strict=False)).get(channel, "m/s^2").replace("^2", "²")
-    examples = {name: _example(data, index, channel) for name, index in example_records(data).items()}
+    unit = (
+        dict(zip(data.channel_names, units, strict=False)).get(channel, "m/s^2").replace("^2", "²")
+    )
+    examples = {
+        name: _example(data, index, channel) for name, index in example_records(data).items()
+    }
     if not examples:
         return {}
     folder = data.folder / FIGURES
@@ -72,7 +76,10 @@ def write_class_figures(data: Dataset) -> dict[str, str]:
         for name, example in examples.items():
             slug = re.sub(r"[^a-z0-9_]+", "-", name.lower())[:40]
             paths[name] = f"{FIGURES}/{data.class_names.index(name)}-{slug}.png"
-            write_bytes(data.folder / paths[name], _png(example, f"{channel}, {unit}", largest or 1.0, highest or 1.0))
+            write_bytes(
+                data.folder / paths[name],
+                _png(example, f"{channel}, {unit}", largest or 1.0, highest or 1.0),
+            )
     return paths
 
 
@@ -88,14 +95,25 @@ def example_records(data: Dataset) -> dict[str, int]:
 
 
 def _example(data: Dataset, index: int, channel: str) -> ClassExample:
-    values = {name: data.column(name)[index] for name in ("record_id", "label_name", "severity", "speed_rpm")}
+    values = {
+        name: data.column(name)[index]
+        for name in ("record_id", "label_name", "severity", "speed_rpm")
+    }
     torque = data.column("torque_nm")[index]
     signal = data.signals(index, channels=[channel])[0].astype(float)
     frequency, amplitude = amplitude_spectrum(signal, data.sampling_rate)
     step = -(-len(amplitude) // N_BINS)
     starts = np.arange(0, len(amplitude), step)
-    mesh = data.column("mesh_frequency_hz")[index] if "mesh_frequency_hz" in data.column_names else np.nan
-    shown = int(TURNS * 60.0 / values["speed_rpm"] * data.sampling_rate) if values["speed_rpm"] > 0.0 else len(signal)
+    mesh = (
+        data.column("mesh_frequency_hz")[index]
+        if "mesh_frequency_hz" in data.column_names
+        else np.nan
+    )
+    shown = (
+        int(TURNS * 60.0 / values["speed_rpm"] * data.sampling_rate)
+        if values["speed_rpm"] > 0.0
+        else len(signal)
+    )
     signal = signal[: max(shown, 2)]
     return ClassExample(
         title=f"{values['label_name']}, severity {values['severity']:.2f} (record {values['record_id']}, "
@@ -131,13 +149,24 @@ def _waveform(axes: Any, example: ClassExample, ordinate: str, limit: float) -> 
 
 
 def _spectrum(axes: Any, example: ClassExample, ordinate: str, limit: float) -> None:
-    axes.semilogy(example.frequency, np.maximum(example.amplitude, limit * 10.0**-DECADES), color=BLUE, linewidth=0.7)
+    axes.semilogy(
+        example.frequency,
+        np.maximum(example.amplitude, limit * 10.0**-DECADES),
+        color=BLUE,
+        linewidth=0.7,
+    )
     top = float(example.frequency[-1])
     if np.isfinite(example.mesh_frequency) and example.mesh_frequency > 0.0:
-        harmonics = np.arange(1, min(60, int(top / example.mesh_frequency)) + 1) * example.mesh_frequency
-        axes.plot(harmonics, np.full(len(harmonics), limit / 1.5), "v", color=ORANGE, markersize=2.5)
+        harmonics = (
+            np.arange(1, min(60, int(top / example.mesh_frequency)) + 1) * example.mesh_frequency
+        )
+        axes.plot(
+            harmonics, np.full(len(harmonics), limit / 1.5), "v", color=ORANGE, markersize=2.5
+        )
     axes.set(
-        xlim=(0.0, top), ylim=(limit * 10.0**-DECADES, limit), xlabel="frequency, kHz; triangles: harmonics of the mesh"
+        xlim=(0.0, top),
+        ylim=(limit * 10.0**-DECADES, limit),
+        xlabel="frequency, kHz; triangles: harmonics of the mesh",
     )
     axes.set_ylabel(f"amplitude of {ordinate.partition(',')[0]}", parse_math=False)
     axes.yaxis.set_major_formatter("{x:g}")

@@ -62,7 +62,10 @@ def croissant_text(data: Dataset, caveats: str) -> str:
     content: dict[str, Any] = {
         "@context": _CONTEXT,
         "@type": "sc:Dataset",
-        "conformsTo": ["http://mlcommons.org/croissant/1.0", "http://mlcommons.org/croissant/RAI/1.0"],
+        "conformsTo": [
+            "http://mlcommons.org/croissant/1.0",
+            "http://mlcommons.org/croissant/RAI/1.0",
+        ],
         "name": name,
         "description": f"Gear vibration, simulated and labelled by gensig {manifest.generator_version}: {facts}.",
         "license": "https://creativecommons.org/licenses/by/4.0/",
@@ -81,7 +84,9 @@ def croissant_text(data: Dataset, caveats: str) -> str:
 def _responsible_ai(data: Dataset, facts: str, caveats: str) -> dict[str, Any]:
     """The fields that say how the data came to be and what they are not good for."""
     names, counts = np.unique(data.column("label_name"), return_counts=True)
-    classes = ", ".join(f"{name} {count}" for name, count in zip(names.tolist(), counts.tolist(), strict=True))
+    classes = ", ".join(
+        f"{name} {count}" for name, count in zip(names.tolist(), counts.tolist(), strict=True)
+    )
     failed = int(np.count_nonzero(~data.usable))
     limits = [line.removeprefix("- ") for line in caveats.replace("\n  ", " ").strip().splitlines()]
     return {
@@ -107,7 +112,9 @@ def _responsible_ai(data: Dataset, facts: str, caveats: str) -> dict[str, Any]:
             "Not validated: deciding on a real machine with a model trained on these records alone.",
         ],
         "rai:dataSocialImpact": "A model that was never tried on measured signals may miss a dangerous fault.",
-        "rai:personalSensitiveInformation": ["None: no person, place or machine of anyone is in the data."],
+        "rai:personalSensitiveInformation": [
+            "None: no person, place or machine of anyone is in the data."
+        ],
         "rai:dataReleaseMaintenancePlan": "Never changed once complete: manifest.json holds the sha256 of every file.",
     }
 
@@ -163,4 +170,8 @@ def _plan_records(plan: Plan) -> dict[str, Any]:
 def _meaning(name: str) -> str:
     if name in ("shard", "row"):
         return f"{name} that holds the record, counted from 0"
-    return "drawn or swept value, unit in the name" if name.startswith(f"{PARAMS}/") else "input of the simulation"
+    return (
+        "drawn or swept value, unit in the name"
+        if name.startswith(f"{PARAMS}/")
+        else "input of the simulation"
+    )

@@ -31,7 +31,12 @@ FORMATS = ("hdf5", "parquet", "npz", "wav")
 
 
 def export(
-    folder: str | Path, to: str, out: str | Path, *, samples: bool = False, one_channel: bool = False
+    folder: str | Path,
+    to: str,
+    out: str | Path,
+    *,
+    samples: bool = False,
+    one_channel: bool = False,
 ) -> dict[str, int]:
     """Write a data set in another format, under a name that does not exist yet; whole or not at all.
 
@@ -78,20 +83,30 @@ def export(
                 shutil.rmtree(temporary, ignore_errors=True)
             temporary.unlink(missing_ok=True)
         files = sorted(path for path in out.iterdir()) if out.is_dir() else [out]
-        return {"records": data.n_records, "files": len(files), "bytes": sum(path.stat().st_size for path in files)}
+        return {
+            "records": data.n_records,
+            "files": len(files),
+            "bytes": sum(path.stat().st_size for path in files),
+        }
 
 
 def _check_request(folder: Path, to: str, out: Path, *, samples: bool, one_channel: bool) -> None:
     if to not in FORMATS:
         raise DatasetError(f"format {to!r} is unknown; allowed are {', '.join(FORMATS)}")
     if (samples and to != "parquet") or (one_channel and to != "wav"):
-        raise DatasetError(f"'samples' belongs to parquet and 'one_channel' to wav; the format asked for is {to}")
+        raise DatasetError(
+            f"'samples' belongs to parquet and 'one_channel' to wav; the format asked for is {to}"
+        )
     if out.exists() or out.is_symlink():
-        raise DatasetError(f"{out} exists and is left alone; choose another name or remove it first")
+        raise DatasetError(
+            f"{out} exists and is left alone; choose another name or remove it first"
+        )
     if not out.parent.is_dir():
         raise DatasetError(f"{out}: there is no folder {out.parent}; make it first")
     if out.resolve().is_relative_to(folder.resolve()):
-        raise DatasetError(f"{out} lies in the data set {folder}, which holds its own files only; choose another place")
+        raise DatasetError(
+            f"{out} lies in the data set {folder}, which holds its own files only; choose another place"
+        )
 
 
 def _check_ids(data: Dataset) -> None:
@@ -107,7 +122,9 @@ def _check_space(data: Dataset, out: Path) -> None:
     n_bytes = data.n_records * sum(signal_row(data, 0, name).nbytes for name in data.signal_names)
     free = shutil.disk_usage(out.parent).free
     if n_bytes > free:
-        raise DatasetError(f"{out} needs about {n_bytes} bytes and {free} are free; choose another disk")
+        raise DatasetError(
+            f"{out} needs about {n_bytes} bytes and {free} are free; choose another disk"
+        )
 
 
 def _cannot_write(out: Path, error: Exception) -> NoReturn:
@@ -137,7 +154,9 @@ def _write_hdf5(data: Dataset, path: Path) -> None:
             dtype = sample.dtype
             if dtype.kind == "U":
                 plain = all(text.isascii() for text in np.unique(data.column(name)).tolist())
-                dtype = h5py.string_dtype("ascii" if plain else "utf-8", column.n_bytes if column else TEXT_BYTES)
+                dtype = h5py.string_dtype(
+                    "ascii" if plain else "utf-8", column.n_bytes if column else TEXT_BYTES
+                )
             item = file.create_dataset(name, (data.n_records, *sample.shape[1:]), dtype)
             set_attribute(item, "unit", unit_of(data, name))
             for shard, entry in enumerate(data.manifest.shards):
@@ -171,8 +190,13 @@ def _write_wav(data: Dataset, folder: Path, *, one_channel: bool) -> None:
         for shard in range(len(data.manifest.shards)):
             columns = [data.shard_column(shard, name).tolist() for name in names]
             for row, values in enumerate(zip(*columns, strict=True)):
-                record_id, signal = values[names.index("record_id")], data.signals(data.first_record(shard) + row)
-                for name, channel, block in _wav_files(data, record_id, signal, one_channel=one_channel):
+                record_id, signal = (
+                    values[names.index("record_id")],
+                    data.signals(data.first_record(shard) + row),
+                )
+                for name, channel, block in _wav_files(
+                    data, record_id, signal, one_channel=one_channel
+                ):
                     wavfile.write(folder / name, rate, np.ascontiguousarray(block.T))
                     table.writerow([name, *channel, *values])
     (folder / "attributes.json").write_text(attributes_json(data.attributes), encoding="utf-8")

@@ -57,7 +57,11 @@ def write_npz(data: Dataset, path: Path) -> None:
 
 
 def _write_npy(
-    archive: zipfile.ZipFile, name: str, shape: tuple[int, ...], dtype: np.dtype, parts: Iterable[np.ndarray]
+    archive: zipfile.ZipFile,
+    name: str,
+    shape: tuple[int, ...],
+    dtype: np.dtype,
+    parts: Iterable[np.ndarray],
 ) -> None:
     """One array of an npz file, part by part, in row order."""
     header = {"descr": np.lib.format.dtype_to_descr(dtype), "fortran_order": False, "shape": shape}
@@ -73,7 +77,9 @@ def write_parquet(data: Dataset, path: Path, *, samples: bool) -> None:
         import pyarrow
         from pyarrow import parquet
     except ImportError as error:
-        raise DatasetError("format parquet needs the package pyarrow; pip install 'gensig[parquet]'") from error
+        raise DatasetError(
+            "format parquet needs the package pyarrow; pip install 'gensig[parquet]'"
+        ) from error
 
     def nested(values: np.ndarray) -> pyarrow.Array:
         if values.dtype.kind == "U":
@@ -85,12 +91,16 @@ def write_parquet(data: Dataset, path: Path, *, samples: bool) -> None:
 
     def batch(shard: int, start: int, stop: int) -> pyarrow.RecordBatch:
         first = data.first_record(shard)
-        arrays = {name: nested(data.shard_column(shard, name)[start:stop]) for name in column_names(data)}
+        arrays = {
+            name: nested(data.shard_column(shard, name)[start:stop]) for name in column_names(data)
+        }
         for name in data.signal_names if samples else []:
             rows = [signal_row(data, first + row, name) for row in range(start, stop)]
             arrays[name] = nested(np.stack(rows))
         fields = [
-            pyarrow.field(name, array.type, metadata={"unit": unit} if (unit := unit_of(data, name)) else None)
+            pyarrow.field(
+                name, array.type, metadata={"unit": unit} if (unit := unit_of(data, name)) else None
+            )
             for name, array in arrays.items()
         ]
         return pyarrow.RecordBatch.from_arrays(list(arrays.values()), schema=pyarrow.schema(fields))

@@ -68,14 +68,19 @@ def create_folder(
         CONFIG: yaml.safe_dump(stored_config(config), sort_keys=False, allow_unicode=True),
         OVERRIDES: yaml.safe_dump([str(item) for item in overrides], allow_unicode=True),
         PLAN: plan_text(plan),
-        **{f"{SPLITS}/{name}.csv": table.to_csv() for name, table in make_splits(plan, seed).items()},
+        **{
+            f"{SPLITS}/{name}.csv": table.to_csv()
+            for name, table in make_splits(plan, seed).items()
+        },
     }
     manifest = Manifest(
         generator_version=generator_version,
         identity=identity,
         seed=seed,
         n_records=plan.n_records,
-        shards=tuple(ShardEntry(name=shard_name(i), rows=rows) for i, rows in enumerate(plan.shard_sizes())),
+        shards=tuple(
+            ShardEntry(name=shard_name(i), rows=rows) for i, rows in enumerate(plan.shard_sizes())
+        ),
         files={name: hashlib.sha256(text.encode()).hexdigest() for name, text in texts.items()},
         configuration=deciding(config),
         environment=environment(),
@@ -83,11 +88,16 @@ def create_folder(
     made: list[Path] = []
     try:
         refuse_used(out)
-        _make_folders([folder for folder in (*reversed(out.parents), out) if not folder.exists()], made)
+        _make_folders(
+            [folder for folder in (*reversed(out.parents), out) if not folder.exists()], made
+        )
         with locked(out):
             refuse_used(out)  # another process may have been faster
             _clear(out)
-            for name, text in {BEGINNING: "This folder is being made by gensig.\n", **texts}.items():
+            for name, text in {
+                BEGINNING: "This folder is being made by gensig.\n",
+                **texts,
+            }.items():
                 made.append(out / name)
                 if not (out / name).parent.exists():
                     _make_folders([(out / name).parent], made)
@@ -144,7 +154,10 @@ def _is_killed_beginning(out: Path) -> bool:
         BEGINNING in names
         and names <= {BEGINNING, CONFIG, OVERRIDES, PLAN, SHARDS, SPLITS}
         and all(part.is_dir() and not part.is_symlink() for part in parts)
-        and all(path.parent.name == SPLITS and (path.suffix == ".csv" or _is_temporary(path)) for path in inside)
+        and all(
+            path.parent.name == SPLITS and (path.suffix == ".csv" or _is_temporary(path))
+            for path in inside
+        )
     )
 
 
@@ -154,6 +167,8 @@ def _is_temporary(path: Path) -> bool:
 
 def _clear(out: Path) -> None:
     """Remove what a killed beginning left, its note last."""
-    paths = sorted(out.rglob("*"), key=lambda path: (path.name != BEGINNING, len(path.parts)), reverse=True)
+    paths = sorted(
+        out.rglob("*"), key=lambda path: (path.name != BEGINNING, len(path.parts)), reverse=True
+    )
     for path in paths:
         path.rmdir() if path.is_dir() and not path.is_symlink() else path.unlink()

@@ -30,9 +30,16 @@ def inspect(path: Path) -> str:
         raise DatasetError(f"{path} does not exist; give a data-set folder or an HDF5 file")
     with open_file(path) as file:
         try:
-            return "\n".join([f"{_show(path)}: HDF5 file, {path.stat().st_size} bytes", *_objects(file)]) + "\n"
+            return (
+                "\n".join(
+                    [f"{_show(path)}: HDF5 file, {path.stat().st_size} bytes", *_objects(file)]
+                )
+                + "\n"
+            )
         except HDF5_ERRORS as error:
-            raise DatasetError(f"{path} is damaged ({_show(error)}); restore it from a copy") from error
+            raise DatasetError(
+                f"{path} is damaged ({_show(error)}); restore it from a copy"
+            ) from error
 
 
 def _folder(folder: Path) -> str:
@@ -56,7 +63,10 @@ def _how_to_finish(folder: Path, manifest: Manifest) -> list[str]:
 
 
 def _manifest_lines(folder: Path, manifest: Manifest) -> list[str]:
-    states = {state: sum(entry.state == state for entry in manifest.shards) for state in ("planned", "done", "failed")}
+    states = {
+        state: sum(entry.state == state for entry in manifest.shards)
+        for state in ("planned", "done", "failed")
+    }
     n_bytes = sum(entry.bytes for entry in manifest.shards)
     return [
         f"  records      {manifest.n_records}, {manifest.n_failed} failed",
@@ -72,7 +82,9 @@ def _dataset_lines(data: Dataset) -> list[str]:
     usable = data.usable
     duration = data.n_samples / data.sampling_rate
     units = " and ".join(map(_show, dict.fromkeys(data.attributes.get("channel_units", ["m/s^2"]))))
-    of_what = f", of the {_show(data.attributes['torque_of'])}" if "torque_of" in data.attributes else ""
+    of_what = (
+        f", of the {_show(data.attributes['torque_of'])}" if "torque_of" in data.attributes else ""
+    )
     lines = [
         f"  signal       acceleration ({len(data.channel_names)}, {data.n_samples}) float32, {units}, "
         f"{data.sampling_rate:g} Hz, {duration:g} s",
@@ -92,17 +104,25 @@ def _dataset_lines(data: Dataset) -> list[str]:
         lines.append(f"  {title:<12} {_counts(data.column(column))}")
     lines.append("  columns      " + ", ".join(map(_show, data.column_names)))
     lines.append("  attributes")
-    return lines + [f"    {_show(name)} = {_show(value)}" for name, value in data.attributes.items()]
+    return lines + [
+        f"    {_show(name)} = {_show(value)}" for name, value in data.attributes.items()
+    ]
 
 
 def _counts(values: np.ndarray) -> str:
     names, counts = np.unique(values[values != ""], return_counts=True)
-    shown = [f"{_show(name)} {count}" for name, count in zip(names[:12].tolist(), counts[:12].tolist(), strict=True)]
+    shown = [
+        f"{_show(name)} {count}"
+        for name, count in zip(names[:12].tolist(), counts[:12].tolist(), strict=True)
+    ]
     return f"{len(names)}: " + ", ".join(shown) + (", ..." if len(names) > 12 else "")
 
 
 def _objects(file: h5py.File) -> list[str]:
-    lines = [f"  attribute {_show(name)} = {_show(value)}" for name, value in read_attributes(file).items()]
+    lines = [
+        f"  attribute {_show(name)} = {_show(value)}"
+        for name, value in read_attributes(file).items()
+    ]
     pending: list[tuple[str, h5py.Group]] = [("", file)]
     seen = {file.id.__hash__()}  # hard links can make a file its own descendant
     while pending and len(lines) < OBJECTS_LIMIT:
@@ -117,7 +137,9 @@ def _objects(file: h5py.File) -> list[str]:
                     pending.append((name, item))
                     lines.append(f"  {_show(name)}/")
             elif isinstance(item, h5py.Dataset):
-                lines.append(f"  {_show(name)} {item.shape} {_show(item.dtype)}{_dataset_notes(item)}")
+                lines.append(
+                    f"  {_show(name)} {item.shape} {_show(item.dtype)}{_dataset_notes(item)}"
+                )
             else:
                 lines.append(f"  {_show(name)} -> {type(link).__name__}, not followed")
     return lines if len(lines) < OBJECTS_LIMIT else [*lines[:OBJECTS_LIMIT], "  ..."]
@@ -127,7 +149,13 @@ def _dataset_notes(data: h5py.Dataset) -> str:
     found = read_attributes(data)
     unit = found.pop("unit", "")
     unit = f", {_show(unit)}" if unit else ""
-    virtual = ", virtual" if data.is_virtual else ", data in another file, not read" if data.external else ""
+    virtual = (
+        ", virtual"
+        if data.is_virtual
+        else ", data in another file, not read"
+        if data.external
+        else ""
+    )
     rest = "".join(f", {_show(name)}={_show(value)}" for name, value in found.items())
     small = data.size == 1 and data.dtype.kind in "iuf" and holds_its_data(data)
     return unit + virtual + rest + (f", value {data[()]}" if small else "")

@@ -4,7 +4,14 @@ from __future__ import annotations
 
 from pathlib import Path
 
-from gensig.dataset.folder.layout import CONFIG, PLAN, ConfigContent, Manifest, read_config, read_manifest
+from gensig.dataset.folder.layout import (
+    CONFIG,
+    PLAN,
+    ConfigContent,
+    Manifest,
+    read_config,
+    read_manifest,
+)
 from gensig.dataset.folder.manifest import differing_keys, identity_hash
 from gensig.dataset.storage.atomic import sha256_file
 from gensig.dataset.storage.compression import creation_options
@@ -12,7 +19,9 @@ from gensig.errors import DatasetError
 from gensig.version import __version__
 
 
-def joined_folder(out: Path, *, asked: ConfigContent | None = None) -> tuple[Manifest, ConfigContent]:
+def joined_folder(
+    out: Path, *, asked: ConfigContent | None = None
+) -> tuple[Manifest, ConfigContent]:
     """Manifest and configuration of a folder that this gensig may add shards to.
 
     Parameters
@@ -44,7 +53,9 @@ def joined_folder(out: Path, *, asked: ConfigContent | None = None) -> tuple[Man
             "change"
         )
     if manifest.files.get(PLAN) != sha256_file(out / PLAN):
-        raise DatasetError(f"{out / PLAN} was changed since the folder was begun; restore it, or start a new folder")
+        raise DatasetError(
+            f"{out / PLAN} was changed since the folder was begun; restore it, or start a new folder"
+        )
     creation_options(config["dataset"]["compression"])  # refuses one whose package is missing
     return manifest, config
 

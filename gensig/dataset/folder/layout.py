@@ -140,8 +140,12 @@ def read_manifest(folder: Path) -> Manifest:
         content = json.loads(read_text(path, limit=TEXT_BYTES_LIMIT))
         version = _get(content, "schema_version", int)
         if version != SCHEMA_VERSION:
-            raise DatasetError(f"format version {version}; this gensig reads {SCHEMA_VERSION}, install a matching one")
-        shards = tuple(shard_entry(i, entry) for i, entry in enumerate(_get(content, "shards", list)))
+            raise DatasetError(
+                f"format version {version}; this gensig reads {SCHEMA_VERSION}, install a matching one"
+            )
+        shards = tuple(
+            shard_entry(i, entry) for i, entry in enumerate(_get(content, "shards", list))
+        )
         manifest = Manifest(
             schema_version=version,
             generator_version=_get(content, "generator_version", str),
@@ -150,33 +154,47 @@ def read_manifest(folder: Path) -> Manifest:
             n_records=_get(content, "n_records", int),
             state=_one_of(_get(content, "state", str), ("incomplete", "complete"), "state"),
             shards=shards,
-            files={name: _hash(value, name) for name, value in _get(content, "files", dict).items()},
-            configuration=_get(content, "configuration", dict) if "configuration" in content else {},
+            files={
+                name: _hash(value, name) for name, value in _get(content, "files", dict).items()
+            },
+            configuration=_get(content, "configuration", dict)
+            if "configuration" in content
+            else {},
             environment=_get(content, "environment", dict),
         )
         _check_manifest(manifest)
     except DatasetError as error:
         raise DatasetError(f"{path}: {error}") from error
     except (ValueError, RecursionError) as error:
-        raise DatasetError(f"{path} is no JSON ({str(error)[:80]}); it is damaged, restore it from a copy") from error
+        raise DatasetError(
+            f"{path} is no JSON ({str(error)[:80]}); it is damaged, restore it from a copy"
+        ) from error
     return manifest
 
 
 def _check_manifest(manifest: Manifest) -> None:
     rows = sum(entry.rows for entry in manifest.shards)
     if rows != manifest.n_records or not manifest.shards:
-        raise DatasetError(f"n_records is {manifest.n_records}, the shards hold {rows}; the manifest is damaged")
+        raise DatasetError(
+            f"n_records is {manifest.n_records}, the shards hold {rows}; the manifest is damaged"
+        )
     bad = [name for name in manifest.files if not _FILE.fullmatch(name)]
     if bad:
-        raise DatasetError(f"file {bad[0]!r} is not one of a data set; the manifest is damaged or forged")
+        raise DatasetError(
+            f"file {bad[0]!r} is not one of a data set; the manifest is damaged or forged"
+        )
     if manifest.is_complete and manifest.n_done < len(manifest.shards):
-        raise DatasetError("state is complete, but not every shard is done; the manifest is damaged")
+        raise DatasetError(
+            "state is complete, but not every shard is done; the manifest is damaged"
+        )
 
 
 def _get(content: Any, key: str, kind: type) -> Any:
     value = content.get(key) if isinstance(content, dict) else None
     if not isinstance(value, kind) or isinstance(value, bool):
-        raise DatasetError(f"'{key}' is missing or no {kind.__name__}; the manifest is damaged, restore it from a copy")
+        raise DatasetError(
+            f"'{key}' is missing or no {kind.__name__}; the manifest is damaged, restore it from a copy"
+        )
     if isinstance(value, int) and value < 0:
         raise DatasetError(f"'{key}' is {value}; it cannot be negative")
     return value
@@ -197,8 +215,12 @@ def _one_of(value: str, allowed: tuple[str, ...], name: str) -> str:
 def shard_entry(index: int, content: Any) -> ShardEntry:
     """One entry of the list of shards, every name and type checked."""
     name = _get(content, "name", str)
-    if name != shard_name(index):  # an exact match leaves no room for a path that leads out of the folder
-        raise DatasetError(f"shard {index} is named {name[:80]!r}; the only name allowed is {shard_name(index)!r}")
+    if name != shard_name(
+        index
+    ):  # an exact match leaves no room for a path that leads out of the folder
+        raise DatasetError(
+            f"shard {index} is named {name[:80]!r}; the only name allowed is {shard_name(index)!r}"
+        )
     state = _one_of(_get(content, "state", str), ("planned", "done", "failed"), f"state of {name}")
     digest = _get(content, "sha256", str)
     entry = ShardEntry(
@@ -210,7 +232,9 @@ def shard_entry(index: int, content: Any) -> ShardEntry:
         n_failed=_get(content, "n_failed", int),
     )
     if entry.rows == 0 or entry.n_failed > entry.rows:
-        raise DatasetError(f"{name}: {entry.n_failed} failed of {entry.rows} records; the manifest is damaged")
+        raise DatasetError(
+            f"{name}: {entry.n_failed} failed of {entry.rows} records; the manifest is damaged"
+        )
     return entry
 
 
@@ -236,7 +260,9 @@ def _refuse_yaml_bombs(text: str, path: Path) -> None:
     for event in yaml.parse(text, Loader=yaml.SafeLoader):
         if isinstance(event, yaml.AliasEvent):
             raise DatasetError(f"{path} uses YAML aliases; a gensig configuration has none")
-        depth += isinstance(event, yaml.CollectionStartEvent) - isinstance(event, yaml.CollectionEndEvent)
+        depth += isinstance(event, yaml.CollectionStartEvent) - isinstance(
+            event, yaml.CollectionEndEvent
+        )
         if depth > CONFIG_DEPTH_LIMIT:
             raise DatasetError(
                 f"{path} is nested deeper than {CONFIG_DEPTH_LIMIT} levels; it is no gensig configuration"

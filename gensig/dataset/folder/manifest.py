@@ -86,7 +86,11 @@ def differing_keys(one: ConfigContent, other: ConfigContent) -> list[str]:
     """Dotted keys that decide bits and whose values differ between two configurations, in order."""
     ours, theirs = SINCE_0_9 | _leaves(one), SINCE_0_9 | _leaves(other)
     absent = object()
-    return [key for key in sorted({*ours, *theirs}) if repr(ours.get(key, absent)) != repr(theirs.get(key, absent))]
+    return [
+        key
+        for key in sorted({*ours, *theirs})
+        if repr(ours.get(key, absent)) != repr(theirs.get(key, absent))
+    ]
 
 
 def _leaves(content: Mapping[str, Any], prefix: str = "") -> dict[str, Any]:
@@ -109,14 +113,20 @@ def record_shard(out: Path, shard_index: int, sha256: str, bytes: int, n_failed:
 def record_shards(out: Path, entries: Mapping[int, ShardEntry]) -> None:
     """Enter finished shards in the manifest in one go."""
     _record(
-        out, {i: {"sha256": one.sha256, "bytes": one.bytes, "n_failed": one.n_failed} for i, one in entries.items()}
+        out,
+        {
+            i: {"sha256": one.sha256, "bytes": one.bytes, "n_failed": one.n_failed}
+            for i, one in entries.items()
+        },
     )
 
 
 def _record(out: Path, facts: Mapping[int, Mapping[str, Any]]) -> None:
     for index in facts:
         if not shard_path(out, index).is_file():
-            raise DatasetError(f"{shard_path(out, index)} does not exist; a shard is written before it is recorded")
+            raise DatasetError(
+                f"{shard_path(out, index)} does not exist; a shard is written before it is recorded"
+            )
     _update(out, {index: {"state": "done", **fact} for index, fact in facts.items()})
 
 
@@ -129,11 +139,15 @@ def _update(out: Path, changes: Mapping[int, Mapping[str, Any]]) -> None:
     with locked(out):
         manifest = read_manifest(out)
         if manifest.is_complete:
-            raise DatasetError(f"{out} is complete and closed; make another data set to change anything")
+            raise DatasetError(
+                f"{out} is complete and closed; make another data set to change anything"
+            )
         shards = list(manifest.shards)
         for index, change in changes.items():
             if not 0 <= index < len(shards):
-                raise DatasetError(f"shard {index} does not exist; {out} has shards 0 to {len(shards) - 1}")
+                raise DatasetError(
+                    f"shard {index} does not exist; {out} has shards 0 to {len(shards) - 1}"
+                )
             shards[index] = shard_entry(index, {**asdict(shards[index]), **change})
         write_manifest(out, replace(manifest, shards=tuple(shards)))
 

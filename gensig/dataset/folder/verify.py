@@ -102,7 +102,10 @@ def verify(folder: Path, *, quick: bool = False) -> VerifyResult:
         except HDF5_ERRORS as error:
             problems.append(f"{entry.name} cannot be read ({first_line(error)}); it is damaged")
     return VerifyResult(
-        complete=not problems, problems=problems, n_records=manifest.n_records, n_failed=manifest.n_failed
+        complete=not problems,
+        problems=problems,
+        n_records=manifest.n_records,
+        n_failed=manifest.n_failed,
     )
 
 
@@ -118,12 +121,18 @@ def _state(folder: Path, manifest: Manifest) -> list[str]:
             f"never closed; run `gensig resume {folder}`"
         )
     needed = [CONFIG, PLAN, OVERRIDES, *([INDEX] if manifest.is_complete else [])]
-    problems += [f"the manifest does not list {name}; it is damaged" for name in needed if name not in manifest.files]
+    problems += [
+        f"the manifest does not list {name}; it is damaged"
+        for name in needed
+        if name not in manifest.files
+    ]
     problems += [f"{name} is missing" for name in manifest.files if not (folder / name).is_file()]
     if manifest.is_complete:
         found = sorted(f"{SPLITS}/{path.name}" for path in (folder / SPLITS).glob("*"))
         problems += [
-            f"{name!a} is extra: the manifest does not list it" for name in found if name not in manifest.files
+            f"{name!a} is extra: the manifest does not list it"
+            for name in found
+            if name not in manifest.files
         ]
     return problems
 
@@ -136,7 +145,11 @@ def _extra_files(folder: Path, manifest: Manifest) -> list[str]:
     names = sorted(path.name for path in (folder / SHARDS).iterdir())
     if not manifest.is_complete:
         names = [name for name in names if not name.startswith(".")]
-    return [f"{SHARDS}/{name!a} is extra: no shard of this data set" for name in names if name not in known]
+    return [
+        f"{SHARDS}/{name!a} is extra: no shard of this data set"
+        for name in names
+        if name not in known
+    ]
 
 
 def _beside_shards(folder: Path, manifest: Manifest) -> tuple[list[str], Plan | None]:
@@ -149,12 +162,18 @@ def _beside_shards(folder: Path, manifest: Manifest) -> tuple[list[str], Plan | 
     try:
         config = read_config(folder)
         if identity_hash(config, manifest.generator_version) != manifest.identity:
-            problems.append(f"{CONFIG} and the identity in the manifest do not belong together; one was altered")
+            problems.append(
+                f"{CONFIG} and the identity in the manifest do not belong together; one was altered"
+            )
         begun = manifest.configuration
         if begun and identity_hash(begun, manifest.generator_version) != manifest.identity:
-            problems.append(f"{MANIFEST} has a configuration and an identity that do not belong together")
+            problems.append(
+                f"{MANIFEST} has a configuration and an identity that do not belong together"
+            )
         if "seed" in config and config["seed"] != manifest.seed:
-            problems.append(f"{CONFIG} has seed {config['seed']!r} and the manifest {manifest.seed}; one was altered")
+            problems.append(
+                f"{CONFIG} has seed {config['seed']!r} and the manifest {manifest.seed}; one was altered"
+            )
     except DatasetError as error:
         problems.append(str(error))
     try:
@@ -169,10 +188,15 @@ def _beside_shards(folder: Path, manifest: Manifest) -> tuple[list[str], Plan | 
 def _splits(folder: Path, manifest: Manifest, plan: Plan) -> list[str]:
     """Splits that do not keep apart what their protocol says."""
     problems = []
-    for name in sorted(name for name in manifest.files if name.startswith(f"{SPLITS}/") and (folder / name).is_file()):
+    for name in sorted(
+        name
+        for name in manifest.files
+        if name.startswith(f"{SPLITS}/") and (folder / name).is_file()
+    ):
         try:
             problems += [
-                f"{SPLITS}/{line}" for line in split_problems(Path(name).stem, read_split(folder / name), plan)
+                f"{SPLITS}/{line}"
+                for line in split_problems(Path(name).stem, read_split(folder / name), plan)
             ]
         except DatasetError as error:
             problems.append(str(error))
@@ -194,12 +218,16 @@ def _bytes_differ(path: Path, entry: ShardEntry, manifest: Manifest, *, quick: b
     other = next((e.name for e in manifest.shards if e.sha256 == digest), None)
     if other is not None:
         return [f"{entry.name} is swapped: it holds what belongs in {other}"]
-    return [f"{entry.name} was altered: its sha256 is {digest[:12]}..., recorded is {entry.sha256[:12]}..."]
+    return [
+        f"{entry.name} was altered: its sha256 is {digest[:12]}..., recorded is {entry.sha256[:12]}..."
+    ]
 
 
 def _description(file: h5py.File, path: Path) -> dict:
     """What all shards of one data set have in common."""
-    shapes = {name: (str(data.dtype), data.shape[1:]) for name, data in datasets(file, path).items()}
+    shapes = {
+        name: (str(data.dtype), data.shape[1:]) for name, data in datasets(file, path).items()
+    }
     return {"data sets": shapes, "attributes": read_attributes(file)}
 
 
@@ -207,7 +235,11 @@ def _description_differs(file: h5py.File, path: Path, reference: dict) -> list[s
     problems = []
     for part, found in _description(file, path).items():
         expected = reference[part]
-        names = sorted(name for name in {*found, *expected} if repr(found.get(name)) != repr(expected.get(name)))
+        names = sorted(
+            name
+            for name in {*found, *expected}
+            if repr(found.get(name)) != repr(expected.get(name))
+        )
         if names:
             problems.append(
                 f"{path.name} is foreign: its {part} {', '.join(names)} differ from those of the other shards"
@@ -225,9 +257,16 @@ def _rows_differ(file: h5py.File, entry: ShardEntry, plan: Plan | None, start: i
     planned_columns = plan.columns if plan is not None else {}
     for column in COLUMNS.values():
         # Other inputs may be refined while simulating; names and labels never.
-        if column.role not in ("id", "label", "unit") or column.name not in planned_columns or column.name not in file:
+        if (
+            column.role not in ("id", "label", "unit")
+            or column.name not in planned_columns
+            or column.name not in file
+        ):
             continue
-        planned, found = planned_columns[column.name][start : start + n], read_rows(file[column.name])
+        planned, found = (
+            planned_columns[column.name][start : start + n],
+            read_rows(file[column.name]),
+        )
         wrong = np.flatnonzero(planned != found)
         if wrong.size:
             i = int(wrong[0])
@@ -239,9 +278,14 @@ def _rows_differ(file: h5py.File, entry: ShardEntry, plan: Plan | None, start: i
                 return problems
     failed = read_rows(file["status"]) != "ok"
     if int(failed.sum()) != entry.n_failed:
-        problems.append(f"{name} has {int(failed.sum())} failed records, recorded are {entry.n_failed}")
+        problems.append(
+            f"{name} has {int(failed.sum())} failed records, recorded are {entry.n_failed}"
+        )
     for row, is_failed in enumerate(failed.tolist()):
-        problems += [f"{name} row {row}: {problem}" for problem in _signal_problems(file, row, failed=is_failed)]
+        problems += [
+            f"{name} row {row}: {problem}"
+            for problem in _signal_problems(file, row, failed=is_failed)
+        ]
     return problems
 
 
@@ -255,7 +299,9 @@ def _signal_problems(file: h5py.File, row: int, *, failed: bool) -> list[str]:
             scale = file[scale_name][row]
             wrong = ~(is_scale(scale) | (np.isnan(scale) & failed))
             if wrong.any():
-                problems.append(f"{scale_name} is {scale[wrong][0]}; it must be positive and finite")
+                problems.append(
+                    f"{scale_name} is {scale[wrong][0]}; it must be positive and finite"
+                )
                 continue
         if not failed and not np.isfinite(read_signal(file, name, row)).all():
             problems.append(f"{name} is not finite, but its status is ok")

@@ -52,18 +52,30 @@ def deal_groups(plan: Plan, deal: Deal, rng: np.random.Generator) -> SplitTable 
     for subset, usable in enumerate(deal.usable):
         holds[subset, group[usable], label[usable]] = True
     needed = holds.any(axis=1) | deal.every_class
-    if lacking := [name for name, found in zip(SUBSETS, holds.any(axis=1) >= needed, strict=True) if not found.all()]:
+    if lacking := [
+        name
+        for name, found in zip(SUBSETS, holds.any(axis=1) >= needed, strict=True)
+        if not found.all()
+    ]:
         return f"a class has no record that may be used for {lacking[0]}"
-    n_validation, n_test = (max(1, round(share * len(names))) for share in (VALIDATION_SHARE, deal.test_share))
+    n_validation, n_test = (
+        max(1, round(share * len(names))) for share in (VALIDATION_SHARE, deal.test_share)
+    )
     if MAX_FOR_TESTS * len(names) >= MIN_TESTED:
         n_test = max(n_test, MIN_TESTED)
-    in_order = np.repeat(np.arange(len(SUBSETS)), [len(names) - n_validation - n_test, n_validation, n_test])
-    worth = None if deal.for_test is None else np.bincount(group, weights=deal.for_test).astype(float)
+    in_order = np.repeat(
+        np.arange(len(SUBSETS)), [len(names) - n_validation - n_test, n_validation, n_test]
+    )
+    worth = (
+        None if deal.for_test is None else np.bincount(group, weights=deal.for_test).astype(float)
+    )
     for attempt in range(_ATTEMPTS):
         side = rng.permutation(in_order)
         if worth is not None and attempt < _ATTEMPTS // 2:
             side = _best_tested(side, worth, rng)
-        present = np.stack([holds[subset, side == subset].any(axis=0) for subset in range(len(SUBSETS))])
+        present = np.stack(
+            [holds[subset, side == subset].any(axis=0) for subset in range(len(SUBSETS))]
+        )
         if (present >= needed).all():
             return _table(plan, side[group], deal.usable)
     return f"no deal of {len(names)} {deal.column} found that gives every subset all its classes"

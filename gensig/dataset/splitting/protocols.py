@@ -65,10 +65,14 @@ def why_left_out(plan: Plan, seed: int, names: Collection[str] | None = None) ->
 
     ``names`` are the protocols to ask about, None all of them.
     """
-    return {name: reason for name, reason in _outcomes(plan, seed, names) if isinstance(reason, str)}
+    return {
+        name: reason for name, reason in _outcomes(plan, seed, names) if isinstance(reason, str)
+    }
 
 
-def _outcomes(plan: Plan, seed: int, names: Collection[str] | None = None) -> list[tuple[str, Outcome]]:
+def _outcomes(
+    plan: Plan, seed: int, names: Collection[str] | None = None
+) -> list[tuple[str, Outcome]]:
     found: list[tuple[str, Outcome]] = []
     for name, protocol in PROTOCOLS.items():
         if names is not None and name not in names:
@@ -124,7 +128,9 @@ def _cross_range(column: str, hold: str, plan: Plan, rng: np.random.Generator) -
     return deal_groups(plan, deal, rng)
 
 
-def _unseen_severity(hold: Callable[[NDArray[np.float64]], Mask], plan: Plan, rng: np.random.Generator) -> Outcome:
+def _unseen_severity(
+    hold: Callable[[NDArray[np.float64]], Mask], plan: Plan, rng: np.random.Generator
+) -> Outcome:
     """A quarter of each fault's severities tested on, in units that are not trained on.
 
     Healthy records and those of a fault that has no severity to hold out are on every side.
@@ -204,18 +210,28 @@ def _cross(column: str, hold: str) -> Callable[[Plan, np.random.Generator], Outc
 _UNIT = ("unit_id",)
 PROTOCOLS = {
     "random_window_leaky": Protocol(stream=9001, apart=(), make=_random_windows),
-    "by_unit": Protocol(stream=9002, apart=_UNIT, make=functools.partial(_by_group, "unit_id", len(SUBSETS))),
+    "by_unit": Protocol(
+        stream=9002, apart=_UNIT, make=functools.partial(_by_group, "unit_id", len(SUBSETS))
+    ),
     "cross_specimen": Protocol(
-        stream=9003, apart=("specimen_id",), make=functools.partial(_by_group, "specimen_id", MIN_SPECIMENS)
+        stream=9003,
+        apart=("specimen_id",),
+        make=functools.partial(_by_group, "specimen_id", MIN_SPECIMENS),
     ),
     "cross_gearbox": Protocol(
-        stream=9004, apart=("gearbox_id",), make=functools.partial(_by_group, "gearbox_id", len(SUBSETS))
+        stream=9004,
+        apart=("gearbox_id",),
+        make=functools.partial(_by_group, "gearbox_id", len(SUBSETS)),
     ),
     "cross_speed": Protocol(stream=9005, apart=_UNIT, make=_cross("speed_set_rpm", "highest")),
     "cross_torque": Protocol(stream=9006, apart=_UNIT, make=_cross("torque_nm", "highest")),
     "cross_snr": Protocol(stream=9007, apart=_UNIT, make=_cross("snr_db", "lowest")),
-    "unseen_severity_inner": Protocol(stream=9008, apart=_UNIT, make=functools.partial(_unseen_severity, _inner)),
-    "unseen_severity_outer": Protocol(stream=9009, apart=_UNIT, make=functools.partial(_unseen_severity, _outer)),
+    "unseen_severity_inner": Protocol(
+        stream=9008, apart=_UNIT, make=functools.partial(_unseen_severity, _inner)
+    ),
+    "unseen_severity_outer": Protocol(
+        stream=9009, apart=_UNIT, make=functools.partial(_unseen_severity, _outer)
+    ),
     "healthy_only": Protocol(stream=9010, apart=_UNIT, make=_healthy_only, every_class=False),
     "open_set": Protocol(stream=9011, apart=_UNIT, make=_open_set, every_class=False),
 }

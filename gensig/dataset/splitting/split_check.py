@@ -39,7 +39,9 @@ def split_problems(protocol: str, table: SplitTable, plan: Plan) -> list[str]:
         seen[group[record], sides] = True
         torn = names[seen.sum(axis=1) > 1]
         if torn.size:
-            problems.append(f"{protocol}: {column} {torn[0]} is in more than one subset ({torn.size} such)")
+            problems.append(
+                f"{protocol}: {column} {torn[0]} is in more than one subset ({torn.size} such)"
+            )
     return problems
 
 

@@ -54,7 +54,11 @@ def read_split(path: Path) -> SplitTable:
             raise ValueError("fractions must be 0 <= start < stop <= 1")
         unknown = set(subsets) - set(SUBSETS)
         if unknown:
-            raise ValueError(f"subset {min(unknown)[:40]!r} is unknown; allowed are {', '.join(SUBSETS)}")
+            raise ValueError(
+                f"subset {min(unknown)[:40]!r} is unknown; allowed are {', '.join(SUBSETS)}"
+            )
     except (csv.Error, ValueError) as error:
         raise DatasetError(f"{path} is no split table ({error}); restore it from a copy") from error
-    return SplitTable(record_id=np.array(ids), start_fraction=start, stop_fraction=stop, subset=np.array(subsets))
+    return SplitTable(
+        record_id=np.array(ids), start_fraction=start, stop_fraction=stop, subset=np.array(subsets)
+    )

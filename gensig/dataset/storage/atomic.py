@@ -24,9 +24,13 @@ def locked(folder: Path) -> Iterator[None]:
     try:
         descriptor = os.open(folder, os.O_RDONLY)
     except OSError as error:
-        raise DatasetError(f"{folder} cannot be opened: {error.strerror}; give the folder of a data set") from error
+        raise DatasetError(
+            f"{folder} cannot be opened: {error.strerror}; give the folder of a data set"
+        ) from error
     try:
-        with suppress(OSError):  # a file system without locks: one writer at a time is then the caller's duty
+        with suppress(
+            OSError
+        ):  # a file system without locks: one writer at a time is then the caller's duty
             fcntl.flock(descriptor, fcntl.LOCK_EX)
         yield
     finally:
@@ -85,7 +89,9 @@ def read_text(path: Path, *, limit: int) -> str:
     """A UTF-8 file of at most `limit` bytes; DatasetError when it is absent, no ordinary file, too long or not text."""
     try:
         if not path.is_file():
-            raise DatasetError(f"{path} is missing or no ordinary file; the folder is damaged or no gensig data set")
+            raise DatasetError(
+                f"{path} is missing or no ordinary file; the folder is damaged or no gensig data set"
+            )
         size = path.stat().st_size
         if size > limit:
             raise DatasetError(
@@ -93,7 +99,9 @@ def read_text(path: Path, *, limit: int) -> str:
             )
         return path.read_bytes().decode("utf-8")
     except UnicodeDecodeError as error:
-        raise DatasetError(f"{path} is not UTF-8 text (byte {error.start}); it is damaged, restore it") from error
+        raise DatasetError(
+            f"{path} is not UTF-8 text (byte {error.start}); it is damaged, restore it"
+        ) from error
     except (OSError, ValueError) as error:
         raise DatasetError(f"{path} cannot be read: {error}; check its permissions") from error
 

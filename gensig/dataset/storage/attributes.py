@@ -25,13 +25,17 @@ def set_attribute(target: h5py.HLObject, name: str, value: Attribute) -> None:
         if data.dtype.kind == "b":
             data = data.astype(np.int8)
         if data.dtype.kind not in "if":
-            raise DatasetError(f"attribute {name} is {value!r}; allowed are text, int, float and lists of one of them")
+            raise DatasetError(
+                f"attribute {name} is {value!r}; allowed are text, int, float and lists of one of them"
+            )
     if data.nbytes > ATTRIBUTE_BYTES_LIMIT:
         raise DatasetError(
             f"attribute {name} has {data.nbytes} bytes, HDF5 allows about {ATTRIBUTE_BYTES_LIMIT}; "
             "make it a column or a file beside the shards"
         )
-    dtype = h5py.string_dtype("utf-8", data.dtype.itemsize) if data.dtype.kind == "S" else data.dtype
+    dtype = (
+        h5py.string_dtype("utf-8", data.dtype.itemsize) if data.dtype.kind == "S" else data.dtype
+    )
     target.attrs.create(name, data, shape=data.shape, dtype=dtype)
 
 

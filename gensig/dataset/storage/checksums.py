@@ -42,12 +42,17 @@ def write_checksums(folder: Path, manifest: Manifest, manifest_digest: str) -> N
     """Write `SHA256SUMS` for a manifest that says 'complete'; it may be written before that manifest."""
     digests = {MANIFEST: manifest_digest, **_recorded(manifest)}
     digests |= {name: sha256_file(folder / name) for name in _beside(folder)}
-    write_text(folder / CHECKSUMS, "".join(f"{digest}  {name}\n" for name, digest in digests.items()))
+    write_text(
+        folder / CHECKSUMS, "".join(f"{digest}  {name}\n" for name, digest in digests.items())
+    )
 
 
 def _recorded(manifest: Manifest) -> dict[str, str]:
     """Digests that the manifest holds, by path."""
-    return {**manifest.files, **{f"{SHARDS}/{entry.name}": entry.sha256 for entry in manifest.shards}}
+    return {
+        **manifest.files,
+        **{f"{SHARDS}/{entry.name}": entry.sha256 for entry in manifest.shards},
+    }
 
 
 def _beside(folder: Path) -> list[str]:
@@ -74,7 +79,9 @@ def read_checksums(folder: Path) -> dict[str, str]:
     for number, line in enumerate(text.split("\n")[:-1], start=1):
         match = _LINE.fullmatch(line)
         if match is None or match[2] in found:
-            raise DatasetError(f"{CHECKSUMS} was altered: line {number} is none of a data set; restore it from a copy")
+            raise DatasetError(
+                f"{CHECKSUMS} was altered: line {number} is none of a data set; restore it from a copy"
+            )
         found[match[2]] = match[1]
     if not text.endswith("\n"):
         raise DatasetError(f"{CHECKSUMS} was altered: its end is missing; restore it from a copy")
@@ -97,17 +104,28 @@ def differences(folder: Path, manifest: Manifest, *, quick: bool = False) -> lis
     for name in (MANIFEST, *recorded, CARD, CROISSANT, *_beside(folder)):
         if name not in listed:
             listed[name] = ""
-            found.append(Difference(name=CHECKSUMS, line=f"{CHECKSUMS} does not list {name}; one of them was altered"))
+            found.append(
+                Difference(
+                    name=CHECKSUMS,
+                    line=f"{CHECKSUMS} does not list {name}; one of them was altered",
+                )
+            )
     for name, digest in listed.items():
         path = folder / name
         if name in recorded:
             if digest and digest != recorded[name]:
-                line = f"{CHECKSUMS} and {MANIFEST} have different sha256 of {name}; one was altered"
+                line = (
+                    f"{CHECKSUMS} and {MANIFEST} have different sha256 of {name}; one was altered"
+                )
                 found.append(Difference(name=CHECKSUMS, line=line))
         elif not path.is_file() or not path.resolve().is_relative_to(folder.resolve()):
             found.append(Difference(name=name, line=f"{name} is missing; {CHECKSUMS} lists it"))
         elif digest and (name == MANIFEST or not quick) and sha256_file(path) != digest:
-            hint = f"; if you edited it, `gensig finalize {folder}` accepts it" if name in EDITABLE else ""
+            hint = (
+                f"; if you edited it, `gensig finalize {folder}` accepts it"
+                if name in EDITABLE
+                else ""
+            )
             line = f"{name} was altered: its sha256 is not the one in {CHECKSUMS}{hint}"
             found.append(Difference(name=name, line=line))
     return found
@@ -126,7 +144,9 @@ def accept_edits(folder: Path) -> list[str]:
             raise DatasetError(f"{folder} is incomplete; run `gensig resume {folder}` first")
         found = differences(folder, manifest)
         missing = not (folder / CHECKSUMS).exists()
-        refused = [one for one in found if one.name not in EDITABLE or not (folder / one.name).is_file()]
+        refused = [
+            one for one in found if one.name not in EDITABLE or not (folder / one.name).is_file()
+        ]
         if refused and not missing:
             raise DatasetError(f"{refused[0].line}; only {' and '.join(EDITABLE)} may be edited")
         if found:

@@ -6,7 +6,15 @@ from pathlib import Path
 import h5py
 import numpy as np
 
-from gensig.dataset.schema import COLUMNS, REQUIRED, REQUIRED_ATTRIBUTES, SAMPLE_TYPES, SCALES, SCHEMA_VERSION, SIGNALS
+from gensig.dataset.schema import (
+    COLUMNS,
+    REQUIRED,
+    REQUIRED_ATTRIBUTES,
+    SAMPLE_TYPES,
+    SCALES,
+    SCHEMA_VERSION,
+    SIGNALS,
+)
 from gensig.dataset.storage.attributes import HDF5_ERRORS, decoded, read_attributes
 from gensig.dataset.storage.compression import (
     BLOSC2_CHUNK_LIMIT,
@@ -40,7 +48,9 @@ def open_file(path: Path) -> h5py.File:
 def open_shard(path: Path, *, folder: Path | None = None) -> h5py.File:
     """A shard, open for reading after `check_shard`; with `folder`, refused when the name leads out of that folder."""
     if folder is not None and not path.resolve().is_relative_to(folder.resolve()):
-        raise DatasetError(f"{path} is a link that leads out of {folder}; put the file itself there")
+        raise DatasetError(
+            f"{path} is a link that leads out of {folder}; put the file itself there"
+        )
     file = open_file(path)
     try:
         check_shard(file, path)
@@ -56,7 +66,14 @@ def same_file(path: Path) -> tuple[int, ...]:
         found, link = path.stat(), path.lstat()
     except OSError:
         return ()
-    return (found.st_dev, found.st_ino, found.st_size, found.st_mtime_ns, found.st_ctime_ns, link.st_ino)
+    return (
+        found.st_dev,
+        found.st_ino,
+        found.st_size,
+        found.st_mtime_ns,
+        found.st_ctime_ns,
+        link.st_ino,
+    )
 
 
 def check_shard(file: h5py.File, path: Path) -> None:
@@ -72,7 +89,9 @@ def check_shard(file: h5py.File, path: Path) -> None:
         found = datasets(file, path)
         missing = [name for name in REQUIRED if name not in found]
         if missing:
-            raise DatasetError(f"{path} has no data set {', '.join(missing)}; it is no gensig shard")
+            raise DatasetError(
+                f"{path} has no data set {', '.join(missing)}; it is no gensig shard"
+            )
         n_records = row_count(found["record_id"])
         for name, data in found.items():
             _check_dataset(name, data, n_records, path)
@@ -80,7 +99,9 @@ def check_shard(file: h5py.File, path: Path) -> None:
             _check_scale(found, name, scale, path)
         _check_attributes(file, path)
     except HDF5_ERRORS as error:
-        raise DatasetError(f"{path} is damaged ({first_line(error)}); restore it from a copy") from error
+        raise DatasetError(
+            f"{path} is damaged ({first_line(error)}); restore it from a copy"
+        ) from error
 
 
 def datasets(file: h5py.File, path: Path) -> dict[str, h5py.Dataset]:
@@ -90,16 +111,22 @@ def datasets(file: h5py.File, path: Path) -> dict[str, h5py.Dataset]:
     def collect(group: h5py.Group, prefix: str, *, deeper: bool) -> None:
         for key in group:
             if not isinstance(key, str):
-                raise DatasetError(f"{path}: the name {key!r} is no UTF-8 text; the file is damaged")
+                raise DatasetError(
+                    f"{path}: the name {key!r} is no UTF-8 text; the file is damaged"
+                )
             if group.id.links.get_info(key.encode()).type != h5py.h5l.TYPE_HARD:
-                raise DatasetError(f"{path}: '{_plain(prefix + key)}' is a link; a shard holds its own data only")
+                raise DatasetError(
+                    f"{path}: '{_plain(prefix + key)}' is a link; a shard holds its own data only"
+                )
             item = group[key]
             if isinstance(item, h5py.Dataset):
                 found[prefix + key] = item
             elif isinstance(item, h5py.Group) and deeper:
                 collect(item, f"{prefix}{key}/", deeper=False)
             else:
-                raise DatasetError(f"{path}: '{_plain(prefix + key)}' is neither a data set nor a group of data sets")
+                raise DatasetError(
+                    f"{path}: '{_plain(prefix + key)}' is neither a data set nor a group of data sets"
+                )
 
     collect(file, "", deeper=True)
     return found
@@ -114,14 +141,22 @@ def _check_dataset(name: str, data: h5py.Dataset, n_records: int, path: Path) ->
     label = f"{path}: data set '{_plain(name)}'"
     dtype = data.dtype
     if dtype.kind not in "Siuf" or dtype.subdtype is not None:
-        raise DatasetError(f"{label} has type {dtype}; allowed are numbers and text of fixed length")
+        raise DatasetError(
+            f"{label} has type {dtype}; allowed are numbers and text of fixed length"
+        )
     if data.is_virtual or data.external:
-        raise DatasetError(f"{label} keeps its data in another file; a shard holds its own data only")
+        raise DatasetError(
+            f"{label} keeps its data in another file; a shard holds its own data only"
+        )
     if n_records == 0 or row_count(data) != n_records:
-        raise DatasetError(f"{label} has shape {data.shape}, record_id has {n_records} rows; all must be equal, not 0")
+        raise DatasetError(
+            f"{label} has shape {data.shape}, record_id has {n_records} rows; all must be equal, not 0"
+        )
     used = filters(data)
     if not used <= _FILTERS:
-        raise DatasetError(f"{label} uses HDF5 filter {sorted(used - _FILTERS)}; allowed are gzip, lzf and blosc2")
+        raise DatasetError(
+            f"{label} uses HDF5 filter {sorted(used - _FILTERS)}; allowed are gzip, lzf and blosc2"
+        )
     if BLOSC2_FILTER in used:
         load_blosc2(f"{path} is compressed with blosc2; reading it")
     if not _is_stored(data, used):
@@ -144,7 +179,12 @@ def _check_dataset(name: str, data: h5py.Dataset, n_records: int, path: Path) ->
 def holds_its_data(data: h5py.Dataset) -> bool:
     """True for a data set whose values are all in its own file, in no more bytes than it declares."""
     used = filters(data)
-    return not data.is_virtual and not data.external and used <= _FILTERS - {BLOSC2_FILTER} and _is_stored(data, used)
+    return (
+        not data.is_virtual
+        and not data.external
+        and used <= _FILTERS - {BLOSC2_FILTER}
+        and _is_stored(data, used)
+    )
 
 
 def _is_stored(data: h5py.Dataset, used: set[int]) -> bool:
@@ -163,7 +203,9 @@ def _check_scale(found: dict[str, h5py.Dataset], name: str, scale: str, path: Pa
     if name not in found or found[name].dtype.kind == "f":
         return
     if scale not in found:
-        raise DatasetError(f"{path}: {name} is int16 and there is no data set {scale}; its values are unknown")
+        raise DatasetError(
+            f"{path}: {name} is int16 and there is no data set {scale}; its values are unknown"
+        )
     if found[scale].shape != found[name].shape[:2]:
         raise DatasetError(
             f"{path}: {scale} has shape {found[scale].shape}, {name} has {found[name].shape[:2]} records and channels"
@@ -176,7 +218,9 @@ def _check_attributes(file: h5py.File, path: Path) -> None:
     found = read_attributes(file)
     missing = [name for name in REQUIRED_ATTRIBUTES if name not in found]
     if missing:
-        raise DatasetError(f"{path} has no root attribute {', '.join(missing)}; it is no gensig shard")
+        raise DatasetError(
+            f"{path} has no root attribute {', '.join(missing)}; it is no gensig shard"
+        )
     version, rate = found["schema_version"], found["sampling_rate_hz"]
     if version != SCHEMA_VERSION:
         raise DatasetError(

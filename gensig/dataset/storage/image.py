@@ -19,7 +19,9 @@ def memory_file() -> h5py.File:
     """An empty HDF5 file that exists in memory only."""
     # No file of this name is made; HDF5 wants distinct names for files that are open together.
     name = f"gensig-memory-{next(_COUNTER)}"
-    return h5py.File(name, "w", driver="core", backing_store=False, block_size=GROWTH, libver=LIBRARY_VERSIONS)
+    return h5py.File(
+        name, "w", driver="core", backing_store=False, block_size=GROWTH, libver=LIBRARY_VERSIONS
+    )
 
 
 def publish_image(file: h5py.File, path: Path) -> tuple[str, int]:

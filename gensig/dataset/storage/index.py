@@ -50,7 +50,9 @@ def _map(index: h5py.File, name: str, data: h5py.Dataset, manifest: Manifest) ->
     if "/" in name:
         parent = index.require_group(name.rpartition("/")[0])
     leaf = name.rpartition("/")[2]
-    identifier = h5py.h5d.create(parent.id, leaf.encode(), data.id.get_type(), space, dcpl=properties)
+    identifier = h5py.h5d.create(
+        parent.id, leaf.encode(), data.id.get_type(), space, dcpl=properties
+    )
     notes = read_attributes(data)
     for note in ("unit", "scale"):
         if isinstance(notes.get(note), str):
@@ -67,14 +69,18 @@ def open_index(folder: Path) -> h5py.File:
     path = Path(folder) / INDEX
     manifest = read_manifest(folder)
     if not path.resolve().is_relative_to(Path(folder).resolve()):
-        raise DatasetError(f"{path} is a link that leads out of {folder}; put the file itself there")
+        raise DatasetError(
+            f"{path} is a link that leads out of {folder}; put the file itself there"
+        )
     file = open_file(path)
     try:
         for name, data in datasets(file, path).items():
             _check_view(data, name, manifest, path)
     except HDF5_ERRORS as error:
         file.close()
-        raise DatasetError(f"{path} is damaged ({first_line(error)}); restore it from a copy") from error
+        raise DatasetError(
+            f"{path} is damaged ({first_line(error)}); restore it from a copy"
+        ) from error
     except BaseException:
         file.close()
         raise
@@ -84,8 +90,16 @@ def open_index(folder: Path) -> h5py.File:
 def _check_view(data: h5py.Dataset, name: str, manifest: Manifest, path: Path) -> None:
     expected = [(f"{SHARDS}/{entry.name}", name) for entry in manifest.shards]
     found = (
-        [(str(source.file_name), str(source.dset_name)) for source in data.virtual_sources()] if data.is_virtual else []
+        [(str(source.file_name), str(source.dset_name)) for source in data.virtual_sources()]
+        if data.is_virtual
+        else []
     )
-    if found != expected or data.dtype.kind not in "Siuf" or data.shape[:1] != (manifest.n_records,):
+    if (
+        found != expected
+        or data.dtype.kind not in "Siuf"
+        or data.shape[:1] != (manifest.n_records,)
+    ):
         shown = "".join(c if c.isprintable() else "?" for c in name)[:80]
-        raise DatasetError(f"{path}: '{shown}' does not show the shards of this folder; restore it from a copy")
+        raise DatasetError(
+            f"{path}: '{shown}' does not show the shards of this folder; restore it from a copy"
+        )

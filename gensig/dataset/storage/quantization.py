@@ -41,7 +41,9 @@ def is_scale(scale: np.ndarray) -> np.ndarray:
     return (scale > 0.0) & (scale < np.inf)
 
 
-def read_signal(file: h5py.File, name: str, row: int, start: int = 0, stop: int | None = None) -> np.ndarray:
+def read_signal(
+    file: h5py.File, name: str, row: int, start: int = 0, stop: int | None = None
+) -> np.ndarray:
     """One record's time signal from a checked shard, in its unit however it is stored.
 
     Parameters
@@ -65,6 +67,10 @@ def read_signal(file: h5py.File, name: str, row: int, start: int = 0, stop: int 
     scale = np.asarray(file[SCALES[name]][row])
     wrong = ~(is_scale(scale) | np.isnan(scale))
     if wrong.any():
-        raise ValueError(f"{SCALES[name]} of row {row} is {scale[wrong][0]}; a scale is positive and finite")
-    with np.errstate(over="ignore"):  # of a forged scale; the infinite values are found where signals are checked
+        raise ValueError(
+            f"{SCALES[name]} of row {row} is {scale[wrong][0]}; a scale is positive and finite"
+        )
+    with np.errstate(
+        over="ignore"
+    ):  # of a forged scale; the infinite values are found where signals are checked
         return np.multiply(stored, scale[:, None], dtype=np.float64).astype(np.float32)

@@ -29,10 +29,17 @@ def receipt_path(folder: Path, shard_index: int) -> Path:
     return path.with_name(f".{path.name}{RECEIPT_SUFFIX}")
 
 
-def write_receipt(folder: Path, shard_index: int, *, rows: int, sha256: str, n_bytes: int, n_failed: int) -> None:
+def write_receipt(
+    folder: Path, shard_index: int, *, rows: int, sha256: str, n_bytes: int, n_failed: int
+) -> None:
     """Say that a shard is whole under its final name."""
     entry = ShardEntry(
-        name=shard_name(shard_index), rows=rows, state="done", sha256=sha256, bytes=n_bytes, n_failed=n_failed
+        name=shard_name(shard_index),
+        rows=rows,
+        state="done",
+        sha256=sha256,
+        bytes=n_bytes,
+        n_failed=n_failed,
     )
     write_text(receipt_path(folder, shard_index), json.dumps(asdict(entry)) + "\n")
 

@@ -83,12 +83,20 @@ class ShardWriter:
         self.attributes = {"schema_version": SCHEMA_VERSION, **attributes}
         self.compression = compression
         self.sample_type = sample_type
-        self.scales = {name: SCALES[name] for name in signals if name in SCALES and sample_type == "int16"}
-        self.columns = {name: column for name, column in COLUMNS.items() if lives or name not in LIFE_COLUMNS}
+        self.scales = {
+            name: SCALES[name] for name in signals if name in SCALES and sample_type == "int16"
+        }
+        self.columns = {
+            name: column for name, column in COLUMNS.items() if lives or name not in LIFE_COLUMNS
+        }
         for name in params:
             full_name = f"{PARAMS}/{name}"
             self.columns[full_name] = Column(
-                name=full_name, dtype="float64", unit="", role="condition", description="drawn or swept value"
+                name=full_name,
+                dtype="float64",
+                unit="",
+                role="condition",
+                description="drawn or swept value",
             )
         _check_declaration(self, params)
         self._options = creation_options(compression)
@@ -96,13 +104,19 @@ class ShardWriter:
         self.n_bytes = 0
         self.n_failed = 0
         self._rows = {
-            **{name: np.zeros(n_records, column.storage_dtype) for name, column in self.columns.items()},
+            **{
+                name: np.zeros(n_records, column.storage_dtype)
+                for name, column in self.columns.items()
+            },
             **{
                 name: np.zeros((n_records, *shape), SIGNALS[name].storage_dtype)
                 for name, shape in self.signals.items()
                 if not SIGNALS[name].is_bulk
             },
-            **{scale: np.zeros((n_records, self.signals[name][0]), "<f8") for name, scale in self.scales.items()},
+            **{
+                scale: np.zeros((n_records, self.signals[name][0]), "<f8")
+                for name, scale in self.scales.items()
+            },
         }
         self._written = np.zeros(n_records, dtype=bool)
         self._file: h5py.File | None = None
@@ -121,7 +135,10 @@ class ShardWriter:
         return self
 
     def __exit__(
-        self, kind: type[BaseException] | None, error: BaseException | None, trace: TracebackType | None
+        self,
+        kind: type[BaseException] | None,
+        error: BaseException | None,
+        trace: TracebackType | None,
     ) -> None:
         try:
             if kind is None:
@@ -129,7 +146,9 @@ class ShardWriter:
         finally:
             self._close()
 
-    def write(self, row: int, signals: Mapping[str, np.ndarray], values: Mapping[str, str | int | float]) -> None:
+    def write(
+        self, row: int, signals: Mapping[str, np.ndarray], values: Mapping[str, str | int | float]
+    ) -> None:
         """Write one record.
 
         Parameters
@@ -147,7 +166,9 @@ class ShardWriter:
             )
         self._refuse_unknown(signals, self.signals)
         self._refuse_unknown(values, self.columns)
-        encoded = {name: _encoded(column, _value(column, values)) for name, column in self.columns.items()}
+        encoded = {
+            name: _encoded(column, _value(column, values)) for name, column in self.columns.items()
+        }
         _check_row(values)
         failed = encoded["status"] == b"failed"
         arrays = {name: self._signal(name, signals, failed=failed) for name in self.signals}
@@ -180,7 +201,9 @@ class ShardWriter:
         with np.errstate(over="ignore"):  # beyond float32 becomes inf, refused below
             array = given.astype(column.storage_dtype, copy=False)
         if column.is_bulk and not failed and not np.isfinite(array).all():
-            raise DatasetError(f"{self.path.name}: {name} is not finite; write the record with status 'failed'")
+            raise DatasetError(
+                f"{self.path.name}: {name} is not finite; write the record with status 'failed'"
+            )
         return array
 
     def _create_bulk(self, name: str, shape: tuple[int, ...]) -> None:
@@ -209,7 +232,9 @@ class ShardWriter:
         for name in given:
             if name not in known:
                 near = difflib.get_close_matches(name, list(known), n=3) or sorted(known)[:5]
-                raise DatasetError(f"{self.path.name}: '{name}' is not declared; did you mean {', '.join(near)}?")
+                raise DatasetError(
+                    f"{self.path.name}: '{name}' is not declared; did you mean {', '.join(near)}?"
+                )
 
     def _finish(self) -> None:
         assert self._file is not None
@@ -223,7 +248,9 @@ class ShardWriter:
             raise DatasetError(f"{self.path.name}: a record_id occurs twice; ids must be unique")
         for name, rows in self._rows.items():
             column = SIGNALS.get(name) or self.columns[name]
-            data = self._file.create_dataset(name, data=rows, dtype=column.storage_dtype, track_times=False)
+            data = self._file.create_dataset(
+                name, data=rows, dtype=column.storage_dtype, track_times=False
+            )
             set_attribute(data, "unit", unit_in_file(column, self.attributes))
         self.n_failed = int(np.count_nonzero(self._rows["status"] == b"failed"))
         with fixed_settings():  # HDF5 compresses what is in its cache now
@@ -243,14 +270,18 @@ def _check_declaration(writer: ShardWriter, params: Sequence[str]) -> None:
         ("sample_type", writer.sample_type, SAMPLE_TYPES),
     ):
         if given not in known:
-            raise DatasetError(f"{name}: {key} '{given}' is unknown; allowed are {', '.join(known)}")
+            raise DatasetError(
+                f"{name}: {key} '{given}' is unknown; allowed are {', '.join(known)}"
+            )
     if writer.n_records < 1:
         raise DatasetError(f"{name}: {writer.n_records} records; a shard needs at least 1")
     for signal, shape in writer.signals.items():
         own = {key: column for key, column in SIGNALS.items() if key not in SCALES.values()}
         if signal not in own or len(shape) != len(own[signal].axes) or min(shape) < 1:
             allowed = ", ".join(f"{key} ({', '.join(column.axes)})" for key, column in own.items())
-            raise DatasetError(f"{name}: signal {signal} of shape {shape} is not allowed; allowed are {allowed}")
+            raise DatasetError(
+                f"{name}: signal {signal} of shape {shape} is not allowed; allowed are {allowed}"
+            )
         n_bytes = math.prod(shape) * own[signal].n_bytes
         if writer.compression == "blosc2" and n_bytes > BLOSC2_CHUNK_LIMIT:
             raise DatasetError(
@@ -268,7 +299,9 @@ def _check_declaration(writer: ShardWriter, params: Sequence[str]) -> None:
         )
     channels = writer.attributes["channel_names"]
     if not isinstance(channels, Sequence) or len(channels) != writer.signals["acceleration"][0]:
-        raise DatasetError(f"{name}: channel_names {channels!r} for {writer.signals['acceleration'][0]} channels")
+        raise DatasetError(
+            f"{name}: channel_names {channels!r} for {writer.signals['acceleration'][0]} channels"
+        )
     bad = [param for param in params if not _PARAM_NAME.fullmatch(param)]
     if bad or len(set(params)) != len(params):
         raise DatasetError(
@@ -283,7 +316,9 @@ def _value(column: Column, values: Mapping[str, str | int | float]) -> str | int
         return DEFAULTS[column.name]
     if column.name.startswith(f"{PARAMS}/"):
         return math.nan
-    raise DatasetError(f"column {column.name} is missing ({column.description}); every record needs it")
+    raise DatasetError(
+        f"column {column.name} is missing ({column.description}); every record needs it"
+    )
 
 
 def _encoded(column: Column, value: str | int | float) -> bytes | int | float:
@@ -307,8 +342,14 @@ def _encoded(column: Column, value: str | int | float) -> bytes | int | float:
             raise OverflowError
         return integer
     except (TypeError, ValueError, OverflowError) as error:
-        kind = f"ASCII text of at most {column.n_bytes} bytes" if column.is_text else f"value of type {column.dtype}"
-        raise DatasetError(f"column {column.name}: {value!a} is no {kind}; give {column.description}") from error
+        kind = (
+            f"ASCII text of at most {column.n_bytes} bytes"
+            if column.is_text
+            else f"value of type {column.dtype}"
+        )
+        raise DatasetError(
+            f"column {column.name}: {value!a} is no {kind}; give {column.description}"
+        ) from error
 
 
 def _check_row(values: Mapping[str, str | int | float]) -> None:

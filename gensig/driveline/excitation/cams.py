@@ -41,11 +41,17 @@ class Cam:
     def __post_init__(self) -> None:
         if self.follower not in FOLLOWERS:
             raise ConfigError(f"cam.follower = {self.follower!r}; allowed: {', '.join(FOLLOWERS)}")
-        for key, value in (("lift_mm", self.lift), ("base_radius_mm", self.base_radius), ("span_deg", self.span)):
+        for key, value in (
+            ("lift_mm", self.lift),
+            ("base_radius_mm", self.base_radius),
+            ("span_deg", self.span),
+        ):
             if not value > 0.0:
                 raise ConfigError(f"cam.{key} = {from_si(key, value):g} must be positive")
         if self.span > 2.0 * math.pi:
-            raise ConfigError(f"cam.span_deg = {math.degrees(self.span):g} must be at most a turn of the cam, 360")
+            raise ConfigError(
+                f"cam.span_deg = {math.degrees(self.span):g} must be at most a turn of the cam, 360"
+            )
         for key, value in (
             ("roller_radius_mm", self.roller_radius),
             ("moving_mass_kg", self.moving_mass),
@@ -55,7 +61,9 @@ class Cam:
             if not value >= 0.0:
                 raise ConfigError(f"cam.{key} = {from_si(key, value):g} must not be negative")
         if not 0.0 <= self.friction_coefficient <= 1.0:
-            raise ConfigError(f"cam.friction_coefficient = {self.friction_coefficient:g} must lie in 0..1")
+            raise ConfigError(
+                f"cam.friction_coefficient = {self.friction_coefficient:g} must lie in 0..1"
+            )
         if (self.follower == "roller") != (self.roller_radius > 0.0):
             raise ConfigError(
                 f"cam.roller_radius_mm = {self.roller_radius * 1e3:g} with follower = {self.follower}; a roller has a "

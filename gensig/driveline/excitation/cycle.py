@@ -41,7 +41,9 @@ class Cylinder:
                 "it is the crank's radius over the length of the connecting rod"
             )
         if not self.compression_ratio > 1.0:
-            raise ConfigError(f"excitation.cylinder.compression_ratio = {self.compression_ratio:g} must be above 1")
+            raise ConfigError(
+                f"excitation.cylinder.compression_ratio = {self.compression_ratio:g} must be above 1"
+            )
         if not self.reciprocating_mass >= 0.0:
             raise ConfigError(
                 f"excitation.cylinder.reciprocating_mass_kg = {self.reciprocating_mass:g} must not be negative"
@@ -83,11 +85,15 @@ class Cylinder:
         """Second slope d2x/da2, m/rad2."""
         ratio, sine, cosine = self.crank_to_rod_ratio, np.sin(angle), np.cos(angle)
         rod = np.sqrt(1.0 - np.square(ratio * sine))
-        bend = (np.square(cosine) - np.square(sine)) / rod + np.square(ratio * sine * cosine) / rod**3
+        bend = (np.square(cosine) - np.square(sine)) / rod + np.square(
+            ratio * sine * cosine
+        ) / rod**3
         return np.asarray(self.crank_radius * (cosine + ratio * bend))
 
 
-def gas_torque(cylinder: Cylinder, angle: Array, pressure: Array, crankcase_pressure: float) -> Array:
+def gas_torque(
+    cylinder: Cylinder, angle: Array, pressure: Array, crankcase_pressure: float
+) -> Array:
     """Torque of the gas on the crank, (point,) N m: T = (p - p_0) A dx/da.
 
     Parameters
@@ -101,7 +107,9 @@ def gas_torque(cylinder: Cylinder, angle: Array, pressure: Array, crankcase_pres
     By virtual work, so that its mean over the cycle is the work over 4 pi. Same as eq. (18) of the engine paper,
     pi/4 D^2 R times the tangential pressure. Assumes a piston pin on the cylinder's axis.
     """
-    return np.asarray((pressure - crankcase_pressure) * cylinder.piston_area * cylinder.piston_rate(angle))
+    return np.asarray(
+        (pressure - crankcase_pressure) * cylinder.piston_area * cylinder.piston_rate(angle)
+    )
 
 
 def inertia_torque(cylinder: Cylinder, angle: Array, speed: float) -> Array:

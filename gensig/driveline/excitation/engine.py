@@ -65,7 +65,9 @@ def read_engine(values: Section) -> Engine:
         friction_mean_pressure=_number("friction_mean_pressure_mpa", values),
         reference=read(Reference, values["reference"], f"{PLACE}.reference"),
         throw_nodes=_whole_numbers("throw_nodes", values["throw_nodes"]),
-        valve_trains={name: _read_train(name, one) for name, one in named_groups("valves", values["valves"])},
+        valve_trains={
+            name: _read_train(name, one) for name, one in named_groups("valves", values["valves"])
+        },
         valve_nodes={
             name: _whole_numbers(f"valve_nodes.{name}", one)
             for name, one in named_groups("valve_nodes", values["valve_nodes"])
@@ -73,7 +75,8 @@ def read_engine(values: Section) -> Engine:
         plunger=plunger,
         plunger_nodes=plunger_nodes,
         loads={
-            name: read_named(Load, one, f"loads.{name}", "load") for name, one in named_groups("loads", values["loads"])
+            name: read_named(Load, one, f"loads.{name}", "load")
+            for name, one in named_groups("loads", values["loads"])
         },
         dynamometer=read(Dynamometer, values["dynamometer"], f"{PLACE}.dynamometer"),
     )
@@ -91,7 +94,9 @@ def read_wheels(values: Section) -> dict[str, ToothedWheel]:
 def _read_pressure(values: Any) -> WiebeCycle | PressureFile:
     """The cycle, or the file in its place where one is given."""
     check_group(f"{PLACE}.pressure", values)
-    cycle = read(WiebeCycle, {key: one for key, one in values.items() if key != "file"}, f"{PLACE}.pressure")
+    cycle = read(
+        WiebeCycle, {key: one for key, one in values.items() if key != "file"}, f"{PLACE}.pressure"
+    )
     if values.get("file") is None:
         return cycle
     return read(PressureFile, {"file": values["file"]}, f"{PLACE}.pressure")
@@ -101,7 +106,9 @@ def _read_train(name: str, values: Any) -> ValveTrain:
     place = f"{PLACE}.valves.{name}"
     check_group(place, values)
     own = {key: one for key, one in values.items() if key != "cam"}
-    return read(ValveTrain, own, place, cam=read_named(Cam, values.get("cam"), f"valves.{name}.cam", "cam"))
+    return read(
+        ValveTrain, own, place, cam=read_named(Cam, values.get("cam"), f"valves.{name}.cam", "cam")
+    )
 
 
 def _read_pump(values: Any) -> tuple[Plunger | None, dict[str, int]]:
@@ -111,10 +118,21 @@ def _read_pump(values: Any) -> tuple[Plunger | None, dict[str, int]]:
     place = f"{PLACE}.injection_pump"
     check_group(place, values)
     own = {key: one for key, one in values.items() if key not in ("cam", "nodes", "cylinders")}
-    nodes, cylinders = _whole_numbers("injection_pump.nodes", values.get("nodes")), values.get("cylinders")
-    if not isinstance(cylinders, list | tuple) or len(set(cylinders)) != len(nodes) or len(cylinders) != len(nodes):
-        raise ConfigError(f"{place}.cylinders must name a different cylinder for each of its {len(nodes)} nodes")
-    plunger = read(Plunger, own, place, cam=read_named(Cam, values.get("cam"), "injection_pump.cam", "cam"))
+    nodes, cylinders = (
+        _whole_numbers("injection_pump.nodes", values.get("nodes")),
+        values.get("cylinders"),
+    )
+    if (
+        not isinstance(cylinders, list | tuple)
+        or len(set(cylinders)) != len(nodes)
+        or len(cylinders) != len(nodes)
+    ):
+        raise ConfigError(
+            f"{place}.cylinders must name a different cylinder for each of its {len(nodes)} nodes"
+        )
+    plunger = read(
+        Plunger, own, place, cam=read_named(Cam, values.get("cam"), "injection_pump.cam", "cam")
+    )
     return plunger, dict(zip(cylinders, nodes, strict=True))
 
 

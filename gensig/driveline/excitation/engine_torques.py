@@ -48,7 +48,9 @@ class Dynamometer:
 
     def __post_init__(self) -> None:
         if not 0.0 <= self.disturbance_share <= 1.0:
-            raise ConfigError(f"excitation.dynamometer.disturbance_share = {self.disturbance_share:g} must lie in 0..1")
+            raise ConfigError(
+                f"excitation.dynamometer.disturbance_share = {self.disturbance_share:g} must lie in 0..1"
+            )
         if not self.disturbance_frequency > 0.0:
             raise ConfigError(
                 f"excitation.dynamometer.disturbance_frequency_hz = {self.disturbance_frequency:g} must be positive"
@@ -94,12 +96,18 @@ class Engine:
             )
         for bank, nodes in self.valve_nodes.items():
             if bank not in self.layout.banks:
-                raise ConfigError(f"excitation.valve_nodes: no bank {bank!r}; there are {', '.join(self.layout.banks)}")
+                raise ConfigError(
+                    f"excitation.valve_nodes: no bank {bank!r}; there are {', '.join(self.layout.banks)}"
+                )
             if len(nodes) not in (0, n_throws):
-                raise ConfigError(f"excitation.valve_nodes.{bank} has {len(nodes)} nodes for {n_throws} throws")
+                raise ConfigError(
+                    f"excitation.valve_nodes.{bank} has {len(nodes)} nodes for {n_throws} throws"
+                )
         for name in self.plunger_nodes:
             if name not in self.layout.cylinders:
-                raise ConfigError(f"excitation.injection_pump.cylinders: there is no cylinder {name!r}")
+                raise ConfigError(
+                    f"excitation.injection_pump.cylinders: there is no cylinder {name!r}"
+                )
         for key, value in (
             ("crankcase_pressure_mpa", self.crankcase_pressure),
             ("friction_mean_pressure_mpa", self.friction_mean_pressure),
@@ -158,7 +166,12 @@ class EngineTorques(LineTorques):
 
 
 def engine_torques(
-    engine: Engine, speed: float, torque: float | None, ratios: Mapping[int, float], *, n_points: int = POINTS
+    engine: Engine,
+    speed: float,
+    torque: float | None,
+    ratios: Mapping[int, float],
+    *,
+    n_points: int = POINTS,
 ) -> EngineTorques:
     """What acts on the shaft line at a speed and a brake torque.
 
@@ -180,7 +193,9 @@ def engine_torques(
     """
     _check_nodes(engine, ratios)
     if not speed > 0.0:
-        raise ConfigError(f"the speed of the crank, {speed * 30.0 / math.pi:g} r/min, must be positive")
+        raise ConfigError(
+            f"the speed of the crank, {speed * 30.0 / math.pi:g} r/min, must be positive"
+        )
     share = speed / engine.reference.speed
     parts = [*_loads(engine, share), *_valve_torques(engine, speed, n_points)]
     taken = engine.friction_torque - sum(ratios[node] * float(np.mean(row)) for node, row in parts)
@@ -208,15 +223,21 @@ def engine_torques(
         nodes=nodes,
         torque=torques,
         disturbance_node=engine.dynamometer.node,
-        disturbance_torque=engine.dynamometer.disturbance_share * brake / ratios[engine.dynamometer.node],
+        disturbance_torque=engine.dynamometer.disturbance_share
+        * brake
+        / ratios[engine.dynamometer.node],
         disturbance_frequency=engine.dynamometer.disturbance_frequency,
     )
 
 
 def _check_nodes(engine: Engine, ratios: Mapping[int, float]) -> None:
     """Every node is there, throws turn with the crank, cams at half its speed."""
-    cams = [node for nodes in engine.valve_nodes.values() for node in nodes] + list(engine.plunger_nodes.values())
-    wanted: list[tuple[str, int, float | None]] = [("throw_nodes", node, 1.0) for node in engine.throw_nodes]
+    cams = [node for nodes in engine.valve_nodes.values() for node in nodes] + list(
+        engine.plunger_nodes.values()
+    )
+    wanted: list[tuple[str, int, float | None]] = [
+        ("throw_nodes", node, 1.0) for node in engine.throw_nodes
+    ]
     wanted += [("valve_nodes or injection_pump.nodes", node, CAM_RATIO) for node in cams]
     wanted += [(f"loads.{name}.node", load.node, None) for name, load in engine.loads.items()]
     wanted += [("dynamometer.node", engine.dynamometer.node, None)]
@@ -231,7 +252,10 @@ def _check_nodes(engine: Engine, ratios: Mapping[int, float]) -> None:
 
 def _loads(engine: Engine, speed_share: float) -> list[tuple[int, Array]]:
     """Mean torques of the driven machines on their nodes."""
-    return [(load.node, np.array(-load.torque * speed_share ** LAWS[load.law])) for load in engine.loads.values()]
+    return [
+        (load.node, np.array(-load.torque * speed_share ** LAWS[load.law]))
+        for load in engine.loads.values()
+    ]
 
 
 def _valve_torques(engine: Engine, speed: float, n_points: int) -> list[tuple[int, Array]]:
@@ -241,11 +265,16 @@ def _valve_torques(engine: Engine, speed: float, n_points: int) -> list[tuple[in
         angle = CAM_RATIO * (cycle_angles(n_points) - train.opening)
         one = cam_torque(train.cam, angle, CAM_RATIO * speed)
         for bank, nodes in engine.valve_nodes.items():
-            parts += [(node, delayed(one, firing[f"{bank}{throw + 1}"])) for throw, node in enumerate(nodes)]
+            parts += [
+                (node, delayed(one, firing[f"{bank}{throw + 1}"]))
+                for throw, node in enumerate(nodes)
+            ]
     return parts
 
 
-def _plunger_torque(engine: Engine, speed: float, speed_share: float, volume: float, *, n_points: int) -> Array:
+def _plunger_torque(
+    engine: Engine, speed: float, speed_share: float, volume: float, *, n_points: int
+) -> Array:
     """Torque of the plunger of a cylinder that fires at crank angle 0 on its node, (point,)."""
     if engine.plunger is None:
         return np.zeros(n_points)
@@ -261,7 +290,8 @@ def _cylinder_torques(engine: Engine, pressure: Array, speed: float) -> list[tup
     one = one - engine.friction_torque / len(engine.layout.cylinders)
     firing = engine.layout.firing_angles()
     return [
-        (engine.throw_nodes[engine.layout.throw(name)], delayed(one, firing[name])) for name in engine.layout.cylinders
+        (engine.throw_nodes[engine.layout.throw(name)], delayed(one, firing[name]))
+        for name in engine.layout.cylinders
     ]
 
 
@@ -274,7 +304,9 @@ def _fuel(engine: Engine, indicated: float) -> float:
 
 def _indicated(engine: Engine, pressure: Array) -> float:
     """Mean torque of the gas in all cylinders, N m."""
-    torque = gas_torque(engine.cylinder, cycle_angles(len(pressure)), pressure, engine.crankcase_pressure)
+    torque = gas_torque(
+        engine.cylinder, cycle_angles(len(pressure)), pressure, engine.crankcase_pressure
+    )
     return float(np.mean(torque)) * len(engine.layout.cylinders)
 
 
@@ -314,7 +346,9 @@ def _burned(
     """Pressure, indicated and brake torque with a Wiebe cycle."""
     assert isinstance(engine.pressure, WiebeCycle)
     if torque is None:
-        raise ConfigError("a Wiebe cycle needs the brake torque; only a measured pressure decides it")
+        raise ConfigError(
+            "a Wiebe cycle needs the brake torque; only a measured pressure decides it"
+        )
     if not torque >= 0.0:
         raise ConfigError(
             f"the brake torque {torque:g} N m is below the friction, which the engine overcomes itself; give 0 or more"
@@ -323,10 +357,16 @@ def _burned(
     motored, fired = wiebe_parts(engine.pressure, engine.cylinder, n_points, power_share)
     indicated = torque + taken
     for _ in range(ROUNDS):
-        before, indicated = indicated, torque + taken + _taken_by(engine, one_plunger(_fuel(engine, indicated)))
+        before, indicated = (
+            indicated,
+            torque + taken + _taken_by(engine, one_plunger(_fuel(engine, indicated))),
+        )
         if abs(indicated - before) <= ROUNDING * indicated:
             break
-    without, unit_heat = _indicated(engine, motored), _indicated(engine, engine.crankcase_pressure + fired)
+    without, unit_heat = (
+        _indicated(engine, motored),
+        _indicated(engine, engine.crankcase_pressure + fired),
+    )
     heat = (indicated - without) / unit_heat
     if not heat > 0.0:
         raise ConfigError(

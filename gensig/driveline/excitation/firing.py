@@ -28,13 +28,17 @@ class Layout:
 
     def __post_init__(self) -> None:
         if not self.banks or len(set(self.banks)) != len(self.banks):
-            raise ConfigError(f"excitation.layout.banks = {', '.join(self.banks)}: name at least one bank, each once")
+            raise ConfigError(
+                f"excitation.layout.banks = {', '.join(self.banks)}: name at least one bank, each once"
+            )
         if len(self.bank_angles) != len(self.banks):
             raise ConfigError(
                 f"excitation.layout.bank_angles_deg has {len(self.bank_angles)} values for {len(self.banks)} banks"
             )
         if not self.throw_angles:
-            raise ConfigError("excitation.layout.throw_angles_deg is empty; give one angle for every throw")
+            raise ConfigError(
+                "excitation.layout.throw_angles_deg is empty; give one angle for every throw"
+            )
         known = self.cylinders
         for place, name in enumerate(self.firing_order):
             if name not in known:
@@ -49,13 +53,17 @@ class Layout:
                     "every cylinder fires once a cycle"
                 )
         if missing := [name for name in known if name not in self.firing_order]:
-            raise ConfigError(f"excitation.layout.firing_order lacks {', '.join(missing)}; every cylinder fires once")
+            raise ConfigError(
+                f"excitation.layout.firing_order lacks {', '.join(missing)}; every cylinder fires once"
+            )
         self._check_turns()
 
     @property
     def cylinders(self) -> tuple[str, ...]:
         """Names, bank by bank."""
-        return tuple(f"{bank}{throw + 1}" for bank in self.banks for throw in range(len(self.throw_angles)))
+        return tuple(
+            f"{bank}{throw + 1}" for bank in self.banks for throw in range(len(self.throw_angles))
+        )
 
     def throw(self, cylinder: str) -> int:
         """Index of a cylinder's throw."""
@@ -82,7 +90,10 @@ class Layout:
         if len(self.firing_order) == 1:
             return [2.0 * TURN]
         centers = [self.dead_center(name) for name in self.firing_order]
-        gaps = [(after - before) % TURN for before, after in zip(centers, [*centers[1:], centers[0]], strict=True)]
+        gaps = [
+            (after - before) % TURN
+            for before, after in zip(centers, [*centers[1:], centers[0]], strict=True)
+        ]
         return [TURN if min(gap, TURN - gap) < TOGETHER else gap for gap in gaps]
 
     def _check_turns(self) -> None:

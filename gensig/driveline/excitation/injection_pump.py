@@ -49,9 +49,13 @@ class Plunger:
             if not value > 0.0:
                 raise ConfigError(f"{place}.{key} = {from_si(key, value):g} must be positive")
         if not 0.0 < self.ramp_share <= 0.5:
-            raise ConfigError(f"{place}.ramp_share = {self.ramp_share:g} must be above 0 and at most 0.5")
+            raise ConfigError(
+                f"{place}.ramp_share = {self.ramp_share:g} must be above 0 and at most 0.5"
+            )
         if not 0.0 < self.indicated_efficiency < 1.0:
-            raise ConfigError(f"{place}.indicated_efficiency = {self.indicated_efficiency:g} must lie between 0 and 1")
+            raise ConfigError(
+                f"{place}.indicated_efficiency = {self.indicated_efficiency:g} must lie between 0 and 1"
+            )
         if not 0.0 <= self.lift_at_delivery < self.cam.lift:
             raise ConfigError(
                 f"{place}.lift_at_delivery_mm = {self.lift_at_delivery * 1e3:g} must be at least 0 and below the cam's "
@@ -65,9 +69,13 @@ class Plunger:
 
     def fuel_volume(self, work: float) -> float:
         """Volume of fuel, m3, that a cylinder burns for the work of its gas over a cycle, J."""
-        return work / (self.indicated_efficiency * self.heating_value_j_per_kg * self.fuel_density_kg_per_m3)
+        return work / (
+            self.indicated_efficiency * self.heating_value_j_per_kg * self.fuel_density_kg_per_m3
+        )
 
-    def pressure(self, lift: Array, rising: NDArray[np.bool_], volume: float, speed_share: float) -> Array:
+    def pressure(
+        self, lift: Array, rising: NDArray[np.bool_], volume: float, speed_share: float
+    ) -> Array:
         """Pressure over the plunger, (point,) Pa, at lifts of the cam in m.
 
         Parameters
@@ -97,7 +105,9 @@ class Plunger:
         return float(np.interp(self.lift_at_delivery, self.cam.motion(angle)[0], angle))
 
 
-def plunger_torque(plunger: Plunger, angle: Array, speed: float, volume: float, speed_share: float) -> Array:
+def plunger_torque(
+    plunger: Plunger, angle: Array, speed: float, volume: float, speed_share: float
+) -> Array:
     """Torque of one plunger on the pump's shaft, (point,) N m.
 
     Parameters

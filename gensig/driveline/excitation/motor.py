@@ -63,7 +63,8 @@ def read_motor(values: Section, drive: DriveLine) -> MotorDrive:
         else read_named(TorqueRipple, ripple, "motor.torque_ripple", "torque_ripple"),
     )
     loads = {
-        name: read_named(Load, one, f"loads.{name}", "load") for name, one in named_groups("loads", values["loads"])
+        name: read_named(Load, one, f"loads.{name}", "load")
+        for name, one in named_groups("loads", values["loads"])
     }
     for name, load in loads.items():
         if load.node not in drive.numbers:
@@ -83,7 +84,9 @@ def _node(drive: DriveLine, key: str, what: str, node: int | None) -> int:
     """A node of the line; the motor's turns as fast as the first one, to which all speeds refer."""
     if node is None:
         numbers = ", ".join(map(str, drive.numbers))
-        raise ConfigError(f"system.{key} = null: {PLACE}={KIND} needs the node of {what}, one of {numbers}; {TOGETHER}")
+        raise ConfigError(
+            f"system.{key} = null: {PLACE}={KIND} needs the node of {what}, one of {numbers}; {TOGETHER}"
+        )
     if node not in drive.numbers:
         raise ConfigError(f"system.{key} = {node}: {_no_node(drive, node)}; {TOGETHER}")
     ratio = abs(float(drive.line.speed_ratio[drive.numbers.index(node)]))

@@ -53,9 +53,13 @@ class MotorDrive:
 
     def __post_init__(self) -> None:
         if not 0.0 < self.slip < 1.0:
-            raise ConfigError(f"excitation.motor.slip = {self.slip:g} must lie between 0 and 1, such as 0.03")
+            raise ConfigError(
+                f"excitation.motor.slip = {self.slip:g} must lie between 0 and 1, such as 0.03"
+            )
         if self.load_law not in LAWS:
-            raise ConfigError(f"excitation.load.law = {self.load_law!r}; allowed: {', '.join(LAWS)}")
+            raise ConfigError(
+                f"excitation.load.law = {self.load_law!r}; allowed: {', '.join(LAWS)}"
+            )
 
     @property
     def driving_nodes(self) -> tuple[int, ...]:
@@ -90,7 +94,12 @@ class MotorDrive:
 
 
 def motor_torques(
-    drive: MotorDrive, speed: float, torque: float, ratios: Mapping[int, float], *, n_points: int = POINTS
+    drive: MotorDrive,
+    speed: float,
+    torque: float,
+    ratios: Mapping[int, float],
+    *,
+    n_points: int = POINTS,
 ) -> LineTorques:
     """What acts on the shaft line at a speed of the motor and a torque that the load takes.
 
@@ -111,7 +120,9 @@ def motor_torques(
     lose is a matter of vibration, and the slip and the governor give it.
     """
     if not speed > 0.0:
-        raise ConfigError(f"the speed of the motor, {speed * 30.0 / math.pi:g} r/min, must be positive")
+        raise ConfigError(
+            f"the speed of the motor, {speed * 30.0 / math.pi:g} r/min, must be positive"
+        )
     if not 0.0 <= torque < math.inf:
         raise ConfigError(f"the torque of the load, {torque:g} N m at the motor, must be 0 or more")
     share = speed / drive.reference.speed

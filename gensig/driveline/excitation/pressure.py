@@ -48,8 +48,12 @@ class WiebeCycle:
     def __post_init__(self) -> None:
         place = "excitation.pressure"
         if not 0.0 < self.ambient_pressure <= self.boost_pressure:
-            given = ", ".join(f"{value * 1e-6:g}" for value in (self.ambient_pressure, self.boost_pressure))
-            raise ConfigError(f"{place}: 0 < ambient_pressure_mpa <= boost_pressure_mpa is needed, not {given}")
+            given = ", ".join(
+                f"{value * 1e-6:g}" for value in (self.ambient_pressure, self.boost_pressure)
+            )
+            raise ConfigError(
+                f"{place}: 0 < ambient_pressure_mpa <= boost_pressure_mpa is needed, not {given}"
+            )
         for key, value, low, high in (
             ("exhaust_share", self.exhaust_share, 0.0, 2.0),
             ("exponent", self.exponent, 1.1, 1.67),
@@ -82,7 +86,9 @@ class PressureFile:
     file: str
 
 
-def wiebe_parts(cycle: WiebeCycle, cylinder: Cylinder, n_points: int, power_share: float) -> tuple[Array, Array]:
+def wiebe_parts(
+    cycle: WiebeCycle, cylinder: Cylinder, n_points: int, power_share: float
+) -> tuple[Array, Array]:
     """Pressure without combustion, Pa, and the pressure that each joule of heat adds, Pa/J, both (point,).
 
     Notes
@@ -104,7 +110,9 @@ def wiebe_parts(cycle: WiebeCycle, cylinder: Cylinder, n_points: int, power_shar
     burned = -np.expm1(-BURNED * share ** (cycle.shape + 1.0)) / -math.expm1(-BURNED)
     weight = volume ** (cycle.exponent - 1.0)
     steps = 0.5 * (weight[1:] + weight[:-1]) * np.diff(burned)
-    fired = (cycle.exponent - 1.0) * np.concatenate([[0.0], np.cumsum(steps)]) / volume**cycle.exponent
+    fired = (
+        (cycle.exponent - 1.0) * np.concatenate([[0.0], np.cumsum(steps)]) / volume**cycle.exponent
+    )
     opened = rising > cycle.exhaust_opening
     fall = np.exp(-(rising - cycle.exhaust_opening) / cycle.blowdown_angle)
     last = np.flatnonzero(~opened)[-1]
@@ -133,15 +141,21 @@ def read_pressure(given: PressureFile, n_points: int) -> Array:
         name = names[bare.index(quantity)]
         suffix = split_unit(name)[1]
         if suffix is None or UNITS[suffix][1] != kind:
-            raise ConfigError(f"{where}: column {name} has no unit that fits; write {quantity}_{example}")
-        columns[quantity] = np.array([to_si(name, float(value)) for value in values[names.index(name)]])
+            raise ConfigError(
+                f"{where}: column {name} has no unit that fits; write {quantity}_{example}"
+            )
+        columns[quantity] = np.array(
+            [to_si(name, float(value)) for value in values[names.index(name)]]
+        )
     angle, pressure = columns["crank_angle"], columns["pressure"]
     gaps = np.diff(np.append(angle, angle[0] + CYCLE))
     if not np.all(gaps[:-1] > 0.0):
         row = int(np.argmin(gaps[:-1] > 0.0)) + 3
         raise ConfigError(f"{where}: row {row}, crank_angle must rise from row to row")
     if gaps[-1] < -1e-9 * CYCLE:
-        raise ConfigError(f"{where}: crank_angle runs over {math.degrees(CYCLE - gaps[-1]):g} degrees, at most 720")
+        raise ConfigError(
+            f"{where}: crank_angle runs over {math.degrees(CYCLE - gaps[-1]):g} degrees, at most 720"
+        )
     if gaps.max() > WIDEST_GAP:
         row = int(np.argmax(gaps)) + 2
         raise ConfigError(
@@ -149,7 +163,9 @@ def read_pressure(given: PressureFile, n_points: int) -> Array:
             f"degrees is needed, at most {math.degrees(WIDEST_GAP):g} between points"
         )
     if not np.all(pressure > 0.0):
-        raise ConfigError(f"{where}: row {int(np.argmax(pressure <= 0.0)) + 2}, pressure is absolute and positive")
+        raise ConfigError(
+            f"{where}: row {int(np.argmax(pressure <= 0.0)) + 2}, pressure is absolute and positive"
+        )
     if gaps[-1] < 1e-9 * CYCLE:  # both ends of the cycle are given: they are one
         angle, pressure = angle[:-1], pressure[:-1]
     return np.asarray(np.interp(cycle_angles(n_points), angle, pressure, period=CYCLE))

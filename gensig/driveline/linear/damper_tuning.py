@@ -30,7 +30,10 @@ Array = NDArray[np.float64]
 ComplexArray = NDArray[np.complex128]
 
 LEAST_INERTIA = 0.05  # of the largest allowed: a smaller ring is no damper
-DAMPING_RATIOS = (0.05, 5.0)  # searched, of the ring on its spring; assumed: rubber has a loss factor of 0.1 and more
+DAMPING_RATIOS = (
+    0.05,
+    5.0,
+)  # searched, of the ring on its spring; assumed: rubber has a loss factor of 0.1 and more
 RATE_MARGIN = 10.0  # by which the rate damping over inertia of a viscous damper may leave the excited frequencies
 POPULATION, GENERATIONS = 10, 100  # per unknown, and at most
 SETTLED = 1e-3  # of the population's spread; the simplex goes on from there
@@ -63,12 +66,16 @@ class SeenFromNodes:
         """Complex amplitudes of the element's force with dampers on some of the nodes, (speed, order)."""
         stiffness = np.zeros((*self.frequency.shape, len(self.nodes)), dtype=complex)
         for damper in dampers:
-            stiffness[..., self.nodes.index(damper.node)] += damper.dynamic_stiffness(self.frequency)
+            stiffness[..., self.nodes.index(damper.node)] += damper.dynamic_stiffness(
+                self.frequency
+            )
         matrix = np.eye(len(self.nodes)) + stiffness[..., :, None] * self.receptance
         torque = -np.linalg.solve(matrix, (stiffness * self.angle)[..., None])[..., 0]
         return np.asarray(self.force + np.sum(self.transfer * torque, axis=-1))
 
-    def largest_force(self, dampers: Sequence[TorsionalDamper], *, n_points: int | None = None) -> Array:
+    def largest_force(
+        self, dampers: Sequence[TorsionalDamper], *, n_points: int | None = None
+    ) -> Array:
         """Largest force of the element over a cycle, whichever way it acts, (speed,) N or N m.
 
         ``n_points`` of the cycle; by default 8 a period of the highest order.
@@ -148,8 +155,12 @@ def tune_dampers(
     """
     from scipy.optimize import differential_evolution, minimize
 
-    if len(most_inertia) != len(seen.nodes) or not all(0.0 < one < math.inf for one in most_inertia):
-        raise ConfigError(f"largest inertias {list(most_inertia)} kg m2: give a positive one for each damper")
+    if len(most_inertia) != len(seen.nodes) or not all(
+        0.0 < one < math.inf for one in most_inertia
+    ):
+        raise ConfigError(
+            f"largest inertias {list(most_inertia)} kg m2: give a positive one for each damper"
+        )
     low, high = float(seen.frequency.min()), float(seen.frequency.max())
     bounds: list[tuple[float, float]] = []
     for most in most_inertia:
@@ -167,9 +178,18 @@ def tune_dampers(
         return float(seen.largest_force(dampers(unknowns)).max())
 
     found = differential_evolution(
-        worst, bounds, popsize=POPULATION, maxiter=GENERATIONS, tol=SETTLED, rng=seed, polish=False, init="sobol"
+        worst,
+        bounds,
+        popsize=POPULATION,
+        maxiter=GENERATIONS,
+        tol=SETTLED,
+        rng=seed,
+        polish=False,
+        init="sobol",
     )
-    nearest = minimize(worst, found.x, method="Nelder-Mead", bounds=bounds, options={"xatol": 1e-4, "fatol": 1e-9})
+    nearest = minimize(
+        worst, found.x, method="Nelder-Mead", bounds=bounds, options={"xatol": 1e-4, "fatol": 1e-9}
+    )
     return dampers(nearest.x if nearest.fun <= found.fun else found.x)
 
 
@@ -177,7 +197,9 @@ def _damper(node: int, row: Array) -> TorsionalDamper:
     """Of inertia and rate, or of inertia, own frequency and damping ratio."""
     inertia, frequency = float(row[0]), float(row[1])
     if len(row) == 2:
-        return TorsionalDamper(node=node, ring_inertia=inertia, damping=inertia * frequency, stiffness=0.0)
+        return TorsionalDamper(
+            node=node, ring_inertia=inertia, damping=inertia * frequency, stiffness=0.0
+        )
     return TorsionalDamper(
         node=node,
         ring_inertia=inertia,

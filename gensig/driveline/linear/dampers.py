@@ -35,11 +35,16 @@ class TorsionalDamper:
     def __post_init__(self) -> None:
         if not 0.0 < self.ring_inertia < math.inf:
             raise ConfigError(f"damper.ring_inertia_kg_m2 = {self.ring_inertia:g} must be positive")
-        for key, value in (("damping_nms_per_rad", self.damping), ("stiffness_nm_per_rad", self.stiffness)):
+        for key, value in (
+            ("damping_nms_per_rad", self.damping),
+            ("stiffness_nm_per_rad", self.stiffness),
+        ):
             if not 0.0 <= value < math.inf:
                 raise ConfigError(f"damper.{key} = {value:g} must not be negative")
         if self.damping == self.stiffness == 0.0:
-            raise ConfigError("damper: without damping and stiffness nothing holds the ring; give one of both")
+            raise ConfigError(
+                "damper: without damping and stiffness nothing holds the ring; give one of both"
+            )
 
     def dynamic_stiffness(self, frequency: NDArray[np.float64]) -> ComplexArray:
         """What it adds to the dynamic stiffness of its node at angular frequencies in rad/s, N m/rad.
@@ -70,7 +75,13 @@ def with_dampers(
         hub = numbers.index(damper.node)
         name = f"Damper ring on {line.nodes[hub].name}"
         shafts.append(
-            Shaft(first=hub, second=len(nodes), stiffness=damper.stiffness, damping=damper.damping, place=name)
+            Shaft(
+                first=hub,
+                second=len(nodes),
+                stiffness=damper.stiffness,
+                damping=damper.damping,
+                place=name,
+            )
         )
         nodes.append(Node(name=name, inertia=damper.ring_inertia))
         known.append(max(known) + 1)

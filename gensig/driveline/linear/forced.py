@@ -45,14 +45,18 @@ class LinearLine:
         for name in ("mass", "stiffness", "loss", "damping"):
             matrix = getattr(self, name)
             if matrix.shape != (n_dof, n_dof) or not np.all(np.isfinite(matrix)):
-                raise ValueError(f"{name} {matrix.shape} must be a finite matrix ({n_dof}, {n_dof})")
+                raise ValueError(
+                    f"{name} {matrix.shape} must be a finite matrix ({n_dof}, {n_dof})"
+                )
             if np.max(np.abs(matrix - matrix.T)) > ASYMMETRIC * np.max(np.abs(matrix)):
                 raise ValueError(f"{name} must be symmetric")
 
     def dynamic_stiffness(self, frequency: Array) -> ComplexArray:
         """K + i H + i w C - w^2 M, (frequency, dof, dof), at angular frequencies (frequency,) rad/s."""
         w = np.asarray(frequency, dtype=float)[:, None, None]
-        return np.asarray(self.stiffness + 1j * (self.loss + w * self.damping) - np.square(w) * self.mass)
+        return np.asarray(
+            self.stiffness + 1j * (self.loss + w * self.damping) - np.square(w) * self.mass
+        )
 
     def response(self, force: ComplexArray, frequency: Array) -> ComplexArray:
         """Complex amplitudes, (frequency, dof), of forces (frequency, dof) at frequencies in rad/s, none of them 0.
@@ -64,7 +68,9 @@ class LinearLine:
         try:
             found = np.linalg.solve(self.dynamic_stiffness(frequency), force[..., None])[..., 0]
         except np.linalg.LinAlgError:
-            raise SimulationError("an undamped line is excited at its natural frequency; give it damping") from None
+            raise SimulationError(
+                "an undamped line is excited at its natural frequency; give it damping"
+            ) from None
         return np.asarray(found)
 
 
@@ -187,7 +193,9 @@ def over_cycle(amplitudes: ComplexArray, n_points: int) -> Array:
     """
     n_orders = amplitudes.shape[-1]
     if n_points <= 2 * n_orders:
-        raise ValueError(f"{n_points} points of a cycle cannot hold {n_orders} orders; more than {2 * n_orders} can")
+        raise ValueError(
+            f"{n_points} points of a cycle cannot hold {n_orders} orders; more than {2 * n_orders} can"
+        )
     spectrum = np.zeros((*amplitudes.shape[:-1], n_points // 2 + 1), dtype=complex)
     spectrum[..., 1 : n_orders + 1] = 0.5 * n_points * amplitudes
     return np.asarray(np.fft.irfft(spectrum, n_points, axis=-1))
@@ -202,12 +210,16 @@ def cycle_orders(torque: Array, n_orders: int) -> tuple[Array, ComplexArray]:
     """
     n_points = torque.shape[-1]
     if not 1 <= n_orders < n_points / 2:
-        raise ValueError(f"n_orders = {n_orders} must lie in 1..{(n_points - 1) // 2}: there are {n_points} points")
+        raise ValueError(
+            f"n_orders = {n_orders} must lie in 1..{(n_points - 1) // 2}: there are {n_points} points"
+        )
     spectrum = np.fft.rfft(torque, axis=-1) / n_points
     return np.asarray(spectrum[..., 0].real), np.asarray(2.0 * spectrum[..., 1 : n_orders + 1])
 
 
-def steady_response(line: LinearLine, torque: Array, speed: float, *, n_orders: int = USUAL_ORDERS) -> SteadyResponse:
+def steady_response(
+    line: LinearLine, torque: Array, speed: float, *, n_orders: int = USUAL_ORDERS
+) -> SteadyResponse:
     """Steady vibration of a line under torques over the cycle.
 
     Parameters
@@ -228,7 +240,9 @@ def steady_response(line: LinearLine, torque: Array, speed: float, *, n_orders: 
     return SteadyResponse(speed=speed, orders=orders, angle=angle, twist=_mean_twist(line, mean))
 
 
-def disturbance_response(line: LinearLine, dof: int, torque: float, frequency: float) -> ComplexArray:
+def disturbance_response(
+    line: LinearLine, dof: int, torque: float, frequency: float
+) -> ComplexArray:
     """Complex amplitudes, (dof,) rad, of a torque (N m) of a frequency (rad/s) of its own on one degree of freedom."""
     force = np.zeros((1, len(line.mass)), dtype=complex)
     force[0, dof] = torque
@@ -252,7 +266,9 @@ class Waterfall:
         step = frequencies[1] - frequencies[0]
         out = np.zeros((len(self.speeds), len(frequencies)))
         for row, speed, amplitudes in zip(out, self.speeds, self.angle, strict=True):
-            bins = np.rint((self.orders * speed / (2.0 * math.pi) - frequencies[0]) / step).astype(int)
+            bins = np.rint((self.orders * speed / (2.0 * math.pi) - frequencies[0]) / step).astype(
+                int
+            )
             inside = (bins >= 0) & (bins < len(frequencies))
             np.maximum.at(row, bins[inside], amplitudes[inside])
         return out
@@ -311,5 +327,7 @@ def _mean_twist(line: LinearLine, mean: Array) -> Array:
     twist = vectors[:, held] @ ((vectors[:, held].T @ mean) / values[held])
     free = vectors[:, ~held]
     if free.size:
-        twist = twist - free @ np.linalg.solve(free.T @ line.mass @ free, free.T @ (line.mass @ twist))
+        twist = twist - free @ np.linalg.solve(
+            free.T @ line.mass @ free, free.T @ (line.mass @ twist)
+        )
     return np.asarray(twist)

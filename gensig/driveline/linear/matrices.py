@@ -50,7 +50,9 @@ class LineMatrices:
     @property
     def whole_stiffness(self) -> Array:
         """Stiffness with every mesh held at its own, (dof, dof)."""
-        return np.asarray(self.stiffness + (self.directions.T * self.mesh_stiffness) @ self.directions)
+        return np.asarray(
+            self.stiffness + (self.directions.T * self.mesh_stiffness) @ self.directions
+        )
 
     @property
     def mesh_mass(self) -> Array:
@@ -58,7 +60,9 @@ class LineMatrices:
         return np.asarray(1.0 / np.sum(self.directions**2 / np.diag(self.mass), axis=1))
 
 
-def line_matrices(line: ShaftLine, *, merge_rigid: bool = True, lateral: bool = False) -> LineMatrices:
+def line_matrices(
+    line: ShaftLine, *, merge_rigid: bool = True, lateral: bool = False
+) -> LineMatrices:
     """Matrices of a line, with its rigid compounds as one disc each or as the stiff springs that they are given as.
 
     Raises
@@ -80,7 +84,11 @@ def line_matrices(line: ShaftLine, *, merge_rigid: bool = True, lateral: bool = 
     for shaft in line.shafts:
         if shaft.stiffness is not None:
             spring = shaft.stiffness
-            for matrix, value in ((stiffness, spring), (loss, shaft.loss_factor * spring), (damping, shaft.damping)):
+            for matrix, value in (
+                (stiffness, spring),
+                (loss, shaft.loss_factor * spring),
+                (damping, shaft.damping),
+            ):
                 _join(matrix, shaft.first, shaft.second, value)
     frames = _frames(line)
     for place in moving:
@@ -88,10 +96,15 @@ def line_matrices(line: ShaftLine, *, merge_rigid: bool = True, lateral: bool = 
         if gear.mass is None or gear.support is None:
             raise ConfigError(f"{gear.name}: its lateral motion needs a mass and a support")
         if min(gear.support.stiffness_x, gear.support.stiffness_y) <= 0.0:
-            raise ConfigError(f"{gear.name}: its support needs stiffness along both axes, else it floats away")
+            raise ConfigError(
+                f"{gear.name}: its support needs stiffness along both axes, else it floats away"
+            )
         own_mass[x : x + 2] = gear.mass
         for axis, (spring, damper) in enumerate(
-            ((gear.support.stiffness_x, gear.support.damping_x), (gear.support.stiffness_y, gear.support.damping_y))
+            (
+                (gear.support.stiffness_x, gear.support.damping_x),
+                (gear.support.stiffness_y, gear.support.damping_y),
+            )
         ):
             stiffness[x + axis, x + axis], damping[x + axis, x + axis] = spring, damper
 
@@ -110,7 +123,10 @@ def line_matrices(line: ShaftLine, *, merge_rigid: bool = True, lateral: bool = 
         rotation[part, list(nodes)] = np.abs(line.speed_ratio[list(nodes)])
     gear_names = [f"{line.gears[place].name} {axis}" for place in moving for axis in "xy"]
     return LineMatrices(
-        names=(*(" + ".join(line.nodes[n].name for n in nodes) for nodes in compounds), *gear_names),
+        names=(
+            *(" + ".join(line.nodes[n].name for n in nodes) for nodes in compounds),
+            *gear_names,
+        ),
         mass=expand.T @ np.diag(own_mass) @ expand,
         damping=expand.T @ damping @ expand,
         stiffness=expand.T @ stiffness @ expand,
@@ -125,7 +141,8 @@ def line_matrices(line: ShaftLine, *, merge_rigid: bool = True, lateral: bool = 
         coordinate_mass=own_mass,
         expand=expand,
         coordinate_node=np.array(
-            [*range(n_nodes), *(line.gears[place].node for place in moving for _ in "xy")], dtype=np.int64
+            [*range(n_nodes), *(line.gears[place].node for place in moving for _ in "xy")],
+            dtype=np.int64,
         ),
     )
 

@@ -13,9 +13,8 @@ from gensig.errors import SimulationError
 
 Array = NDArray[np.float64]
 
-RIGID_SHARE = (
-    1e-7  # of the highest frequency: below it is rounding, since springs are resolved to 1e-16 of the stiffest
-)
+# Of the highest frequency. Below it is rounding: springs are resolved to 1e-16 of the stiffest.
+RIGID_SHARE = 1e-7
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -63,11 +62,14 @@ def natural_modes(matrices: LineMatrices) -> Modes:
     n_rigid = len(matrices.rigid)
     frequency = np.sqrt(np.maximum(square, 0.0)) / (2.0 * math.pi)
     if np.count_nonzero(frequency <= RIGID_SHARE * frequency[-1]) > n_rigid:
-        raise SimulationError("some degree of freedom has no restoring force; check supports and joints")
+        raise SimulationError(
+            "some degree of freedom has no restoring force; check supports and joints"
+        )
     frequency[:n_rigid] = 0.0
     # rotations of the parts do not couple through the mass, so each is a mode of its own
     shapes[:n_rigid] = (
-        matrices.rigid / np.sqrt(np.einsum("rd,de,re->r", matrices.rigid, matrices.mass, matrices.rigid))[:, None]
+        matrices.rigid
+        / np.sqrt(np.einsum("rd,de,re->r", matrices.rigid, matrices.mass, matrices.rigid))[:, None]
     )
     largest = np.take_along_axis(shapes, np.abs(shapes).argmax(axis=1)[:, None], axis=1)
     shapes *= np.where(largest < 0.0, -1.0, 1.0)
@@ -77,7 +79,9 @@ def natural_modes(matrices: LineMatrices) -> Modes:
     elastic = shapes[n_rigid:]
     lost = _quadratic(elastic, matrices.loss_stiffness)
     lost += approach[n_rigid:] ** 2 @ (matrices.mesh_loss_factor * matrices.mesh_stiffness)
-    viscous = _quadratic(elastic, matrices.damping) + approach[n_rigid:] ** 2 @ matrices.mesh_damping
+    viscous = (
+        _quadratic(elastic, matrices.damping) + approach[n_rigid:] ** 2 @ matrices.mesh_damping
+    )
     ratio, strain = np.zeros(len(frequency)), np.zeros(approach.shape)
     ratio[n_rigid:] = 0.5 * lost / omega**2 + 0.5 * viscous / omega
     strain[n_rigid:] = approach[n_rigid:] ** 2 * matrices.mesh_stiffness / omega[:, None] ** 2
@@ -98,7 +102,9 @@ def with_viscous_losses(matrices: LineMatrices) -> LineMatrices:
     rigid motion none. Meshes: c = eta sqrt(k m) with the mass that the mesh accelerates, the ratio eta / 2 of the pair
     on its own, since a mesh loses contact and its damper with it.
     """
-    modes = natural_modes(replace(matrices, mesh_loss_factor=np.zeros_like(matrices.mesh_stiffness)))
+    modes = natural_modes(
+        replace(matrices, mesh_loss_factor=np.zeros_like(matrices.mesh_stiffness))
+    )
     omega = 2.0 * math.pi * modes.frequency
     rate = np.zeros(len(omega))
     elastic = omega > 0.0

@@ -31,7 +31,9 @@ class Node:
 
     def __post_init__(self) -> None:
         if not 0.0 < self.inertia < math.inf:
-            raise ConfigError(f"{self.place or self.name}: inertia {self.inertia:g} kg m2 must be positive")
+            raise ConfigError(
+                f"{self.place or self.name}: inertia {self.inertia:g} kg m2 must be positive"
+            )
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -76,7 +78,9 @@ class LineGear:
 
     def __post_init__(self) -> None:
         if self.n_teeth < 1 or not 0.0 < self.base_radius < math.inf:
-            raise ConfigError(f"{self.name}: teeth ({self.n_teeth}) and base radius must be positive")
+            raise ConfigError(
+                f"{self.name}: teeth ({self.n_teeth}) and base radius must be positive"
+            )
         if self.mass is not None and not 0.0 < self.mass < math.inf:
             raise ConfigError(f"{self.name}: mass {self.mass:g} kg must be positive")
 
@@ -133,15 +137,23 @@ class ShaftLine:
         if not self.nodes:
             raise ConfigError("a shaft line needs at least one node")
         for shaft in self.shafts:
-            self._check_places(shaft.place or "a shaft", (shaft.first, shaft.second), len(self.nodes), "node")
+            self._check_places(
+                shaft.place or "a shaft", (shaft.first, shaft.second), len(self.nodes), "node"
+            )
         for gear in self.gears:
             self._check_places(gear.name, (gear.node,), len(self.nodes), "node")
         for mesh in self.meshes:
-            self._check_places(mesh.place or "a mesh", (mesh.driving, mesh.driven), len(self.gears), "gear")
+            self._check_places(
+                mesh.place or "a mesh", (mesh.driving, mesh.driven), len(self.gears), "gear"
+            )
             one, other = self.gears[mesh.driving], self.gears[mesh.driven]
             if one.node == other.node:
-                raise ConfigError(f"{mesh.place or 'a mesh'}: {one.name} and {other.name} turn with the same node")
-            if not math.isclose(one.base_radius * other.n_teeth, other.base_radius * one.n_teeth, rel_tol=1e-9):
+                raise ConfigError(
+                    f"{mesh.place or 'a mesh'}: {one.name} and {other.name} turn with the same node"
+                )
+            if not math.isclose(
+                one.base_radius * other.n_teeth, other.base_radius * one.n_teeth, rel_tol=1e-9
+            ):
                 raise ConfigError(
                     f"{mesh.place or 'a mesh'}: the base radii of {one.name} and {other.name} are not as their teeth, "
                     f"{one.n_teeth} and {other.n_teeth}; they have another module, pressure angle or helix angle"
@@ -197,7 +209,9 @@ class ShaftLine:
     def parts(self) -> tuple[tuple[int, ...], ...]:
         """Nodes of each part of the line that nothing joins to the others; a free line has a rigid mode for each."""
         part = self._turning[1]
-        return tuple(tuple(n for n, own in enumerate(part) if own == one) for one in range(max(part) + 1))
+        return tuple(
+            tuple(n for n, own in enumerate(part) if own == one) for one in range(max(part) + 1)
+        )
 
     @property
     def elastic_parts(self) -> tuple[tuple[int, ...], ...]:
@@ -207,11 +221,15 @@ class ShaftLine:
         """
         leader = list(range(len(self.nodes)))
         joints = [(shaft.first, shaft.second) for shaft in self.shafts if shaft.stiffness != 0.0]
-        joints += [(self.gears[mesh.driving].node, self.gears[mesh.driven].node) for mesh in self.meshes]
+        joints += [
+            (self.gears[mesh.driving].node, self.gears[mesh.driven].node) for mesh in self.meshes
+        ]
         for first, second in joints:
             one, other = sorted((leader[first], leader[second]))
             leader = [one if own == other else own for own in leader]
-        return tuple(tuple(n for n, own in enumerate(leader) if own == one) for one in sorted(set(leader)))
+        return tuple(
+            tuple(n for n, own in enumerate(leader) if own == one) for one in sorted(set(leader))
+        )
 
     @property
     def n_loops(self) -> int:
@@ -225,4 +243,6 @@ class ShaftLine:
             if shaft.stiffness is None or (merge_rigid and shaft.rigid):
                 one, other = sorted((leader[shaft.first], leader[shaft.second]))
                 leader = [one if own == other else own for own in leader]
-        return tuple(tuple(n for n, own in enumerate(leader) if own == one) for one in sorted(set(leader)))
+        return tuple(
+            tuple(n for n, own in enumerate(leader) if own == one) for one in sorted(set(leader))
+        )

@@ -16,7 +16,10 @@ from gensig.dynamics._vector import compiled
 
 MOST_ROUNDS = 60
 UNDAMPED = 20  # rounds of Newton's method after which every step is halved
-SETTLED, SETTLED_LEAST = 1e-9, 1e-13  # of an approach, and m: what forces and approaches may disagree by
+SETTLED, SETTLED_LEAST = (
+    1e-9,
+    1e-13,
+)  # of an approach, and m: what forces and approaches may disagree by
 ROUNDED = 1e-14  # of what forces take off an approach
 
 
@@ -74,13 +77,16 @@ def gather(meshes, mesh, flank, turned, within, pairs):
         between(meshes.table, low, high, x - cell, sense * n_nodes, here[layout.GAP :])
         if flank == DRIVE:
             here[layout.GAP] += (
-                meshes.error[place[layout.AT_ERROR_A] + tooth_a] + meshes.error[place[layout.AT_ERROR_B] + tooth_b]
+                meshes.error[place[layout.AT_ERROR_A] + tooth_a]
+                + meshes.error[place[layout.AT_ERROR_B] + tooth_b]
             )
         for spring in range(n_springs):
             if here[layout.GAP] + meshes.depth[at_depth + spring] > reach:
                 break
             column = spring_column(spring)
-            between(meshes.table, low + column, high + column, x - cell, sense * n_nodes, here[column:])
+            between(
+                meshes.table, low + column, high + column, x - cell, sense * n_nodes, here[column:]
+            )
     return reach
 
 
@@ -151,7 +157,11 @@ def mesh_law(meshes, mesh, turned, roll_rate, approach, rate, law, work):
     for flank in range(layout.N_FLANKS):
         within, least, sense = approach, number[layout.LEAST_GAP], 1.0
         if flank == COAST:
-            within, least, sense = -approach - number[layout.BACKLASH], number[layout.LEAST_COAST_GAP], -1.0
+            within, least, sense = (
+                -approach - number[layout.BACKLASH],
+                number[layout.LEAST_COAST_GAP],
+                -1.0,
+            )
         if not within > least:
             continue
         if not within <= work.reach[mesh, flank]:
@@ -192,7 +202,18 @@ def eliminate(matrix, right):
 
 @compiled
 def solve_contact(
-    meshes, compliance, free, carried, turned, roll_rate, before, rate_before, per_step, approach, law, work
+    meshes,
+    compliance,
+    free,
+    carried,
+    turned,
+    roll_rate,
+    before,
+    rate_before,
+    per_step,
+    approach,
+    law,
+    work,
 ):
     """Approaches and forces of all meshes with delta = free - W (F(delta) - carried), by a semi-smooth Newton method.
 
@@ -221,7 +242,9 @@ def solve_contact(
             off, most = free[m] - approach[m], 0.0
             for k in range(n):
                 off -= compliance[m, k] * (law[k, layout.FORCE] - carried[k, layout.FORCE])
-                most += abs(compliance[m, k]) * (abs(law[k, layout.FORCE]) + abs(carried[k, layout.FORCE]))
+                most += abs(compliance[m, k]) * (
+                    abs(law[k, layout.FORCE]) + abs(carried[k, layout.FORCE])
+                )
             right[m] = off
             if not abs(off) < np.inf:
                 return -1

@@ -15,7 +15,10 @@ from gensig.dynamics._vector import compiled
 
 ANGLE, SPEED, ACCELERATION, MESH_FORCE = range(4)  # kinds of channels
 MOST_PUSHES = 20000  # a soft drive of 0.05 Hz takes half of them
-AT_REST, NEARLY = 1e-10, 1e-5  # of the largest deviation; below the latter, what no longer shrinks is rounding
+AT_REST, NEARLY = (
+    1e-10,
+    1e-5,
+)  # of the largest deviation; below the latter, what no longer shrinks is rounding
 
 
 @compiled
@@ -46,7 +49,9 @@ def add_full(matrix, share, x, out):
     for j in range(0, n - n % 4, 4):  # four rows at once share what they read and write of ``out``
         p, q, r, s = share * x[j], share * x[j + 1], share * x[j + 2], share * x[j + 3]
         for i in range(n):
-            out[i] += (p * matrix[j, i] + q * matrix[j + 1, i]) + (r * matrix[j + 2, i] + s * matrix[j + 3, i])
+            out[i] += (p * matrix[j, i] + q * matrix[j + 1, i]) + (
+                r * matrix[j + 2, i] + s * matrix[j + 3, i]
+            )
     for j in range(n - n % 4, n):
         for i in range(n):
             out[i] += share * x[j] * matrix[j, i]
@@ -138,7 +143,13 @@ def nominal(course, time, knot):
     elif knot + 1 < len(course.time):
         share = since / (course.time[knot + 1] - course.time[knot])
     speed = course.speed[knot]
-    return course.angle[knot] + (speed + 0.5 * gain * since) * since, speed + gain * since, gain, knot, share
+    return (
+        course.angle[knot] + (speed + 0.5 * gain * since) * since,
+        speed + gain * since,
+        gain,
+        knot,
+        share,
+    )
 
 
 @compiled
@@ -187,7 +198,21 @@ def look(line, meshes, torques, course, time, state, work):
 
 
 @compiled
-def advance(line, meshes, torques, course, state, step, first_step, n_steps, channels, out, tally, sums, work):
+def advance(
+    line,
+    meshes,
+    torques,
+    course,
+    state,
+    step,
+    first_step,
+    n_steps,
+    channels,
+    out,
+    tally,
+    sums,
+    work,
+):
     """Advance a line by ``n_steps`` from time ``first_step`` * ``step`` on.
 
     Parameters
@@ -206,7 +231,13 @@ def advance(line, meshes, torques, course, state, step, first_step, n_steps, cha
     q, v, mean, force, approach, rate, law = state
     n, n_meshes = len(q), len(law)
     ahead_q, ahead_v, moved, force_1 = work.ahead_q, work.ahead_v, work.moved, work.force
-    turned, roll_rate, free, approach_1, law_1 = work.turned, work.roll_rate, work.free, work.approach, work.law
+    turned, roll_rate, free, approach_1, law_1 = (
+        work.turned,
+        work.roll_rate,
+        work.free,
+        work.approach,
+        work.law,
+    )
     per_step, half = NEWMARK.damping / step, 0.5 * step
     angle, speed, gain, knot, share = nominal(course, first_step * step, 0)
     for place in range(first_step, first_step + n_steps):
@@ -227,14 +258,29 @@ def advance(line, meshes, torques, course, state, step, first_step, n_steps, cha
             rate_1 = per_step * (approach_1[m] - approach[m]) - rate[m]
             mesh_law(meshes, m, turned[m], roll_rate[m], approach_1[m], rate_1, law_1, work)
             along = law[m, layout.ALONG] + law_1[m, layout.ALONG]
-            moved[meshes.place[m, layout.ROLL_DOF]] += along * meshes.number[m, layout.PITCHES_PER_RAD]
+            moved[meshes.place[m, layout.ROLL_DOF]] += (
+                along * meshes.number[m, layout.PITCHES_PER_RAD]
+            )
             for p in range(line.direction.first[m], line.direction.first[m + 1]):
-                moved[line.direction.column[p]] -= 2.0 * law[m, layout.FORCE] * line.direction.value[p]
+                moved[line.direction.column[p]] -= (
+                    2.0 * law[m, layout.FORCE] * line.direction.value[p]
+                )
         solve(line.factor, moved)
         for m in range(n_meshes):
             free[m] = approach[m] + row_product(line.direction, m, moved)
         rounds = solve_contact(
-            meshes, line.compliance, free, law, turned, roll_rate, approach, rate, per_step, approach_1, law_1, work
+            meshes,
+            line.compliance,
+            free,
+            law,
+            turned,
+            roll_rate,
+            approach,
+            rate,
+            per_step,
+            approach_1,
+            law_1,
+            work,
         )
         if rounds < 0:
             return place
@@ -268,7 +314,10 @@ def advance(line, meshes, torques, course, state, step, first_step, n_steps, cha
             force[i] = force_1[i]
         passing = 0.0
         for m in range(n_meshes):
-            approach[m], rate[m] = row_product(line.direction, m, q), row_product(line.direction, m, v)
+            approach[m], rate[m] = (
+                row_product(line.direction, m, q),
+                row_product(line.direction, m, v),
+            )
             lost += half * (law[m, layout.LOST] + law_1[m, layout.LOST])
             carried = speed_0 * law[m, layout.ALONG] + speed * law_1[m, layout.ALONG]
             passing -= half * meshes.number[m, layout.NOMINAL_PITCHES] * carried
@@ -299,7 +348,13 @@ def rest(line, meshes, force, angle, q, law, work):
     rounds, or -1 where it does not come to rest
     """
     n, n_meshes = len(q), len(law)
-    moved, still, turned, idle, resting = work.moved, work.ahead_v, work.turned, work.roll_rate, work.rate
+    moved, still, turned, idle, resting = (
+        work.moved,
+        work.ahead_v,
+        work.turned,
+        work.roll_rate,
+        work.rate,
+    )
     before, free, approach, law_1 = work.before, work.free, work.approach, work.law
     still[:] = 0.0
     resting[:] = 0.0
@@ -320,7 +375,18 @@ def rest(line, meshes, force, angle, q, law, work):
         for m in range(n_meshes):
             free[m] = before[m] + row_product(line.direction, m, moved)
         rounds = solve_contact(
-            meshes, line.compliance, free, law, turned, resting, before, resting, 0.0, approach, law_1, work
+            meshes,
+            line.compliance,
+            free,
+            law,
+            turned,
+            resting,
+            before,
+            resting,
+            0.0,
+            approach,
+            law_1,
+            work,
         )
         if rounds < 0:
             return -1

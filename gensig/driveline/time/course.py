@@ -27,7 +27,9 @@ class LineCourse:
 
     def __post_init__(self) -> None:
         if self.time.ndim != 1 or self.time.shape != self.speed.shape or len(self.time) < 1:
-            raise ConfigError(f"course: time {self.time.shape} and speed {self.speed.shape} must be alike, (knot,)")
+            raise ConfigError(
+                f"course: time {self.time.shape} and speed {self.speed.shape} must be alike, (knot,)"
+            )
         if not np.isfinite(self.time).all() or np.any(np.diff(self.time) <= 0.0):
             raise ConfigError("course: the times of its knots must increase")
         if not np.isfinite(self.speed).all() or self.speed.min() < 0.0:
@@ -73,11 +75,17 @@ class ShaftTorque:
 
     def __post_init__(self) -> None:
         if self.table.ndim != 1 or len(self.table) < 1 or not np.isfinite(self.table).all():
-            raise ConfigError(f"torque on degree of freedom {self.dof}: its table must be finite numbers, (node,)")
+            raise ConfigError(
+                f"torque on degree of freedom {self.dof}: its table must be finite numbers, (node,)"
+            )
         if not 0.0 < self.period < np.inf:
-            raise ConfigError(f"torque on degree of freedom {self.dof}: period {self.period:g} rad must be positive")
+            raise ConfigError(
+                f"torque on degree of freedom {self.dof}: period {self.period:g} rad must be positive"
+            )
         if self.factor is not None and not np.isfinite(self.factor).all():
-            raise ConfigError(f"torque on degree of freedom {self.dof}: its factors must be finite numbers")
+            raise ConfigError(
+                f"torque on degree of freedom {self.dof}: its factors must be finite numbers"
+            )
 
 
 def _at(course: Course, times: Array) -> tuple[Array, Array]:

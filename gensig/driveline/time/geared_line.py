@@ -42,27 +42,45 @@ class GearedLine:
 
     def __post_init__(self) -> None:
         n = len(self.names)
-        for matrix, what in ((self.mass, "mass"), (self.damping, "damping"), (self.stiffness, "stiffness")):
+        for matrix, what in (
+            (self.mass, "mass"),
+            (self.damping, "damping"),
+            (self.stiffness, "stiffness"),
+        ):
             if matrix.shape != (n, n) or not np.isfinite(matrix).all():
-                raise ConfigError(f"line: the {what} matrix {matrix.shape} must be ({n}, {n}), all finite")
+                raise ConfigError(
+                    f"line: the {what} matrix {matrix.shape} must be ({n}, {n}), all finite"
+                )
             if not np.allclose(matrix, matrix.T, rtol=SYMMETRIC, atol=0.0):
                 raise SimulationError(f"line: the {what} matrix is not symmetric")
             least = float(np.linalg.eigvalsh(matrix).min())
             if least < -SYMMETRIC * float(np.abs(matrix).max()):
-                raise SimulationError(f"line: the {what} matrix would feed energy in; check the signs of its entries")
+                raise SimulationError(
+                    f"line: the {what} matrix would feed energy in; check the signs of its entries"
+                )
         lightest = int(np.argmin(np.diag(self.mass)))
         if not np.linalg.eigvalsh(self.mass).min() > 0.0:
-            raise SimulationError(f"line: the mass or inertia of '{self.names[lightest]}' must be positive")
+            raise SimulationError(
+                f"line: the mass or inertia of '{self.names[lightest]}' must be positive"
+            )
         if self.rotation.shape != (n,) or not np.isfinite(self.rotation).all():
-            raise ConfigError(f"line: rotation {self.rotation.shape} must be ({n},), one a degree of freedom")
+            raise ConfigError(
+                f"line: rotation {self.rotation.shape} must be ({n},), one a degree of freedom"
+            )
         for mesh in self.meshes:
             self._check_mesh(mesh)
 
     def _check_mesh(self, mesh: LineMesh) -> None:
         n = len(self.names)
         if mesh.direction.shape != (n,) or not np.isfinite(mesh.direction).all():
-            raise ConfigError(f"mesh '{mesh.name}': direction {mesh.direction.shape} must be ({n},), one a freedom")
-        if not 0 <= mesh.roll_dof < n or self.rotation[mesh.roll_dof] == 0.0 or mesh.direction[mesh.roll_dof] == 0.0:
+            raise ConfigError(
+                f"mesh '{mesh.name}': direction {mesh.direction.shape} must be ({n},), one a freedom"
+            )
+        if (
+            not 0 <= mesh.roll_dof < n
+            or self.rotation[mesh.roll_dof] == 0.0
+            or mesh.direction[mesh.roll_dof] == 0.0
+        ):
             raise ConfigError(
                 f"mesh '{mesh.name}': roll_dof {mesh.roll_dof} must be the rotation of its gear a, in 0..{n - 1}"
             )
@@ -74,15 +92,22 @@ class GearedLine:
             )
 
 
-def pack_line(line: GearedLine, order: Index, mass_share: float, damping_share: float, step: str) -> Line:
+def pack_line(
+    line: GearedLine, order: Index, mass_share: float, damping_share: float, step: str
+) -> Line:
     """The line with its degrees of freedom in ``order``, and the factor of mass_share M + damping_share C + K."""
     mass, damping, stiffness = (
-        np.ascontiguousarray(part[np.ix_(order, order)]) for part in (line.mass, line.damping, line.stiffness)
+        np.ascontiguousarray(part[np.ix_(order, order)])
+        for part in (line.mass, line.damping, line.stiffness)
     )
     direction = _direction(line, order)
     answer, compliance = np.empty(direction.shape), np.empty((len(direction), len(direction)))
     rows = _rows(direction)
-    factor = _factor(mass_share * mass + damping_share * damping + stiffness, [line.names[i] for i in order], step)
+    factor = _factor(
+        mass_share * mass + damping_share * damping + stiffness,
+        [line.names[i] for i in order],
+        step,
+    )
     kernels.respond(factor, rows, answer, compliance)
     rotation = line.rotation[order]
     sparse_mass, carried = _padded(mass), np.zeros(len(order))
@@ -113,7 +138,9 @@ def pack_meshes(line: GearedLine, order: Index) -> Meshes:
     """All meshes of the line, its degrees of freedom in ``order``."""
     number = np.zeros((len(line.meshes), layout.N_NUMBERS))
     place = np.zeros((len(line.meshes), layout.N_PLACES), dtype=np.int64)
-    parts: dict[str, list[NDArray]] = {name: [] for name in ("table", "depth", "rows", "kind", "error")}
+    parts: dict[str, list[NDArray]] = {
+        name: [] for name in ("table", "depth", "rows", "kind", "error")
+    }
     at_of = np.argsort(order)
 
     def put(name: str, values: NDArray) -> int:
@@ -173,7 +200,9 @@ def _slopes(values: Array, limit: float) -> Array:
     return np.concatenate([chord[:, :1], np.where(is_smooth, mean, limited), chord[:, -1:]], axis=1)
 
 
-def pack_torques(line: GearedLine, order: Index, torques: Sequence[ShaftTorque], course: LineCourse) -> Torques:
+def pack_torques(
+    line: GearedLine, order: Index, torques: Sequence[ShaftTorque], course: LineCourse
+) -> Torques:
     """All torques, the degrees of freedom of the line in ``order``."""
     at_of, n_knots, n = np.argsort(order), len(course.time), len(line.names)
     factor = np.ones((len(torques), n_knots))
@@ -183,10 +212,14 @@ def pack_torques(line: GearedLine, order: Index, torques: Sequence[ShaftTorque],
             raise ConfigError(f"torque {j}: degree of freedom {torque.dof} must lie in 0..{n - 1}")
         told, turning = f"torque on '{line.names[torque.dof]}'", float(line.rotation[torque.dof])
         if len(torque.table) > 1 and turning == 0.0:
-            raise ConfigError(f"{told}: a table over its angle needs a degree of freedom that turns; give one number")
+            raise ConfigError(
+                f"{told}: a table over its angle needs a degree of freedom that turns; give one number"
+            )
         if torque.factor is not None:
             if torque.factor.shape != (n_knots,):
-                raise ConfigError(f"{told}: factor {torque.factor.shape} must be ({n_knots},), the course's knots")
+                raise ConfigError(
+                    f"{told}: factor {torque.factor.shape} must be ({n_knots},), the course's knots"
+                )
             factor[j] = torque.factor
         sense = -1.0 if turning < 0.0 else 1.0
         factor[j] *= sense
@@ -195,7 +228,9 @@ def pack_torques(line: GearedLine, order: Index, torques: Sequence[ShaftTorque],
     return Torques(
         dof=np.array([at_of[torque.dof] for torque in torques], dtype=np.int64),
         first=np.cumsum([0, *[len(torque.table) for torque in torques]], dtype=np.int64),
-        table=np.concatenate([*[torque.table for torque in torques], np.empty(0)]).astype(np.float64),
+        table=np.concatenate([*[torque.table for torque in torques], np.empty(0)]).astype(
+            np.float64
+        ),
         per_rad=per_rad,
         shift=shift,
         factor=factor,
@@ -221,7 +256,9 @@ def _padded(matrix: Array) -> Padded:
     width = max(1, int(filled.sum(axis=1).max()))
     if width > FULL * len(matrix):
         return Padded(column=np.empty((0, len(matrix)), dtype=np.int64), value=matrix)
-    column = np.ascontiguousarray(np.argsort(~filled, axis=1, kind="stable")[:, :width].T).astype(np.int64)
+    column = np.ascontiguousarray(np.argsort(~filled, axis=1, kind="stable")[:, :width].T).astype(
+        np.int64
+    )
     return Padded(column=column, value=np.take_along_axis(matrix.T, column, axis=0))
 
 
@@ -230,12 +267,16 @@ def _factor(matrix: Array, names: Sequence[str], step: str) -> Factor:
     reach = np.arange(n) - np.argmax(matrix != 0.0, axis=1)
     first = np.concatenate([[0], np.cumsum(reach)[:-1]]).astype(np.int64)
     lower, inverse_pivot = np.zeros(int(reach.sum())), np.zeros(n)
-    waits = np.zeros(n, dtype=np.int64)  # how many rows must be solved one after the other before a row
+    waits = np.zeros(
+        n, dtype=np.int64
+    )  # how many rows must be solved one after the other before a row
     for i in range(n):
         waits[i] = 1 + waits[i - reach[i] : i].max(initial=-1)
     failed = kernels.factorize(matrix, first, reach.astype(np.int64), lower, inverse_pivot)
     if failed >= 0:
-        raise SimulationError(f"line: no positive pivot at '{names[failed]}' {step}; check its inertia and springs")
+        raise SimulationError(
+            f"line: no positive pivot at '{names[failed]}' {step}; check its inertia and springs"
+        )
     factor = Factor(
         first=first,
         reach=reach.astype(np.int64),

@@ -60,7 +60,10 @@ class LineMesh:
         told = f"mesh '{self.name}'"
         if not len(self.depth) or self.depth[0] != 0.0 or not np.all(np.diff(self.depth) > 0.0):
             raise ConfigError(f"{told}: depth {self.depth} must begin at 0 and grow")
-        if self.stiffness.ndim != 2 or self.stiffness.shape != (len(self.gap) * len(self.depth), *self.gap.shape[1:]):
+        if self.stiffness.ndim != 2 or self.stiffness.shape != (
+            len(self.gap) * len(self.depth),
+            *self.gap.shape[1:],
+        ):
             raise ConfigError(
                 f"{told}: stiffness {self.stiffness.shape} and gap {self.gap.shape} must be alike, (row, node), with "
                 f"{len(self.depth)} springs a row"
@@ -73,16 +76,29 @@ class LineMesh:
             )
         for values, what in ((self.stiffness, "stiffness"), (self.gap, "gap")):
             if not np.isfinite(values).all():
-                raise ConfigError(f"{told}: {what} is not finite; a pair that never touches is row -1")
+                raise ConfigError(
+                    f"{told}: {what} is not finite; a pair that never touches is row -1"
+                )
         if self.stiffness.min() < 0.0:
-            raise ConfigError(f"{told}: stiffness {self.stiffness.min():g} N/m must not be negative")
+            raise ConfigError(
+                f"{told}: stiffness {self.stiffness.min():g} N/m must not be negative"
+            )
         counts = tuple(int(kind.max()) + 1 for kind in self.kinds)
         for rows, what in ((self.rows, "rows"), (self.coast_rows, "coast_rows")):
-            if rows.shape[0] < counts[0] or rows.shape[1] < counts[1] or rows.min() < -1 or rows.max() >= n_rows:
-                raise ConfigError(f"{told}: {what} {rows.shape} must name rows -1..{n_rows - 1} for {counts} kinds")
+            if (
+                rows.shape[0] < counts[0]
+                or rows.shape[1] < counts[1]
+                or rows.min() < -1
+                or rows.max() >= n_rows
+            ):
+                raise ConfigError(
+                    f"{told}: {what} {rows.shape} must name rows -1..{n_rows - 1} for {counts} kinds"
+                )
         for kind, error, start in zip(self.kinds, self.errors, self.start_teeth, strict=True):
             if len(kind) != len(error) or kind.min() < 0 or not np.isfinite(error).all():
-                raise ConfigError(f"{told}: {len(kind)} teeth need as many kinds, and finite errors, not {len(error)}")
+                raise ConfigError(
+                    f"{told}: {len(kind)} teeth need as many kinds, and finite errors, not {len(error)}"
+                )
             if not 0 <= start < len(kind):
                 raise ConfigError(f"{told}: start tooth {start} must lie in 0..{len(kind) - 1}")
         for key in ("backlash", "damping", "shared_compliance"):
@@ -126,7 +142,9 @@ def phase_mesh(
         )
     n_rows = len(stiffness)
     # the mesh has rolled u = i + s where row i is at s, and the next row begins where it ends
-    closed, closed_gap = (np.hstack([part, np.roll(part[:, :1], -1, axis=0)]) for part in (stiffness, gaps))
+    closed, closed_gap = (
+        np.hstack([part, np.roll(part[:, :1], -1, axis=0)]) for part in (stiffness, gaps)
+    )
     kinds = np.arange(n_teeth[0]) % n_rows, np.zeros(n_teeth[1], dtype=np.int64)
     rows = np.arange(n_rows)[:, None]
     # the mirrored roll reads every row backwards, one tooth further on, for it begins there where the row ends
@@ -205,7 +223,12 @@ def pair_mesh(
 
 
 def mesh_start(
-    n_teeth: int, *, mate_angle: float, drives: bool, tooth_angle: float = 0.0, pitch_point: float = 0.0
+    n_teeth: int,
+    *,
+    mate_angle: float,
+    drives: bool,
+    tooth_angle: float = 0.0,
+    pitch_point: float = 0.0,
 ) -> tuple[int, float]:
     """Start tooth and start phase of a gear's mesh with a mate at an angle, so that its meshes agree with each other.
 
@@ -234,7 +257,12 @@ def mesh_start(
 
 
 def tooth_angle(
-    n_teeth: int, *, mate_angle: float, drives: bool, start: tuple[int, float], pitch_point: float = 0.0
+    n_teeth: int,
+    *,
+    mate_angle: float,
+    drives: bool,
+    start: tuple[int, float],
+    pitch_point: float = 0.0,
 ) -> float:
     """Where the middle of a gear's tooth 0 stands if one of its meshes begins as ``start`` says, rad.
 

@@ -33,7 +33,9 @@ KINDS = ("angle", "speed", "acceleration", "mesh_force")
 BLOCK = 512  # output samples that are integrated between two passes of the low-pass
 OUT_OF_BOUNDS = 1e6  # m, rad, m/s or rad/s
 LONGEST_STEP = 0.25  # pitches that a mesh may roll in a step
-STILL = (2.0 * math.pi) ** 2  # 1/s2, below elastic modes but not so far that rounding moves a free line
+STILL = (
+    2.0 * math.pi
+) ** 2  # 1/s2, below elastic modes but not so far that rounding moves a free line
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -49,11 +51,15 @@ class LineSolver:
 
     def __post_init__(self) -> None:
         if not 0.0 < self.sampling_rate < math.inf:
-            raise ConfigError(f"line solver: sampling rate {self.sampling_rate:g} Hz must be positive")
+            raise ConfigError(
+                f"line solver: sampling rate {self.sampling_rate:g} Hz must be positive"
+            )
         if not 2 <= self.oversampling <= 256:
             raise ConfigError(f"line solver: oversampling {self.oversampling} must lie in 2..256")
         if not 0.0 < self.max_energy_residual <= 1.0:
-            raise ConfigError(f"line solver: max_energy_residual {self.max_energy_residual:g} must lie in 0..1")
+            raise ConfigError(
+                f"line solver: max_energy_residual {self.max_energy_residual:g} must lie in 0..1"
+            )
 
     @property
     def step(self) -> float:
@@ -120,14 +126,21 @@ def integrate_line(
     _check_channels(line, channels)
     n_samples = round(duration * solver.sampling_rate)
     if n_samples < 1 or not 0.0 <= lead_in < math.inf:
-        raise ConfigError(f"line: duration {duration:g} s and lead-in {lead_in:g} s hold no sample, or no start")
-    if start is not None and any(part.shape != (n,) or not np.isfinite(part).all() for part in start):
+        raise ConfigError(
+            f"line: duration {duration:g} s and lead-in {lead_in:g} s hold no sample, or no start"
+        )
+    if start is not None and any(
+        part.shape != (n,) or not np.isfinite(part).all() for part in start
+    ):
         raise ConfigError(f"line: start must be finite deviations and rates, ({n},) each")
     step, low_pass = solver.step, decimator(solver.oversampling)
     _check_step(line, course, step)
     first_sample = -max(low_pass.margin + 1, math.ceil(lead_in * solver.sampling_rate))
     if start is None:
-        start = static_start(line, course, torques, time=first_sample / solver.sampling_rate), np.zeros(n)
+        start = (
+            static_start(line, course, torques, time=first_sample / solver.sampling_rate),
+            np.zeros(n),
+        )
     run = _Run(line, course, torques, solver, start, channels)
     run.begin(first_sample * solver.oversampling)
     run.skip((-low_pass.margin - first_sample) * solver.oversampling - 1)
@@ -149,7 +162,9 @@ def _told_above(value: float, limit: float) -> str:
     return next((text for text in texts if float(text) > limit), f"{value:.3g}")
 
 
-def static_start(line: GearedLine, course: LineCourse, torques: Sequence[ShaftTorque], *, time: float = 0.0) -> Array:
+def static_start(
+    line: GearedLine, course: LineCourse, torques: Sequence[ShaftTorque], *, time: float = 0.0
+) -> Array:
     """Deviations at which the line turns without vibrating under its mean torques at a time, (dof,).
 
     Torques over an angle act with the mean of their tables. What they do not balance accelerates a free line as one
@@ -168,7 +183,9 @@ def static_start(line: GearedLine, course: LineCourse, torques: Sequence[ShaftTo
     q, force = np.zeros((2, len(order)))
     kernels.push(still, pushed, angle, gain, knot, share, q, force)
     free = line.rotation @ line.stiffness @ line.rotation
-    if free <= 1e-12 * float(np.abs(line.rotation) @ np.abs(line.stiffness) @ np.abs(line.rotation)):
+    if free <= 1e-12 * float(
+        np.abs(line.rotation) @ np.abs(line.stiffness) @ np.abs(line.rotation)
+    ):
         force -= still.carried * (force @ still.rotation) / (still.carried @ still.rotation)
     law = np.zeros((len(line.meshes), layout.N_LAW))
     if kernels.rest(still, meshes, force, angle, q, law, _scratch(line)) < 0:
@@ -190,7 +207,12 @@ class _Run:
         start: tuple[Array, Array],
         channels: Sequence[tuple[str, int]],
     ) -> None:
-        self.line, self.course, self.solver, self.channels = line, course.knots, solver, tuple(channels)
+        self.line, self.course, self.solver, self.channels = (
+            line,
+            course.knots,
+            solver,
+            tuple(channels),
+        )
         self.order = elimination_order(line)
         at_of, step = np.argsort(self.order), solver.step
         self.packed = pack_line(
@@ -210,7 +232,8 @@ class _Run:
         self.tally = np.zeros((len(line.meshes), layout.N_TALLY))
         self.sums = np.zeros(layout.N_SUMS)
         self.chosen = np.array(
-            [(KINDS.index(kind), i if kind == "mesh_force" else at_of[i]) for kind, i in channels], dtype=np.int64
+            [(KINDS.index(kind), i if kind == "mesh_force" else at_of[i]) for kind, i in channels],
+            dtype=np.int64,
         ).reshape(-1, 2)
         self.place, self.n_steps, self.energy = 0, 0, 0.0
 
@@ -218,7 +241,9 @@ class _Run:
         """Look at the start, ``place`` steps from time 0."""
         self.place = place
         time = place * self.solver.step
-        kernels.look(self.packed, self.meshes, self.torques, self.course, time, self.state, self.work)
+        kernels.look(
+            self.packed, self.meshes, self.torques, self.course, time, self.state, self.work
+        )
         self.energy = self._energy()
 
     def _energy(self) -> float:
@@ -276,7 +301,10 @@ class _Run:
         residual = into - self.sums[layout.DISSIPATED] - (self._energy() - self.energy)
         at_of = np.argsort(self.order)
         return LineMotion(
-            signals={channel: np.ascontiguousarray(s) for channel, s in zip(self.channels, signals, strict=True)},
+            signals={
+                channel: np.ascontiguousarray(s)
+                for channel, s in zip(self.channels, signals, strict=True)
+            },
             nominal_angle=angle,
             nominal_speed=speed,
             energy_residual=abs(residual) / throughput if throughput > 0.0 else 0.0,
@@ -293,7 +321,9 @@ class _Run:
 def _scratch(line: GearedLine) -> Work:
     n, m = len(line.names), len(line.meshes)
     most = max([1, *[mesh.n_pairs for mesh in line.meshes]])
-    n_columns = layout.STIFFNESS + layout.PER_SPRING * max([1, *[len(mesh.depth) for mesh in line.meshes]])
+    n_columns = layout.STIFFNESS + layout.PER_SPRING * max(
+        [1, *[len(mesh.depth) for mesh in line.meshes]]
+    )
     ahead_q, ahead_v, moved, force = np.zeros((4, n))
     turned, roll_rate, free, approach, before, rate, right, near = np.zeros((8, m))
     return Work(
@@ -322,12 +352,19 @@ def _check_channels(line: GearedLine, channels: Sequence[tuple[str, int]]) -> No
     for kind, i in channels:
         n = len(line.meshes) if kind == "mesh_force" else len(line.names)
         if kind not in KINDS or not 0 <= i < n:
-            raise ConfigError(f"line: no channel ({kind!r}, {i}); allowed: {', '.join(KINDS)} of 0..{n - 1}")
+            raise ConfigError(
+                f"line: no channel ({kind!r}, {i}); allowed: {', '.join(KINDS)} of 0..{n - 1}"
+            )
 
 
 def _check_step(line: GearedLine, course: LineCourse, step: float) -> None:
     for mesh in line.meshes:
-        rate = mesh.n_teeth[0] * abs(float(line.rotation[mesh.roll_dof])) / (2.0 * math.pi) * course.speed.max()
+        rate = (
+            mesh.n_teeth[0]
+            * abs(float(line.rotation[mesh.roll_dof]))
+            / (2.0 * math.pi)
+            * course.speed.max()
+        )
         if rate * step > LONGEST_STEP:
             raise StepError(
                 f"mesh '{mesh.name}' rolls {rate * step:.2g} pitches in a step, its teeth pass at {rate:.4g} Hz; raise "

@@ -15,7 +15,9 @@ from gensig.errors import ConfigError
 Array = NDArray[np.float64]
 
 BOUNCING = 0.01  # share of the time without contact above which teeth bounce
-OUT_OF_BOUNDS = 1e6  # m, rad, m/s or rad/s: no machine; a motion that overflows may come back to finite numbers
+OUT_OF_BOUNDS = (
+    1e6  # m, rad, m/s or rad/s: no machine; a motion that overflows may come back to finite numbers
+)
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -104,5 +106,7 @@ def count_samples(duration: float, sampling_rate: float) -> int:
     """Samples of a record; ConfigError where there is none."""
     n_samples = round(duration * sampling_rate)
     if n_samples < 1:
-        raise ConfigError(f"operating.duration_s = {duration:g} holds no sample at {sampling_rate:g} Hz")
+        raise ConfigError(
+            f"operating.duration_s = {duration:g} holds no sample at {sampling_rate:g} Hz"
+        )
     return n_samples

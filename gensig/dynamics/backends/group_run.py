@@ -18,7 +18,9 @@ Array = NDArray[np.float64]
 class GroupRun:
     """State (2, dof, lane) of machines, their lost steps (lane,), and scratch of the compiled core."""
 
-    def __init__(self, lanes: Sequence[PairDynamics], channels: NDArray[np.int64], precision: str) -> None:
+    def __init__(
+        self, lanes: Sequence[PairDynamics], channels: NDArray[np.int64], precision: str
+    ) -> None:
         n_dof = len(lanes[0].dofs)
         self.n_lanes, self.channels, self.precision = len(lanes), channels, precision
         self.state = np.zeros((2, n_dof, self.n_lanes), dtype=precision)

@@ -28,7 +28,9 @@ from gensig.dynamics.pair import PairDynamics
 Array = NDArray[np.float64]
 Stages: TypeAlias = Sequence[tuple[int, int]]
 
-CAREFUL = 3  # steps per sample in which a machine that bounced settles again: hard landings are stiff
+CAREFUL = (
+    3  # steps per sample in which a machine that bounced settles again: hard landings are stiff
+)
 CHECKED = 0.03  # s at the beginning of a record, integrated again at half the step
 
 
@@ -53,7 +55,9 @@ class RungeKutta(Backend):
     def integrate(self, machines: Sequence[PairDynamics], integration: Integration) -> Motions:
         """Returns the motions of machines, integrated in groups that settle in the same stages."""
         groups = lane_groups(machines, integration)
-        motions = ((group, integrate_group([machines[i] for i in group], integration)) for group in groups)
+        motions = (
+            (group, integrate_group([machines[i] for i in group], integration)) for group in groups
+        )
         return in_order(motions, len(machines))
 
 
@@ -64,7 +68,9 @@ def lane_groups(machines: Sequence[PairDynamics], integration: Integration) -> l
         steps = coarsest_oversampling(machine, integration.oversampling, integration.sampling_rate)
         by_steps.setdefault(steps, []).append(index)
     n = n_lanes(integration.precision)
-    return [same[first : first + n] for same in by_steps.values() for first in range(0, len(same), n)]
+    return [
+        same[first : first + n] for same in by_steps.values() for first in range(0, len(same), n)
+    ]
 
 
 def in_order(groups: Iterable[tuple[list[int], Motions]], n_machines: int) -> Motions:
@@ -188,7 +194,9 @@ def recorded(run: GroupRun, steps: GroupSteps, integration: Integration, end: in
     run.advance(group, step, end * fine, (-low_pass.margin - end) * fine - 1)
     checking = run.again()
     run.lost[:] = 0.0
-    acceleration, angle, seen = run.record(group, step, low_pass, n_samples, tell_mesh=integration.tell_mesh)
+    acceleration, angle, seen = run.record(
+        group, step, low_pass, n_samples, tell_mesh=integration.tell_mesh
+    )
     check = np.empty((*acceleration.shape[:2], 0))
     if integration.max_error is not None:
         check = half_step(checking, steps, integration)

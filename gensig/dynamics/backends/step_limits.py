@@ -13,7 +13,9 @@ from gensig.errors import SimulationError
 
 LONGEST_SETTLING = 0.45  # s
 SETTLED = 1e-4  # share of the start's transient that is left
-STABILITY_LIMIT = 2.6  # |lambda| h of the classical RK4 on the imaginary axis is 2.83, on the real axis 2.79
+STABILITY_LIMIT = (
+    2.6  # |lambda| h of the classical RK4 on the imaginary axis is 2.83, on the real axis 2.79
+)
 LONG_STEP = 0.5  # of the same, above which the error may exceed 1e-3
 COARSE_STABILITY = 0.6  # share of the limit: tables may be stiffer than their mean
 # Stages of the settling: steps per sample, and the time before the record at which the stage ends,
@@ -31,7 +33,9 @@ class CoarseStepWarning(UserWarning):
 
 def settling_time(dynamics: PairDynamics) -> float:
     """Time after which the start's transient has fallen to 1e-4 (longest 0.45 s), s."""
-    rate = slowest_decay(dynamics.system(), dynamics.approach_direction(), dynamics.mean_mesh_stiffness)
+    rate = slowest_decay(
+        dynamics.system(), dynamics.approach_direction(), dynamics.mean_mesh_stiffness
+    )
     return min(LONGEST_SETTLING, math.log(1.0 / SETTLED) / rate)
 
 
@@ -41,13 +45,20 @@ def coarsest_oversampling(dynamics: PairDynamics, oversampling: int, sampling_ra
     return min(oversampling, math.ceil(fastest / (COARSE_STABILITY * STABILITY_LIMIT)))
 
 
-def settling_stages(dynamics: PairDynamics, oversampling: int, sampling_rate: float) -> list[tuple[int, int]]:
+def settling_stages(
+    dynamics: PairDynamics, oversampling: int, sampling_rate: float
+) -> list[tuple[int, int]]:
     """Stages of the settling: steps per sample, and samples from the stage's end to the record."""
     least = coarsest_oversampling(dynamics, oversampling, sampling_rate)
-    return [(min(max(steps, least), oversampling), math.ceil(before * sampling_rate)) for steps, before in COARSE]
+    return [
+        (min(max(steps, least), oversampling), math.ceil(before * sampling_rate))
+        for steps, before in COARSE
+    ]
 
 
-def check_step(dynamics: PairDynamics, sampling_rate: float, oversampling: int, max_error: float | None = None) -> None:
+def check_step(
+    dynamics: PairDynamics, sampling_rate: float, oversampling: int, max_error: float | None = None
+) -> None:
     """Raise SimulationError for a step that RK4 cannot take, warn of a long one where nothing will
     look at its error.
 

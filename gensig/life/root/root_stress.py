@@ -22,7 +22,10 @@ LOAD_POINTS = ("outer_single_pair", "tip")
 EDITIONS = (2019, 2006)
 DEEP_TOOTH_RATIOS = (2.05, 2.5)  # of eps_alpha_n, between which Y_DT falls
 DEEP_TOOTH_GRADE = 4  # the coarsest ISO 1328 grade whose teeth share the load that well
-RIM_SHARES = (0.5, 1.2)  # of the tooth height: no thinner rims; from here on the rim does not matter
+RIM_SHARES = (
+    0.5,
+    1.2,
+)  # of the tooth height: no thinner rims; from here on the rim does not matter
 OVERHANG_MODULES = 1.0  # of a wider gear at either end that helps its root
 
 
@@ -96,9 +99,13 @@ def root_factors(
     (also DIN 3990-3). Y_DT is taken with the edition 2006 only: f_eps of 2019 already shares the load.
     """
     if load_point not in LOAD_POINTS:
-        raise ConfigError(f"strength.load_point = {load_point!r}; allowed: {', '.join(LOAD_POINTS)}")
+        raise ConfigError(
+            f"strength.load_point = {load_point!r}; allowed: {', '.join(LOAD_POINTS)}"
+        )
     if edition not in EDITIONS:
-        raise ConfigError(f"strength.edition = {edition!r}; allowed: {', '.join(map(str, EDITIONS))}")
+        raise ConfigError(
+            f"strength.edition = {edition!r}; allowed: {', '.join(map(str, EDITIONS))}"
+        )
     ratio, at_tip = normal_contact_ratio(pair), load_point == "tip"
     found = {}
     for name, gear in pair.gears.items():
@@ -115,7 +122,9 @@ def root_factors(
             normal_module=gear.normal_module,
             form_factor=float(loading.form_factor[0]),
             stress_correction_factor=float(loading.stress_correction_factor[0]),
-            load_distribution_factor=1.0 if at_tip or edition == 2006 else load_distribution_factor(pair),
+            load_distribution_factor=1.0
+            if at_tip or edition == 2006
+            else load_distribution_factor(pair),
             contact_ratio_factor=0.25 + 0.75 / max(ratio, 1.0) if at_tip else 1.0,
             helix_factor=helix_factor(pair, edition=edition),
             rim_thickness_factor=rim_thickness_factor(gear),
@@ -172,7 +181,9 @@ def deep_tooth_factor(ratio: float, grade: float | None) -> float:
     return 2.366 - 0.666 * ratio if ratio <= high else 0.7
 
 
-def stress_factor_on_path(pair: GearPair, gear: Gear, position: Array, *, allow_extrapolation: bool = False) -> Array:
+def stress_factor_on_path(
+    pair: GearPair, gear: Gear, position: Array, *, allow_extrapolation: bool = False
+) -> Array:
     """Y_F Y_S of one gear for a contact at any position along the path.
 
     Parameters
@@ -230,5 +241,7 @@ def spread_along_face(own: Array, structure: Array, coupling: float) -> Array:
         deflection[..., j] += ratio * deflection[..., j - 1]
     deflection[..., -1] /= pivot[..., -1]
     for j in range(n_slices - 2, -1, -1):
-        deflection[..., j] = (deflection[..., j] + between[..., j] * deflection[..., j + 1]) / pivot[..., j]
+        deflection[..., j] = (
+            deflection[..., j] + between[..., j] * deflection[..., j + 1]
+        ) / pivot[..., j]
     return deflection / structure

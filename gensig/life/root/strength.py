@@ -16,7 +16,10 @@ from gensig.units import from_si, unit
 LIFE_CYCLES, LIFE_FACTORS = (1e3, 3e6, 1e10), (2.5, 1.0, 0.85)
 SLIP_LAYER = 3e-6  # m, rho' of case-hardened steel
 NOTCH_OF_TEST_GEAR = 2.5  # q_sT
-SIZE_MODULES, SMALLEST_SIZE_FACTOR = (5e-3, 25e-3), 0.8  # m; Y_X of case-hardened steel falls between these
+SIZE_MODULES, SMALLEST_SIZE_FACTOR = (
+    (5e-3, 25e-3),
+    0.8,
+)  # m; Y_X of case-hardened steel falls between these
 
 FACTORS = (
     "paper_life_factor", "test_gear_stress_correction", "life_factor", "relative_notch_sensitivity",
@@ -94,7 +97,9 @@ class Strength:
                 raise ConfigError(f"strength.{key} = {from_si(key, value):g} must be positive")
         for key, allowed in (("load_point", LOAD_POINTS), ("edition", EDITIONS)):
             if getattr(self, key) not in allowed:
-                raise ConfigError(f"strength.{key} = {getattr(self, key)!r}; allowed: {', '.join(map(str, allowed))}")
+                raise ConfigError(
+                    f"strength.{key} = {getattr(self, key)!r}; allowed: {', '.join(map(str, allowed))}"
+                )
 
     @property
     def force_factor(self) -> float:
@@ -121,7 +126,9 @@ class Safety:
     size_factor: float
 
 
-def safety(strength: Strength, stress: float, *, notch_parameter: float, normal_module: float) -> Safety:
+def safety(
+    strength: Strength, stress: float, *, notch_parameter: float, normal_module: float
+) -> Safety:
     """Safety factors under a root stress sigma_F in Pa, load factors included.
 
     Source: engine paper eq. (32); ISO 6336-3, 5. The paper's lacks Y_ST although its stress has Y_S, so it is about
@@ -153,7 +160,9 @@ def life_factor(n_load_cycles: float) -> float:
 
     Source: ISO 6336-3, 12, the lower of its two lines beyond 3e6.
     """
-    return float(np.exp(np.interp(math.log(n_load_cycles), np.log(LIFE_CYCLES), np.log(LIFE_FACTORS))))
+    return float(
+        np.exp(np.interp(math.log(n_load_cycles), np.log(LIFE_CYCLES), np.log(LIFE_FACTORS)))
+    )
 
 
 def relative_notch_sensitivity(notch_parameter: float) -> float:

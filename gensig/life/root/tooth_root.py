@@ -17,7 +17,9 @@ from gensig.geometry.involute import involute
 
 Array = NDArray[np.float64]
 
-TANGENT = math.pi / 6.0  # rad, of the root's tangent to the tooth centreline at the critical section
+TANGENT = (
+    math.pi / 6.0
+)  # rad, of the root's tangent to the tooth centreline at the critical section
 ROUNDS = 500  # at most, of the iteration for theta
 SETTLED = 1e-14
 NOTCH = (1.0, 8.0)  # range of q_s on which the stress correction factor was fitted
@@ -100,15 +102,26 @@ def root_section(gear: Gear) -> RootSection:
     z, alpha = virtual_gear(gear).n_teeth, gear.pressure_angle
     rounding = gear.cutter_tip_radius_coefficient
     dedendum = gear.addendum_coefficient + gear.clearance_coefficient
-    e = math.pi / 4.0 - dedendum * math.tan(alpha) - (1.0 - math.sin(alpha)) * rounding / math.cos(alpha)
+    e = (
+        math.pi / 4.0
+        - dedendum * math.tan(alpha)
+        - (1.0 - math.sin(alpha)) * rounding / math.cos(alpha)
+    )
     g = rounding - dedendum + gear.profile_shift
     h = 2.0 / z * (math.pi / 2.0 - e) - math.pi / 3.0
     theta = _settled_theta(gear, z, g, h)
-    thickness = z * math.sin(math.pi / 3.0 - theta) + math.sqrt(3.0) * (g / math.cos(theta) - rounding)
+    thickness = z * math.sin(math.pi / 3.0 - theta) + math.sqrt(3.0) * (
+        g / math.cos(theta) - rounding
+    )
     fillet = rounding + 2.0 * g**2 / (math.cos(theta) * (z * math.cos(theta) ** 2 - 2.0 * g))
     height = 0.5 * (z * math.cos(math.pi / 3.0 - theta) + g / math.cos(theta) - rounding)
     module = gear.normal_module
-    return RootSection(thickness=module * thickness, fillet_radius=module * fillet, height=module * height, theta=theta)
+    return RootSection(
+        thickness=module * thickness,
+        fillet_radius=module * fillet,
+        height=module * height,
+        theta=theta,
+    )
 
 
 def _settled_theta(gear: Gear, z: float, g: float, h: float) -> float:
@@ -125,7 +138,9 @@ def _settled_theta(gear: Gear, z: float, g: float, h: float) -> float:
     )
 
 
-def root_loading(gear: Gear, tip_distance: Array | float, *, allow_extrapolation: bool = False) -> RootLoading:
+def root_loading(
+    gear: Gear, tip_distance: Array | float, *, allow_extrapolation: bool = False
+) -> RootLoading:
     """Form and stress correction factors of a force at points of the flank.
 
     Parameters
@@ -149,21 +164,30 @@ def root_loading(gear: Gear, tip_distance: Array | float, *, allow_extrapolation
             f"where the stress correction factor of ISO 6336-3 holds; change cutter_tip_radius_coefficient, or set "
             f"mesh.allow_extrapolation=true"
         )
-    curvature = virtual.tip_curvature_radius - np.atleast_1d(np.asarray(tip_distance, dtype=np.float64))
+    curvature = virtual.tip_curvature_radius - np.atleast_1d(
+        np.asarray(tip_distance, dtype=np.float64)
+    )
     roll = curvature / virtual.base_radius  # tan(alpha_en)
     alpha = gear.pressure_angle
-    half_thickness = (0.5 * math.pi + 2.0 * gear.profile_shift * math.tan(alpha)) / virtual.n_teeth + involute(alpha)
+    half_thickness = (
+        0.5 * math.pi + 2.0 * gear.profile_shift * math.tan(alpha)
+    ) / virtual.n_teeth + involute(alpha)
     gamma = half_thickness - (roll - np.arctan(roll))
     load_angle = np.arctan(roll) - gamma
     radius = np.hypot(virtual.base_radius, curvature)
     arm = (np.cos(gamma) - np.sin(gamma) * np.tan(load_angle)) * radius - section.height
     per_arm = (
-        6.0 * gear.normal_module * np.cos(load_angle) / (section.thickness**2 * math.cos(alpha))  # Y_F = per_arm * h_Fe
+        6.0
+        * gear.normal_module
+        * np.cos(load_angle)
+        / (section.thickness**2 * math.cos(alpha))  # Y_F = per_arm * h_Fe
     )
     power = 1.0 / (1.21 + 2.3 * np.maximum(arm, 0.0) / section.thickness)
     lifted = np.maximum(1.2 * arm + 0.13 * section.thickness, 0.0)
     with np.errstate(divide="ignore", invalid="ignore"):
-        correction = np.where(arm > 0.0, (1.2 + 0.13 * section.thickness / arm) * notch**power, np.nan)
+        correction = np.where(
+            arm > 0.0, (1.2 + 0.13 * section.thickness / arm) * notch**power, np.nan
+        )
     return RootLoading(
         load_angle=load_angle,
         lever_arm=arm,

@@ -24,7 +24,9 @@ Array = NDArray[np.float64]
 LEAST_CURVATURE_SHARE = 0.1
 
 
-@dataclass(frozen=True, kw_only=True, eq=False)  # no slots: a life asks for the same curves some thousand times
+@dataclass(
+    frozen=True, kw_only=True, eq=False
+)  # no slots: a life asks for the same curves some thousand times
 class FlankPath:
     """Places along the path of contact where wear is followed, ``position`` (node,) m from A to E.
 
@@ -38,7 +40,9 @@ class FlankPath:
     @cached_property
     def curvature(self) -> Array:
         """Curvature radii of new flanks in the transverse section, (2, node) m: pinion, wheel."""
-        return np.array([self.pair.pinion_curvature(self.position), self.pair.wheel_curvature(self.position)])
+        return np.array(
+            [self.pair.pinion_curvature(self.position), self.pair.wheel_curvature(self.position)]
+        )
 
     @cached_property
     def arc(self) -> Array:
@@ -78,11 +82,15 @@ def flank_path(pair: GearPair, n_nodes: int = 101) -> FlankPath:
     if not 0.0 < pitch < path:
         return FlankPath(pair=pair, position=np.linspace(0.0, path, n_nodes))
     before = min(max(round(n_nodes * pitch / path), 2), n_nodes - 2)
-    nodes = np.concatenate([np.linspace(0.0, pitch, before)[:-1], np.linspace(pitch, path, n_nodes + 1 - before)])
+    nodes = np.concatenate(
+        [np.linspace(0.0, pitch, before)[:-1], np.linspace(pitch, path, n_nodes + 1 - before)]
+    )
     return FlankPath(pair=pair, position=nodes)
 
 
-def hertz_pressure(path: FlankPath, line_load: Array, material: Material, depth: Array | None = None) -> Array:
+def hertz_pressure(
+    path: FlankPath, line_load: Array, material: Material, depth: Array | None = None
+) -> Array:
     """Largest Hertzian pressure, (slice, node) Pa.
 
     Parameters
@@ -97,7 +105,12 @@ def hertz_pressure(path: FlankPath, line_load: Array, material: Material, depth:
     if depth is None or not depth.any():
         return np.sqrt(line_load * scaled * new)
     half_width = band_half_width(path, line_load, material)
-    worn = np.stack([worn_curvature(path, depth[:, j], half_width[j]).sum(axis=0) for j in range(len(line_load))])
+    worn = np.stack(
+        [
+            worn_curvature(path, depth[:, j], half_width[j]).sum(axis=0)
+            for j in range(len(line_load))
+        ]
+    )
     return np.sqrt(line_load * scaled * np.maximum(new + worn, LEAST_CURVATURE_SHARE * new))
 
 
@@ -107,7 +120,9 @@ def band_half_width(path: FlankPath, line_load: Array, material: Material) -> Ar
     return 2.0 / math.pi * np.sqrt(line_load / (scaled * path.relative_curvature))
 
 
-def flank_radii(path: FlankPath, depth: Array, line_load: Array, material: Material) -> dict[str, Array]:
+def flank_radii(
+    path: FlankPath, depth: Array, line_load: Array, material: Material
+) -> dict[str, Array]:
     """Curvature radii of both flanks normal to the contact line, (2, node) m each.
 
     Parameters
@@ -150,13 +165,18 @@ def worn_curvature(path: FlankPath, depth: Array, half_width: Array) -> Array:
         long = np.concatenate([[back[0] - slopes[0]], back, [back[-1] + slopes[1]]])
         parts = []
         for reach in (whole, 0.5 * whole):
-            before, after = np.interp(length - reach, wide, long), np.interp(length + reach, wide, long)
+            before, after = (
+                np.interp(length - reach, wide, long),
+                np.interp(length + reach, wide, long),
+            )
             parts.append((before - 2.0 * back + after) / reach**2)
         found[side][order] = 0.5 * (parts[0] + parts[1])
     return found
 
 
-def depth_per_mesh(path: FlankPath, line_load: Array, pressure: Array, options: WearOptions) -> Array:
+def depth_per_mesh(
+    path: FlankPath, line_load: Array, pressure: Array, options: WearOptions
+) -> Array:
     """Depth that one mesh of its tooth takes off either flank, (2, slice, node) m.
 
     Parameters
@@ -177,7 +197,9 @@ def depth_per_mesh(path: FlankPath, line_load: Array, pressure: Array, options: 
     if options.rule == "band":
         slip = path.slide_roll
         return np.stack([factor[side] * slip[side] * line_load for side in (0, 1)])
-    interval = path.pair.path_of_contact / (path.pair.pinion.base_radius * options.n_intervals)  # rad of the pinion
+    interval = path.pair.path_of_contact / (
+        path.pair.pinion.base_radius * options.n_intervals
+    )  # rad of the pinion
     both = pressure * np.abs(path.sliding) * interval
     return np.stack([0.5 * factor[side] * both for side in (0, 1)])
 

@@ -46,7 +46,9 @@ class WearCase:
 
     def __post_init__(self) -> None:
         if not self.torque > 0.0:
-            raise ConfigError(f"operating.torque_nm = {self.torque:g} must be positive: flanks that bear nothing last")
+            raise ConfigError(
+                f"operating.torque_nm = {self.torque:g} must be positive: flanks that bear nothing last"
+            )
 
     @property
     def pair(self) -> GearPair:
@@ -56,13 +58,17 @@ class WearCase:
     @property
     def follows_wear(self) -> bool:
         """Whether wear changes how fast the flanks wear."""
-        return self.options.geometry == "worn" and (self.loads is not None or self.options.rule != "band")
+        return self.options.geometry == "worn" and (
+            self.loads is not None or self.options.rule != "band"
+        )
 
     @property
     def force(self) -> float:
         """Total force along the transverse line of action, N."""
         pinion = self.pair.pinion
-        return self.torque / (pinion.base_radius if self.options.load_radius == "base" else pinion.pitch_radius)
+        return self.torque / (
+            pinion.base_radius if self.options.load_radius == "base" else pinion.pitch_radius
+        )
 
     @property
     def shape(self) -> tuple[int, int, int]:
@@ -86,7 +92,9 @@ class WearCase:
         """
         if self.loads is None:
             return np.full(depth.shape[1:], self.force / self.pair.face_width)
-        return self.loads.line_load(depth if self.options.geometry == "worn" else self.new_flanks(), self.force)
+        return self.loads.line_load(
+            depth if self.options.geometry == "worn" else self.new_flanks(), self.force
+        )
 
     def pressure(self, line_load: Array, depth: Array) -> Array:
         """Largest Hertzian pressure of each place, (slice, node) Pa."""
@@ -105,7 +113,11 @@ class WearCase:
 
     def error_range(self, depth: Array) -> float:
         """Static transmission error under load, from peak to peak over a mesh period, m; NaN where one pair carries."""
-        return np.nan if self.period is None else float(np.ptp(self.period.settled(depth, self.force).approach))
+        return (
+            np.nan
+            if self.period is None
+            else float(np.ptp(self.period.settled(depth, self.force).approach))
+        )
 
     def judged(self, depth: Array) -> float:
         """What is compared with the threshold, m: the deepest place of either flank, or of both together."""
@@ -113,7 +125,12 @@ class WearCase:
 
 
 def wear_case(
-    mesh: SlicedMesh, material: Material, options: WearOptions, torque: float, *, n_nodes: int | None = None
+    mesh: SlicedMesh,
+    material: Material,
+    options: WearOptions,
+    torque: float,
+    *,
+    n_nodes: int | None = None,
 ) -> WearCase:
     """A pair that wears under the pinion's torque in N m; ``n_nodes`` along the path of contact, None as many
     as the rule needs.
@@ -130,7 +147,9 @@ def wear_case(
             f"wear.threshold_um = {options.threshold * 1e6:g} is deeper than the tooth, whose tip is "
             f"{thinnest * 1e6:.4g} um thick; give less"
         )
-    by_mesh = options.sharing == "mesh" or (options.sharing is None and pair.transverse_contact_ratio >= 1.0)
+    by_mesh = options.sharing == "mesh" or (
+        options.sharing is None and pair.transverse_contact_ratio >= 1.0
+    )
     if options.transmission_error_limit is not None and not by_mesh:
         raise ConfigError(
             f"wear.transmission_error_limit_um: with a contact ratio of {pair.transverse_contact_ratio:.4f}, below 1, "

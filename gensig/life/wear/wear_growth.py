@@ -55,7 +55,9 @@ def wear_table(case: WearCase, least: float, greatest: float) -> WearTable:
     # a limit of the transmission error may end lives at unlike depths: the least of them ends all
     sizes = np.linspace(0.0, min(life.threshold for life in lives), N_DEPTHS)
     reached = tuple(np.array([life.case.judged(depth) for depth in life.depth]) for life in lives)
-    turns = np.array([np.interp(sizes, depths, life.turns) for depths, life in zip(reached, lives, strict=True)])
+    turns = np.array(
+        [np.interp(sizes, depths, life.turns) for depths, life in zip(reached, lives, strict=True)]
+    )
     return WearTable(torque=torques, lives=lives, reached=reached, sizes=sizes, turns=turns)
 
 
@@ -81,7 +83,9 @@ class WearGrowth(GrowthLaw):
         """Depth a turn of the pinion, (size,) m."""
         taken = np.diff(self.table.turns, axis=1)
         turns = np.exp(_between(self.table.torque, np.log(taken), torque))
-        return (np.diff(self.sizes) / turns)[np.clip(np.searchsorted(self.sizes, size) - 1, 0, len(turns) - 1)]
+        return (np.diff(self.sizes) / turns)[
+            np.clip(np.searchsorted(self.sizes, size) - 1, 0, len(turns) - 1)
+        ]
 
     def fault(self, size: float) -> dict[str, Any]:
         """Both flanks."""

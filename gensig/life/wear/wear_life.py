@@ -20,7 +20,9 @@ Array = NDArray[np.float64]
 ACCURACY = {"band": (1e-3, 2e-9), "fixed_intervals": (1e-3, 1e-9)}
 BANDWIDTH = 13
 LARGEST_SHARE = 0.1  # of the threshold, worn in one step
-HORIZON = 50.0  # times the life at the rate of new flanks: sharing slows wear down, but never so much
+HORIZON = (
+    50.0  # times the life at the rate of new flanks: sharing slows wear down, but never so much
+)
 N_SNAPSHOTS = 41
 
 
@@ -71,8 +73,16 @@ def wear_life(case: WearCase) -> WearLife:
     at_first_rate = options.threshold / case.judged(rate)
     if not case.follows_wear:
         turns = np.linspace(0.0, at_first_rate, N_SNAPSHOTS)
-        return WearLife(case=case, turns=turns, depth=turns[:, None, None, None] * rate, ended_by="depth", n_steps=1)
-    ends: list[Callable[[Array], float]] = [lambda depth: case.judged(depth) / options.threshold - 1.0]
+        return WearLife(
+            case=case,
+            turns=turns,
+            depth=turns[:, None, None, None] * rate,
+            ended_by="depth",
+            n_steps=1,
+        )
+    ends: list[Callable[[Array], float]] = [
+        lambda depth: case.judged(depth) / options.threshold - 1.0
+    ]
     limit = options.transmission_error_limit
     if limit is not None:
         least = case.error_range(case.new_flanks())
@@ -82,7 +92,9 @@ def wear_life(case: WearCase) -> WearLife:
                 f"{least * 1e6:.4g} um from peak to peak; give more"
             )
         ends.append(lambda depth: case.error_range(depth) / limit - 1.0)
-    solution = _solve(case, case.new_flanks(), HORIZON * at_first_rate, ends=ends, dense_output=True)
+    solution = _solve(
+        case, case.new_flanks(), HORIZON * at_first_rate, ends=ends, dense_output=True
+    )
     if solution.status != 1:
         raise SimulationError(
             f"the flanks do not wear to the threshold in {HORIZON * at_first_rate:.4g} turns: {solution.message}"
@@ -91,10 +103,14 @@ def wear_life(case: WearCase) -> WearLife:
     depth = np.stack([_depth(case, solution.sol(turn)) for turn in turns])
     by_error = len(ends) == 2 and len(solution.t_events[1]) > 0
     ended_by = "transmission_error" if by_error else "depth"
-    return WearLife(case=case, turns=turns, depth=depth, ended_by=ended_by, n_steps=len(solution.t) - 1)
+    return WearLife(
+        case=case, turns=turns, depth=depth, ended_by=ended_by, n_steps=len(solution.t) - 1
+    )
 
 
-def worn_flanks(case: WearCase, turns: Array, *, torque: Array | None = None, start: Array | None = None) -> Array:
+def worn_flanks(
+    case: WearCase, turns: Array, *, torque: Array | None = None, start: Array | None = None
+) -> Array:
     """Depth off both flanks after so many turns of the pinion, whatever the threshold.
 
     Parameters
@@ -114,12 +130,16 @@ def worn_flanks(case: WearCase, turns: Array, *, torque: Array | None = None, st
     """
     turns = np.asarray(turns, dtype=np.float64)
     if turns.ndim != 1 or not np.isfinite(turns).all() or (np.diff(turns, prepend=0.0) < 0.0).any():
-        raise ConfigError("the turns of a life must be a row of numbers that never falls, from 0 on")
+        raise ConfigError(
+            "the turns of a life must be a row of numbers that never falls, from 0 on"
+        )
     depth = case.new_flanks() if start is None else np.array(start, dtype=np.float64)
     if torque is None:
         return _depth_at(case, depth, turns)
     if np.shape(torque) != turns.shape:
-        raise ConfigError(f"{np.size(torque)} torques for {len(turns)} times of a life; give one for each")
+        raise ConfigError(
+            f"{np.size(torque)} torques for {len(turns)} times of a life; give one for each"
+        )
     found = np.empty((len(turns), *case.shape))
     for k, stretch in enumerate(np.diff(turns, prepend=0.0)):
         depth = found[k] = _depth_at(case.under(float(torque[k])), depth, np.array([stretch]))[0]
@@ -133,12 +153,19 @@ def _depth_at(case: WearCase, start: Array, turns: Array) -> Array:
     times, place = np.unique(turns, return_inverse=True)
     solution = _solve(case, start, float(times[-1]), t_eval=times)
     if solution.status != 0:
-        raise SimulationError(f"the flanks wear to where their wear cannot be followed: {solution.message}")
+        raise SimulationError(
+            f"the flanks wear to where their wear cannot be followed: {solution.message}"
+        )
     return np.stack([_depth(case, flat) for flat in solution.y.T])[place]
 
 
 def _solve(
-    case: WearCase, start: Array, end: float, *, ends: list[Callable[[Array], float]] | None = None, **more: Any
+    case: WearCase,
+    start: Array,
+    end: float,
+    *,
+    ends: list[Callable[[Array], float]] | None = None,
+    **more: Any,
 ) -> Any:
     """The depths as an initial value problem over the turns of the pinion from 0 to ``end``, or to the first end."""
     from scipy.integrate import solve_ivp
@@ -154,7 +181,9 @@ def _solve(
         return function
 
     relative, absolute = ACCURACY[case.options.rule]
-    longest = min(case.options.step, LARGEST_SHARE * case.options.threshold) / float(case.rate(start).max())
+    longest = min(case.options.step, LARGEST_SHARE * case.options.threshold) / float(
+        case.rate(start).max()
+    )
     if case.options.rule == "band":
         method: dict[str, Any] = {"method": "RK23"}  # Bogacki & Shampine
     else:

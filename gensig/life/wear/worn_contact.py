@@ -24,7 +24,9 @@ from gensig.mesh.sliced.slices import (
 Array = NDArray[np.float64]
 Indices = NDArray[np.int64]
 
-PHASES_PER_PITCH = 24  # of a mesh in several slices, whose slices pass the nodes at other phases than these
+PHASES_PER_PITCH = (
+    24  # of a mesh in several slices, whose slices pass the nodes at other phases than these
+)
 
 
 @dataclass(frozen=True, slots=True, kw_only=True, eq=False)
@@ -68,7 +70,9 @@ def worn_contact(mesh: SlicedMesh, path: FlankPath, roll: Array) -> WornContact:
     """Prepare a mesh with new flanks at rolls, (phase,) m."""
     phases = contact_phases(mesh, roll)
     place = np.clip(phases.position, path.position[0], path.position[-1])
-    node = np.clip(np.searchsorted(path.position, place, side="right") - 1, 0, len(path.position) - 2)
+    node = np.clip(
+        np.searchsorted(path.position, place, side="right") - 1, 0, len(path.position) - 2
+    )
     share = (place - path.position[node]) / (path.position[node + 1] - path.position[node])
     return WornContact(phases=phases, node=node, share=share)
 
@@ -109,6 +113,8 @@ def path_loads(mesh: SlicedMesh, path: FlankPath) -> PathLoads:
             order = order[(place[order] >= 0.0) & (place[order] <= mesh.pair.path_of_contact)]
         right = np.clip(np.searchsorted(place[order], path.position), 1, len(order) - 1)
         low, high = order[right - 1], order[right]
-        share[j] = np.clip((path.position - place[low]) / np.maximum(place[high] - place[low], 1e-15), 0.0, 1.0)
+        share[j] = np.clip(
+            (path.position - place[low]) / np.maximum(place[high] - place[low], 1e-15), 0.0, 1.0
+        )
         before[j], after[j] = low * n_slices + j, high * n_slices + j
     return PathLoads(contact=contact, before=before, after=after, share=share)

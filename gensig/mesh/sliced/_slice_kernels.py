@@ -16,7 +16,9 @@ _compiled: Any = functools.partial(njit, nogil=True, cache=True, error_model="nu
 ROUNDS = 100  # at most, of the bearing slices and the logarithm's load
 SETTLED = 1e-12  # relative change of the approach that ends the rounds
 SETTLED_FORCE = 1e-4  # and of a force that goes into a table
-LEAST_INTENSITY = 1e-3  # of the even load per width: the logarithm has no limit where a slice lets go
+LEAST_INTENSITY = (
+    1e-3  # of the even load per width: the logarithm has no limit where a slice lets go
+)
 
 
 @_compiled
@@ -73,12 +75,23 @@ def solve_slices(
                 if not bearing[i].any():
                     continue
                 _deflections(
-                    own[i], between[i], breadth, contact[i], gap[k, i], first, bearing[i], per_pivot, lift[i], rest[i]
+                    own[i],
+                    between[i],
+                    breadth,
+                    contact[i],
+                    gap[k, i],
+                    first,
+                    bearing[i],
+                    per_pivot,
+                    lift[i],
+                    rest[i],
                 )
                 for j in range(n_slices):
                     if bearing[i, j]:
                         total += width[k, i, j] * (1.0 - lift[i, j]) / contact[i, j]
-                        moment += width[k, i, j] * (gap[k, i, j] - first - rest[i, j]) / contact[i, j]
+                        moment += (
+                            width[k, i, j] * (gap[k, i, j] - first - rest[i, j]) / contact[i, j]
+                        )
             local = (force + moment) / total  # above the first gap
             changed = False
             for i in range(n_pairs):
@@ -96,7 +109,8 @@ def solve_slices(
                         load = bite / contact[i, j]
                         line_load[k, i, j] = load
                         contact[i, j] = factor * (
-                            constant[k, i, j] - log_weight * np.log(max(load, LEAST_INTENSITY * even))
+                            constant[k, i, j]
+                            - log_weight * np.log(max(load, LEAST_INTENSITY * even))
                         )
                     else:
                         line_load[k, i, j] = 0.0
@@ -112,7 +126,19 @@ def solve_slices(
 
 @_compiled
 def bite_forces(
-    structure, factor, constant, log_weight, gap, width, breadth, length_squared, even, depth, reach, first, force
+    structure,
+    factor,
+    constant,
+    log_weight,
+    gap,
+    width,
+    breadth,
+    length_squared,
+    even,
+    depth,
+    reach,
+    first,
+    force,
 ):
     """Force of one pair of teeth at prescribed depths of bite, position by position.
 
@@ -153,7 +179,9 @@ def bite_forces(
                     bearing[j] = width[k, j] > 0.0 and gap[k, j] - first[k] < depth[knot]
             last, settled = 0.0, False
             for _ in range(ROUNDS):
-                _deflections(own, between, breadth, contact, gap[k], first[k], bearing, per_pivot, lift, rest)
+                _deflections(
+                    own, between, breadth, contact, gap[k], first[k], bearing, per_pivot, lift, rest
+                )
                 total, changed = 0.0, False
                 for j in range(n_slices):
                     if width[k, j] <= 0.0 or gap[k, j] == np.inf:
@@ -185,7 +213,11 @@ def _stiffen(structure, breadth, length_squared, own, between):
         own[j] = breadth[j] / structure[j]
         between[j] = 0.0
         if j < n_slices - 1:
-            between[j] = 4.0 * length_squared / ((structure[j] + structure[j + 1]) * (breadth[j] + breadth[j + 1]))
+            between[j] = (
+                4.0
+                * length_squared
+                / ((structure[j] + structure[j + 1]) * (breadth[j] + breadth[j + 1]))
+            )
 
 
 @_compiled

@@ -8,7 +8,9 @@ from numpy.typing import NDArray
 Array = NDArray[np.float64]
 
 
-def structure_energy(structure: Array, line_load: Array, width: Array, length_squared: float) -> Array:
+def structure_energy(
+    structure: Array, line_load: Array, width: Array, length_squared: float
+) -> Array:
     """Half the work of the loads on the deflection of one pair's structure, (phase,) J.
 
     Parameters
@@ -23,7 +25,9 @@ def structure_energy(structure: Array, line_load: Array, width: Array, length_sq
     """
     n_slices = len(width)
     between = np.zeros_like(structure)
-    between[:, :-1] = 4.0 * length_squared / ((structure[:, 1:] + structure[:, :-1]) * (width[1:] + width[:-1]))
+    between[:, :-1] = (
+        4.0 * length_squared / ((structure[:, 1:] + structure[:, :-1]) * (width[1:] + width[:-1]))
+    )
     before = np.roll(between, 1, axis=1)  # the last ties to nothing, so the first does not either
     pivot = width / structure + before + between
     load = width * line_load

@@ -8,7 +8,9 @@ from numpy.typing import NDArray
 Array = NDArray[np.float64]
 
 
-def over_slice(first: Array, force: Array, depth: Array, n_looks: int, farthest: float) -> tuple[Array, Array]:
+def over_slice(
+    first: Array, force: Array, depth: Array, n_looks: int, farthest: float
+) -> tuple[Array, Array]:
     """First gap and force of a pair over the way that a slice takes to enter, which is its own width.
 
     A slice that stands for its middle enters whole, with a jolt, and the jolts of all slices sound like a mesh of

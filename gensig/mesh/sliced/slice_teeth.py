@@ -15,7 +15,13 @@ from gensig.material import Material
 from gensig.mesh.compliance import tooth_compliance
 from gensig.mesh.face import is_nominal, slice_gaps
 from gensig.mesh.options import MeshOptions, SliceOptions
-from gensig.mesh.pair_table import FlankSide, distinct_teeth, flank_sides, node_positions, structural_compliance
+from gensig.mesh.pair_table import (
+    FlankSide,
+    distinct_teeth,
+    flank_sides,
+    node_positions,
+    structural_compliance,
+)
 from gensig.mesh.root_crack import crack_compliance
 
 Array = NDArray[np.float64]
@@ -46,7 +52,9 @@ class GearSlices:
 def is_uneven(tooth: Tooth) -> bool:
     """True where material is lost, or a crack is deep, over a part of the width only."""
     loss = tooth.material_loss
-    return bool((loss != loss[:1]).any()) or any((crack.depth != crack.depth[0]).any() for crack in tooth.cracks)
+    return bool((loss != loss[:1]).any()) or any(
+        (crack.depth != crack.depth[0]).any() for crack in tooth.cracks
+    )
 
 
 def check_independent(teeth: Iterable[Tooth], slices: SliceOptions) -> None:
@@ -56,7 +64,11 @@ def check_independent(teeth: Iterable[Tooth], slices: SliceOptions) -> None:
     ------
     ConfigError
     """
-    if slices.slice_coupling == "independent" and not slices.independent_faulty_slices and any(map(is_uneven, teeth)):
+    if (
+        slices.slice_coupling == "independent"
+        and not slices.independent_faulty_slices
+        and any(map(is_uneven, teeth))
+    ):
         raise ConfigError(
             "mesh.slice_coupling = 'independent' with a fault over part of the face: the tooth beside the fault would "
             "not help to carry; take mesh.slice_coupling=coupled, or set mesh.independent_faulty_slices=true"
@@ -73,7 +85,9 @@ def merged_edges(pair: GearPair, n_slices: int, teeth: Collection[Tooth]) -> Arr
     further = np.unique(np.concatenate(own)) if own else np.empty(0)
     least = NARROWEST * pair.face_width
     nearest = even[np.searchsorted(0.5 * (even[1:] + even[:-1]), further)]
-    further = further[(further > 0.0) & (further < pair.face_width) & (np.abs(further - nearest) > least)]
+    further = further[
+        (further > 0.0) & (further < pair.face_width) & (np.abs(further - nearest) > least)
+    ]
     if len(further):
         further = further[np.append(True, np.diff(further) > least)]
     return np.sort(np.concatenate([even, further]))
@@ -106,7 +120,9 @@ def slices_of_gears(
             softening, gap = np.zeros(shape), np.zeros(shape)
             for row, tooth in enumerate(distinct[1:], start=1):
                 if tooth.present:
-                    softening[row] = _softening(tooth, flanks[gear.name], pair, material, options, edges, structure)
+                    softening[row] = _softening(
+                        tooth, flanks[gear.name], pair, material, options, edges, structure
+                    )
                     gap[row] = _gap(tooth, flanks[gear.name], pair, edges)
         present = np.array([tooth.present for tooth in distinct])
         sides[gear.name] = GearSlices(softening=softening, gap=gap, present=present, kind=kind)
@@ -143,14 +159,18 @@ def _softening(
 ) -> Array:
     """(slice, node) m2/N: lost material weakens all slices alike, a crack those that it cuts."""
     in_plane, gear = material.in_plane(options.elasticity), tooth.gear
-    different, place = np.unique(np.stack([flank.curvature, structure]), axis=1, return_inverse=True)
+    different, place = np.unique(
+        np.stack([flank.curvature, structure]), axis=1, return_inverse=True
+    )
     curvature, rest = different
     softer = opened = np.zeros((1, len(curvature)))
     if tooth.material_loss.any():
         softer = _without_loss(tooth, curvature, in_plane, options)[_source(tooth, pair, edges)]
     if tooth.cracks:
         reached = np.minimum(curvature, tooth.tip_curvature_radius)
-        cracks = [_strips(tooth, crack, reached, in_plane, options, pair, edges) for crack in tooth.cracks]
+        cracks = [
+            _strips(tooth, crack, reached, in_plane, options, pair, edges) for crack in tooth.cracks
+        ]
         local = np.sum(cracks, axis=0)
         whole = _opened(tooth, reached, in_plane, options)
         opened = _shared_out(local, whole, rest / gear.face_width, np.diff(edges))
@@ -158,7 +178,9 @@ def _softening(
     return softer[:, place.ravel()]
 
 
-def _without_loss(tooth: Tooth, curvature: Array, material: Material, options: MeshOptions) -> Array:
+def _without_loss(
+    tooth: Tooth, curvature: Array, material: Material, options: MeshOptions
+) -> Array:
     """What lost material adds to the compliance in every slice of the tooth, (slice, phase) m/N.
 
     A slice without its tip is loaded at its new corner; what it lost above carried nothing there.
@@ -176,9 +198,13 @@ def _without_loss(tooth: Tooth, curvature: Array, material: Material, options: M
 def _opened(tooth: Tooth, curvature: Array, material: Material, options: MeshOptions) -> Array:
     """What the cracks of a tooth add to its compliance, (phase,) m/N."""
     if options.crack != "paper":
-        return crack_compliance(tooth, curvature, material, allow_extrapolation=options.allow_extrapolation)
+        return crack_compliance(
+            tooth, curvature, material, allow_extrapolation=options.allow_extrapolation
+        )
     cut, whole = (
-        tooth_compliance(tooth, curvature, material, reach=options.tooth, papers_crack=papers_crack).total
+        tooth_compliance(
+            tooth, curvature, material, reach=options.tooth, papers_crack=papers_crack
+        ).total
         for papers_crack in (True, False)
     )
     return cut - whole
@@ -200,7 +226,9 @@ def _strips(
                       for one in alone])  # fmt: skip
     strips = np.linspace(0.0, tooth.gear.face_width, len(crack.depth) + 1)
     own = edges + _overhang(pair, tooth)
-    common = np.minimum(own[1:, None], strips[None, 1:]) - np.maximum(own[:-1, None], strips[None, :-1])
+    common = np.minimum(own[1:, None], strips[None, 1:]) - np.maximum(
+        own[:-1, None], strips[None, :-1]
+    )
     share = np.maximum(common, 0.0) / np.diff(own)[:, None]
     return share @ found[strip]
 
@@ -230,6 +258,8 @@ def _shared_out(local: Array, whole: Array, rest: Array, width: Array) -> Array:
     for _ in range(NEWTON_STEPS):  # convex and falling: from 0 on, no step goes too far
         stiffness = share / (rest + factor * local)
         slope = (stiffness * local / (rest + factor * local)).sum(axis=0)
-        step = np.divide(stiffness.sum(axis=0) - aim, slope, out=np.zeros_like(aim), where=slope > 0.0)
+        step = np.divide(
+            stiffness.sum(axis=0) - aim, slope, out=np.zeros_like(aim), where=slope > 0.0
+        )
         factor = factor + np.maximum(step, 0.0)
     return factor * local

@@ -50,10 +50,16 @@ def chord_states(
     cell = np.minimum(place.astype(np.int64), n_cells - 1)
     part = (place - cell)[:, :, None]
     beyond = position - pair.pitch_point - 0.5 * pair.face_width * math.tan(pair.base_helix_angle)
-    pinion, wheel = (index + start_tooth_pinion) % pair.pinion.n_teeth, (index + start_tooth_wheel) % pair.wheel.n_teeth
+    pinion, wheel = (
+        (index + start_tooth_pinion) % pair.pinion.n_teeth,
+        (index + start_tooth_wheel) % pair.wheel.n_teeth,
+    )
     kinds = table.pinion_kind[pinion], table.wheel_kind[wheel]
     back = np.zeros(position.shape)
-    for teeth, error, tilt in ((pinion, pinion_error, pinion_tilt), (wheel, wheel_error, wheel_tilt)):
+    for teeth, error, tilt in (
+        (pinion, pinion_error, pinion_tilt),
+        (wheel, wheel_error, wheel_tilt),
+    ):
         back += 0.0 if error is None else error[teeth]
         back += 0.0 if tilt is None else tilt[teeth] * beyond
     back[~(table.pinion_present[kinds[0]] & table.wheel_present[kinds[1]])] = np.inf
@@ -89,9 +95,14 @@ def chord_equilibrium(table: SlicedTable, states: ChordStates, force: float) -> 
         """Loads and stiffnesses of the pairs, (phase, pair), at the approach less the shared deflection."""
         depth = local[:, None] - touch
         chord = np.maximum(np.searchsorted(table.depth, depth.ravel()).reshape(depth.shape) - 1, 0)
-        own, start = (np.take_along_axis(v, chord[:, :, None], axis=2)[:, :, 0] for v in (states.compliance, gap))
+        own, start = (
+            np.take_along_axis(v, chord[:, :, None], axis=2)[:, :, 0]
+            for v in (states.compliance, gap)
+        )
         bears = (depth > 0.0) & np.isfinite(start)
-        load = np.where(bears, np.maximum(local[:, None] - np.where(bears, start, 0.0), 0.0) / own, 0.0)
+        load = np.where(
+            bears, np.maximum(local[:, None] - np.where(bears, start, 0.0), 0.0) / own, 0.0
+        )
         return load, np.where(load > 0.0, 1.0 / own, 0.0)
 
     local = np.min(touch, axis=1) + table.depth[-1] + force * states.compliance.min(axis=(1, 2))
@@ -128,5 +139,7 @@ def left_out_energy(table: SlicedTable) -> tuple[Array, Array]:
         step = gap[:, :, chord] - gap[:, :, chord - 1]
         step_slope = table.gap_slope[:, :, chord] - table.gap_slope[:, :, chord - 1]
         value[:, :, chord] = value[:, :, chord - 1] + 0.5 * force * step
-        slope[:, :, chord] = slope[:, :, chord - 1] + 0.5 * (force_slope * step + force * step_slope)
+        slope[:, :, chord] = slope[:, :, chord - 1] + 0.5 * (
+            force_slope * step + force * step_slope
+        )
     return value, slope

@@ -34,9 +34,13 @@ N_CHORDS = 8
 N_TRIED, N_SAMPLES = 32, 24  # depths and positions at which chords are chosen
 PER_SLICE = 4  # positions looked at from one slice's entry to the next one's
 SLICES_PER_STEP = 10  # few slices enter with a jolt: every node is looked at
-UNMET_STEP = 8  # nodes between the positions looked at for teeth that never meet on their working flanks
+UNMET_STEP = (
+    8  # nodes between the positions looked at for teeth that never meet on their working flanks
+)
 DEEPEST = 3.0  # largest depth, in largest static ones
-LEAST_REACH = 1e-4  # m; first gaps up to here are tabulated, so that teeth that stand proud find their force
+LEAST_REACH = (
+    1e-4  # m; first gaps up to here are tabulated, so that teeth that stand proud find their force
+)
 FARTHEST = 1e-3  # m; first gaps beyond are all alike
 N_PHASES = 32
 MOST_PAIRS = 400  # of different teeth, about a tenth of a second and 0.8 MB each
@@ -146,7 +150,8 @@ def sliced_table(
     odd = dict(teeth or {})
     (pinion, pinion_kind), (wheel, wheel_kind) = (
         distinct_teeth(
-            healthy_tooth(gear), {number: odd[name, number] for name, number in sorted(odd) if name == gear.name}
+            healthy_tooth(gear),
+            {number: odd[name, number] for name, number in sorted(odd) if name == gear.name},
         )
         for gear in (pair.pinion, pair.wheel)
     )
@@ -174,7 +179,9 @@ def sliced_table(
     for a, one in enumerate(pinion):
         for b, other in enumerate(wheel):
             asked = a in met[0] and b in met[1] and one.present and other.present
-            first[a, b], loads[a, b] = _curves(setting, _known(one), _known(other), True) if asked else healthy
+            first[a, b], loads[a, b] = (
+                _curves(setting, _known(one), _known(other), True) if asked else healthy
+            )
     compliance, gap = _chords(first, loads, frame.depth)
     mesh = _mesh(setting, setting.pinion, setting.wheel)
     shared = mesh.shared_compliance
@@ -220,7 +227,9 @@ def _smoothed(compliance: Array, gap: Array, distance: float) -> list[Array]:
     """Compliance and gap, each with its slope, chord by chord as ``smooth`` has it."""
     columns = [np.empty_like(compliance) for _ in range(4)]
     for chord in range(compliance.shape[2]):
-        soft, far = (values[:, :, chord].reshape(-1, values.shape[3]) for values in (compliance, gap))
+        soft, far = (
+            values[:, :, chord].reshape(-1, values.shape[3]) for values in (compliance, gap)
+        )
         found = (
             *smooth(soft, distance, SMOOTHED_SHARE * float(soft[0].min())),
             *smooth(far, distance, SMOOTHED_GAP),
@@ -233,12 +242,19 @@ def _smoothed(compliance: Array, gap: Array, distance: float) -> list[Array]:
 def _digest(*arrays: Array | None) -> bytes:
     found = hashlib.sha256()
     for array in arrays:
-        found.update(b"none" if array is None else repr(array.shape).encode() + np.ascontiguousarray(array).tobytes())
+        found.update(
+            b"none"
+            if array is None
+            else repr(array.shape).encode() + np.ascontiguousarray(array).tobytes()
+        )
     return found.digest()
 
 
 def _known(tooth: Tooth) -> _Known:
-    cracks = [repr(replace(crack, depth=np.empty(0))).encode() + _digest(crack.depth) for crack in tooth.cracks]
+    cracks = [
+        repr(replace(crack, depth=np.empty(0))).encode() + _digest(crack.depth)
+        for crack in tooth.cracks
+    ]
     arrays = (tooth.slice_edges, tooth.material_loss, tooth.flank_deviation)
     return _Known(key=b"".join([_digest(*arrays), *cracks, bytes([tooth.present])]), value=tooth)
 
@@ -256,7 +272,14 @@ def _mesh(setting: _Setting, pinion: _Known, wheel: _Known) -> SlicedMesh:
         if known.key != _known(healthy_tooth(gear)).key:
             odd.update({(gear.name, number): known.value for number in range(gear.n_teeth)})
     assert not isinstance(deviation, Tooth)
-    return sliced_mesh(setting.pair, setting.material, setting.options, setting.slices, deviation=deviation, teeth=odd)
+    return sliced_mesh(
+        setting.pair,
+        setting.material,
+        setting.options,
+        setting.slices,
+        deviation=deviation,
+        teeth=odd,
+    )
 
 
 @lru_cache(maxsize=8)
@@ -333,7 +356,9 @@ def _at(mesh: SlicedMesh, position: Array) -> tuple[Array, Array, Array, Array]:
     return structure, gap, constant, share * mesh.slice_width
 
 
-def _bitten(setting: _Setting, mesh: SlicedMesh, position: Array, depth: Array, reach: float) -> tuple[Array, Array]:
+def _bitten(
+    setting: _Setting, mesh: SlicedMesh, position: Array, depth: Array, reach: float
+) -> tuple[Array, Array]:
     """First gap (node,) m, and force (node, knot) N at depths beyond it, 0 where it is beyond ``reach``."""
     structure, gap, constant, width = _at(mesh, position)
     first, force = np.empty(len(position)), np.empty((len(position), len(depth)))
@@ -343,7 +368,9 @@ def _bitten(setting: _Setting, mesh: SlicedMesh, position: Array, depth: Array, 
         force,
     )  # fmt: skip
     if n_unsettled:
-        raise GeometryError(f"the bearing slices of a pair of teeth never settle at {n_unsettled} positions and depths")
+        raise GeometryError(
+            f"the bearing slices of a pair of teeth never settle at {n_unsettled} positions and depths"
+        )
     return first, force
 
 
@@ -358,7 +385,9 @@ def _curves(setting: _Setting, pinion: _Known, wheel: _Known, are_met: bool) -> 
         looked = looked[n_looks // 2 : n_looks // 2 + len(first)]
     found = np.flatnonzero(first <= frame.reach)
     if not len(found):  # no flank is left to touch: what is sound, out of reach
-        return np.full(len(frame.position), FARTHEST), _curves(setting, *_healthy(setting.pair), False)[1]
+        return np.full(len(frame.position), FARTHEST), _curves(
+            setting, *_healthy(setting.pair), False
+        )[1]
     if setting.options.law == "paper":
         first, force = np.zeros_like(first), np.maximum(force, force.max() / OFF_PATH)
     else:  # beyond reach, the forces of the nearest position within
@@ -370,15 +399,21 @@ def _curves(setting: _Setting, pinion: _Known, wheel: _Known, are_met: bool) -> 
     return first, force
 
 
-def _looked(setting: _Setting, position: Array, mesh: SlicedMesh, are_met: bool) -> tuple[Array, int]:
+def _looked(
+    setting: _Setting, position: Array, mesh: SlicedMesh, are_met: bool
+) -> tuple[Array, int]:
     """Positions at which two teeth are looked at, m, and, where slices enter one by one, how many of their distances
     make the way from one slice to the next, an even number; else 0."""
     node = position[1] - position[0]
-    if not mesh.lag[-1] > 0.0 or setting.options.law == "paper":  # whose slices the edge of the field cuts
+    if (
+        not mesh.lag[-1] > 0.0 or setting.options.law == "paper"
+    ):  # whose slices the edge of the field cuts
         return (position if are_met else np.append(position[:-1:UNMET_STEP], position[-1])), 0
     n_slices = setting.slices.n_slices
     later = float(setting.pair.face_width * math.tan(setting.pair.base_helix_angle)) / n_slices
-    apart = min(later / PER_SLICE, n_slices / SLICES_PER_STEP * node) if are_met else UNMET_STEP * node
+    apart = (
+        min(later / PER_SLICE, n_slices / SLICES_PER_STEP * node) if are_met else UNMET_STEP * node
+    )
     n_looks = 2 * max(1, round(0.5 * later / max(apart, node)))
     n_beside, distance = n_looks // 2, later / n_looks
     n_steps = math.ceil((position[-1] - position[0]) / distance)

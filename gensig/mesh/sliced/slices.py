@@ -144,11 +144,15 @@ def sliced_mesh(
     structure, shared = _structure(pair, material, options)
     law = contact_law(pair, np.clip(position, 0.0, pair.path_of_contact), material, options)
     # the paper's law knows no corners: the edge of the field of action ends contact
-    corner = np.zeros_like(position) if options.law == "paper" else corner_gap_by_pinion(pair, position)
+    corner = (
+        np.zeros_like(position) if options.law == "paper" else corner_gap_by_pinion(pair, position)
+    )
     gap = np.repeat(corner[None], len(place), axis=0)
     if deviation is not None:
         gap = gap + _across(
-            slice_places(pair, slices), np.broadcast_to(deviation, (slices.n_slices, len(position))), place
+            slice_places(pair, slices),
+            np.broadcast_to(deviation, (slices.n_slices, len(position))),
+            place,
         )
     sides = slices_of_gears(pair, material, options, odd, edges, structure)
     return SlicedMesh(
@@ -188,11 +192,18 @@ def slice_places(pair: GearPair, slices: SliceOptions) -> Array:
 @lru_cache(maxsize=16)
 def _structure(pair: GearPair, material: Material, options: MeshOptions) -> tuple[Array, float]:
     """Compliance of both sound teeth and bodies per width (node,) m2/N, and what pairs share, m/N."""
-    on_path, place = np.unique(np.clip(node_positions(pair, options), 0.0, pair.path_of_contact), return_inverse=True)
+    on_path, place = np.unique(
+        np.clip(node_positions(pair, options), 0.0, pair.path_of_contact), return_inverse=True
+    )
     in_plane = material.in_plane(options.elasticity)
     whole = np.zeros_like(on_path)
-    for gear, curvature in ((pair.pinion, pair.pinion_curvature), (pair.wheel, pair.wheel_curvature)):
-        own = structural_compliance(healthy_tooth(gear), np.asarray(curvature(on_path)), in_plane, options)
+    for gear, curvature in (
+        (pair.pinion, pair.pinion_curvature),
+        (pair.wheel, pair.wheel_curvature),
+    ):
+        own = structural_compliance(
+            healthy_tooth(gear), np.asarray(curvature(on_path)), in_plane, options
+        )
         whole += own * gear.face_width
     shared = 0.0
     if options.pair_coupling == "coupled":
@@ -277,7 +288,9 @@ def contact_phases(mesh: SlicedMesh, roll: Array, meeting: Meeting | None = None
     )
 
 
-def loaded_contact(mesh: SlicedMesh, roll: Array, force: float, meeting: Meeting | None = None) -> LoadedContact:
+def loaded_contact(
+    mesh: SlicedMesh, roll: Array, force: float, meeting: Meeting | None = None
+) -> LoadedContact:
     """Load of every slice of every pair under a total force along the transverse line of action.
 
     Parameters
@@ -326,12 +339,19 @@ def _gaps(mesh: SlicedMesh, position: Array) -> Array:
     """(phase, pair, slice) m; inf beyond the table, where no corner reaches."""
     gap = np.empty_like(position)
     for j in range(position.shape[-1]):
-        gap[..., j] = np.interp(position[..., j], mesh.position, mesh.gap[j], left=np.inf, right=np.inf)
+        gap[..., j] = np.interp(
+            position[..., j], mesh.position, mesh.gap[j], left=np.inf, right=np.inf
+        )
     return gap
 
 
 def _add_teeth(
-    mesh: SlicedMesh, position: Array, index: NDArray[np.int64], meeting: Meeting, structure: Array, gap: Array
+    mesh: SlicedMesh,
+    position: Array,
+    index: NDArray[np.int64],
+    meeting: Meeting,
+    structure: Array,
+    gap: Array,
 ) -> None:
     """Add what single teeth have to structure and gap, (phase, pair, slice)."""
     for side, start, error, tilt in (
@@ -365,7 +385,12 @@ def _of_kind(mesh: SlicedMesh, side: GearSlices, kind: int, position: Array) -> 
 def cut_by_field(mesh: SlicedMesh, position: Array) -> tuple[Array, Array]:
     """Slices that the edge of the field of action cuts: the middle of what lies on the path and its share of the slice,
     of the shape of ``position`` both."""
-    half = 0.5 * mesh.slice_width * math.tan(mesh.pair.base_helix_angle) * (not mesh.slices.slices_in_phase)
+    half = (
+        0.5
+        * mesh.slice_width
+        * math.tan(mesh.pair.base_helix_angle)
+        * (not mesh.slices.slices_in_phase)
+    )
     path = mesh.pair.path_of_contact
     if not half.any():
         return position, ((position >= 0.0) & (position <= path)).astype(np.float64)
@@ -375,7 +400,11 @@ def cut_by_field(mesh: SlicedMesh, position: Array) -> tuple[Array, Array]:
 
 
 def single_pair_stiffness(
-    mesh: SlicedMesh, position: Array, force: float, kinds: tuple[int, int] = (0, 0), closed: float = 0.1 * NO_FLANK
+    mesh: SlicedMesh,
+    position: Array,
+    force: float,
+    kinds: tuple[int, int] = (0, 0),
+    closed: float = 0.1 * NO_FLANK,
 ) -> Array:
     """Stiffness of the slices of one pair that lie on the path, flanks taken as touching, (phase,) N/m.
 
@@ -390,7 +419,9 @@ def single_pair_stiffness(
     """
     middle, share = cut_by_field(mesh, position[:, None] - mesh.lag)
     constant = np.interp(middle, mesh.position, mesh.contact_constant)
-    contact = mesh.contact_factor * (constant - mesh.log_weight * math.log(force / mesh.pair.face_width))
+    contact = mesh.contact_factor * (
+        constant - mesh.log_weight * math.log(force / mesh.pair.face_width)
+    )
     softness = np.interp(middle, mesh.position, mesh.structure) + contact
     for side, kind in zip((mesh.pinion, mesh.wheel), kinds, strict=True):
         if kind:

@@ -74,10 +74,18 @@ def face_surface(gear: Gear) -> float:
 def uniform_body(gear: Gear, temperature: float) -> BodyHeat:
     """A gear whose temperature is known and the same all over."""
     radius = np.linspace(gear.bore_radius, gear.root_radius, N_RADII)
-    return BodyHeat(radius=radius, temperature=np.full_like(radius, temperature), input=0.0, to_oil=0.0, to_bore=0.0)
+    return BodyHeat(
+        radius=radius,
+        temperature=np.full_like(radius, temperature),
+        input=0.0,
+        to_oil=0.0,
+        to_bore=0.0,
+    )
 
 
-def solved_body(gear: Gear, input_heat: float, heat: Heat, *, bore_temperature: float | None) -> BodyHeat:
+def solved_body(
+    gear: Gear, input_heat: float, heat: Heat, *, bore_temperature: float | None
+) -> BodyHeat:
     """Temperature of a gear that takes ``input_heat`` (W) at its teeth.
 
     Source: (1/r) d/dr(r dT/dr) = 2 h (T - T_oil) / (g b), the annular fin of heat transfer text books (Incropera &
@@ -94,8 +102,12 @@ def solved_body(gear: Gear, input_heat: float, heat: Heat, *, bore_temperature: 
             f"heat.{gear.name}_bore_temperature_degc or heat.{gear.name}_temperature_degc"
         )
     radius = np.linspace(gear.bore_radius, gear.root_radius, N_RADII)
-    values, slopes = _solutions(radius, math.sqrt(2.0 * heat.face_convection / (heat.conductivity * gear.face_width)))
-    per_slope = 2.0 * math.pi * radius * gear.face_width * heat.conductivity  # W for 1 K/m through the cylinder
+    values, slopes = _solutions(
+        radius, math.sqrt(2.0 * heat.face_convection / (heat.conductivity * gear.face_width))
+    )
+    per_slope = (
+        2.0 * math.pi * radius * gear.face_width * heat.conductivity
+    )  # W for 1 K/m through the cylinder
     from_teeth = heat.tooth_convection * tooth_surface(gear)
     at_bore = slopes[:, 0] if bore_temperature is None else values[:, 0]
     bore_rise = 0.0 if bore_temperature is None else bore_temperature - heat.oil_temperature

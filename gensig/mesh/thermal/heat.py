@@ -70,16 +70,27 @@ class Heat:
             ("specific_heat_j_per_kgk", 50.0, 5000.0),
             ("expansion_per_k", 0.0, 1e-4),
         ):
-            value = next(getattr(self, field.name) for field in fields(self) if key.startswith(field.name))
+            value = next(
+                getattr(self, field.name) for field in fields(self) if key.startswith(field.name)
+            )
             if not low <= value <= high:
-                raise ConfigError(f"heat.{key} = {from_si(key, value):g} must lie in {low:g}..{high:g}")
+                raise ConfigError(
+                    f"heat.{key} = {from_si(key, value):g} must lie in {low:g}..{high:g}"
+                )
         if self.convection_speed is not None and not self.convection_speed > 0.0:
             raise ConfigError(
                 f"heat.convection_speed_rpm = {from_si('convection_speed_rpm', self.convection_speed):g} must be "
                 f"positive, or null for convection that does not depend on speed"
             )
-        rising = all(a < b for a, b in zip(self.modulus_temperature, self.modulus_temperature[1:], strict=False))
-        if len(self.modulus_temperature) < 2 or len(self.modulus_temperature) != len(self.modulus) or not rising:
+        rising = all(
+            a < b
+            for a, b in zip(self.modulus_temperature, self.modulus_temperature[1:], strict=False)
+        )
+        if (
+            len(self.modulus_temperature) < 2
+            or len(self.modulus_temperature) != len(self.modulus)
+            or not rising
+        ):
             raise ConfigError(
                 f"heat.modulus_temperature_degc has {len(self.modulus_temperature)} and heat.modulus_gpa "
                 f"{len(self.modulus)} values; give equally many, two or more, at temperatures that rise"
@@ -141,7 +152,13 @@ def rolling_speeds(pair: GearPair, position: Array, speed: float) -> tuple[Array
 
 
 def friction_heat(
-    pair: GearPair, position: Array, line_load: Array, *, force: float, friction: float, speed: float
+    pair: GearPair,
+    position: Array,
+    line_load: Array,
+    *,
+    force: float,
+    friction: float,
+    speed: float,
 ) -> float:
     """Friction loss of the flanks, W, mean over the phases: friction x normal load x sliding speed of every slice.
 
@@ -154,7 +171,9 @@ def friction_heat(
     speed : rad/s                           of the pinion
     """
     pinion, wheel = rolling_speeds(pair, position, speed)
-    sliding = np.sum(line_load * np.abs(pinion - wheel), axis=(1, 2)) / np.sum(line_load, axis=(1, 2))
+    sliding = np.sum(line_load * np.abs(pinion - wheel), axis=(1, 2)) / np.sum(
+        line_load, axis=(1, 2)
+    )
     return friction * force / math.cos(pair.base_helix_angle) * float(sliding.mean())
 
 
@@ -182,11 +201,17 @@ def flash_temperature(
     half_width = contact_half_width(pair, position, line_load, material)
     effusivity = math.sqrt(heat.conductivity * material.density_kg_per_m3 * heat.specific_heat)
     # sqrt(v1) - sqrt(v2) is |v1 - v2| over their sum; w / sqrt(B) goes to 0 with the load
-    loaded = np.divide(line_load, np.sqrt(half_width), out=np.zeros_like(half_width), where=half_width > 0.0)
-    return BLOK_SEMI_WIDTH * friction * loaded * np.abs(np.sqrt(pinion) - np.sqrt(wheel)) / effusivity
+    loaded = np.divide(
+        line_load, np.sqrt(half_width), out=np.zeros_like(half_width), where=half_width > 0.0
+    )
+    return (
+        BLOK_SEMI_WIDTH * friction * loaded * np.abs(np.sqrt(pinion) - np.sqrt(wheel)) / effusivity
+    )
 
 
-def contact_half_width(pair: GearPair, position: Array, line_load: Array | float, material: Material) -> Array:
+def contact_half_width(
+    pair: GearPair, position: Array, line_load: Array | float, material: Material
+) -> Array:
     """Half width of the Hertzian contact, m, of the shape of ``position``; loads and radii as for the pressure."""
     on_path = np.clip(position, 0.0, pair.path_of_contact)
     radius = relative_radius(pair, on_path) / math.cos(pair.base_helix_angle)

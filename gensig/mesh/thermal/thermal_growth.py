@@ -37,7 +37,9 @@ class GearGrowth:
         alike, the gear stays similar: the flank moves by strain x curvature radius, which is the involute of the grown
         base circle. Otherwise the tooth is shifted along its axis besides.
         """
-        shifted = gear.root_radius * (self.body - self.tooth) * np.sin(load_angle(gear, curvature_radius))
+        shifted = (
+            gear.root_radius * (self.body - self.tooth) * np.sin(load_angle(gear, curvature_radius))
+        )
         return self.tooth * curvature_radius + shifted
 
     def of_tooth_alone(self, gear: Gear, curvature_radius: Array) -> Array:

@@ -12,7 +12,11 @@ from gensig.geometry.gear import Gear
 from gensig.geometry.tooth import Tooth, healthy_tooth
 from gensig.geometry.tooth_profile import load_angle
 from gensig.mesh.body_coupling import cross_compliance
-from gensig.mesh.fillet_foundation import ExtrapolationWarning, body_coefficients, fillet_foundation_compliance
+from gensig.mesh.fillet_foundation import (
+    ExtrapolationWarning,
+    body_coefficients,
+    fillet_foundation_compliance,
+)
 from gensig.mesh.pair_table import structural_terms
 from gensig.validation.case import Array, Case
 from gensig.validation.checks.geometry_checks import Check
@@ -71,7 +75,9 @@ def _sainsot(gear: Gear, case: Case, side: str, point: str) -> float:
     angle = load_angle(gear, case.curvature(side, point))
     with warnings.catch_warnings():
         warnings.simplefilter("ignore", ExtrapolationWarning)
-        found = fillet_foundation_compliance(gear, angle, case.system.material, allow_extrapolation=True)
+        found = fillet_foundation_compliance(
+            gear, angle, case.system.material, allow_extrapolation=True
+        )
     return float(found[0])
 
 
@@ -91,7 +97,9 @@ def _double_zone(case: Case, at: str) -> tuple[Array, Array]:
 
 
 def _curvature(case: Case, side: str, position: Array) -> Array:
-    return np.asarray((case.pair.pinion_curvature if side == "pinion" else case.pair.wheel_curvature)(position))
+    return np.asarray(
+        (case.pair.pinion_curvature if side == "pinion" else case.pair.wheel_curvature)(position)
+    )
 
 
 def _pair_structure(which: int, case: Case, at: str) -> float:
@@ -103,14 +111,21 @@ def _pair_structure(which: int, case: Case, at: str) -> float:
 def _cross(side: str, case: Case, at: str) -> float:
     """Body compliance between the two pairs of the double zone."""
     gear = case.gear(side)
-    angles = [load_angle(gear, _curvature(case, side, position)) for position in _double_zone(case, at)]
+    angles = [
+        load_angle(gear, _curvature(case, side, position)) for position in _double_zone(case, at)
+    ]
     pitches = 1 if side == "pinion" else -1
-    return float(cross_compliance(gear, case.structure_material, angles[0], angles[1], pitches=pitches)[0])
+    return float(
+        cross_compliance(gear, case.structure_material, angles[0], angles[1], pitches=pitches)[0]
+    )
 
 
 def _cross_over_body(side: str, case: Case, at: str) -> float:
     """Shared body compliance over the mean of the two pairs' own, in the middle of the double zone."""
-    bodies = [terms(case, side, _curvature(case, side, place))["foundation"][0] for place in _double_zone(case, "mid")]
+    bodies = [
+        terms(case, side, _curvature(case, side, place))["foundation"][0]
+        for place in _double_zone(case, "mid")
+    ]
     return _cross(side, case, "mid") / float(np.mean(bodies))
 
 
@@ -121,7 +136,11 @@ def _stiffness_body_once(case: Case, at: str) -> float:
     for position in _double_zone(case, "mean"):
         parts = [terms(case, side, _curvature(case, side, position)) for side in SIDES]
         body.append(sum(part["foundation"] for part in parts))
-        own.append(contact_compliance(case, position) + sum(sum(part.values()) for part in parts) - body[-1])
+        own.append(
+            contact_compliance(case, position)
+            + sum(sum(part.values()) for part in parts)
+            - body[-1]
+        )
     together = 1.0 / (1.0 / own[0] + 1.0 / own[1])
     return float(np.mean(1.0 / (together + 0.5 * (body[0] + body[1]))))
 
@@ -136,13 +155,17 @@ def _stiffness_other_root_angle(case: Case, at: str) -> float:
     change = 0.0
     for side in SIDES:
         gear = case.gear(side)
-        change += _sainsot(other_root_angle(gear, at), case, side, "C") - _sainsot(gear, case, side, "C")
+        change += _sainsot(other_root_angle(gear, at), case, side, "C") - _sainsot(
+            gear, case, side, "C"
+        )
     return 1.0 / (1.0 / single_pair_stiffness(case, "C") + change)
 
 
 def _straight_root_stiffness(case: Case, at: str) -> float:
     """Single pair with the straight root in both teeth; body and contact as they are."""
-    change = sum(_tooth(side, "straight", case, at) - _tooth(side, "true", case, at) for side in SIDES)
+    change = sum(
+        _tooth(side, "straight", case, at) - _tooth(side, "true", case, at) for side in SIDES
+    )
     return 1.0 / (1.0 / single_pair_stiffness(case, at) + change)
 
 

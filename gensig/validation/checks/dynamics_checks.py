@@ -16,7 +16,15 @@ from gensig.dynamics.system import LumpedSystem
 from gensig.signals.averaging import remove_orders
 from gensig.signals.indicators import kurtosis, rms
 from gensig.signals.spectrum import amplitude_spectrum
-from gensig.validation.case import RECORD_TURNS, Array, Case, pair_dynamics, record, with_fault, with_words
+from gensig.validation.case import (
+    RECORD_TURNS,
+    Array,
+    Case,
+    pair_dynamics,
+    record,
+    with_fault,
+    with_words,
+)
 from gensig.validation.checks.geometry_checks import Check
 
 SAMPLES_PER_TOOTH = 512

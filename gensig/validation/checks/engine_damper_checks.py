@@ -67,7 +67,9 @@ class DamperCase:
         first, second = (int(word) for word in mesh.split("/"))
         place = mesh_between(self.line, (first, second))
         strength = read_mesh_strength(self.config, self.line, place)
-        return dynamic_root_stress(strength, self.line, place, tooth_load(self.line, place, self.response))
+        return dynamic_root_stress(
+            strength, self.line, place, tooth_load(self.line, place, self.response)
+        )
 
     @cached_property
     def waterfalls(self) -> dict[int, Waterfall]:
@@ -87,7 +89,9 @@ class DamperCase:
         node, order = at.split("/")
         run = self.waterfalls[int(node)]
         column = int(np.flatnonzero(run.orders == float(order))[0])
-        return float(run.speeds[int(run.angle[:, column].argmax())] * float(order) / (2.0 * math.pi))
+        return float(
+            run.speeds[int(run.angle[:, column].argmax())] * float(order) / (2.0 * math.pi)
+        )
 
     def order(self, node: str, order: float) -> float:
         """Amplitude of an order of a node's angular displacement, rad."""
@@ -124,7 +128,9 @@ DAMPERS: dict[str, DamperCheck] = {
     "dampers.safety_iso": lambda case, at: float(_wheel(case.root(at)).safety.iso),
     "dampers.stress_drop": lambda case, at: 1.0 - _stress(case, at) / _stress(case.without, at),
     "spectrum.half_order_share": lambda case, at: case.half_order_share(at),
-    "spectrum.disturbance_over_order_1": lambda case, at: case.disturbance(at) / case.order(at, 1.0),
+    "spectrum.disturbance_over_order_1": lambda case, at: (
+        case.disturbance(at) / case.order(at, 1.0)
+    ),
     "waterfall.peak_frequency": lambda case, at: case.peak_on_order(at),
 }
 

@@ -61,7 +61,9 @@ class TimeCase:
     @property
     def without(self) -> TimeCase:
         """The same without the dampers."""
-        return read_time_case(tuple(word for word in self.overrides if not word.startswith("system.dampers=")))
+        return read_time_case(
+            tuple(word for word in self.overrides if not word.startswith("system.dampers="))
+        )
 
     def fluctuation(self, node: str) -> float:
         """Half the peak to peak of a node's speed in a cycle, rad/s."""
@@ -91,7 +93,9 @@ class TimeCase:
     def root(self, mesh: str) -> DynamicRootStress:
         """Root stress of a mesh."""
         place = self.mesh(mesh)
-        return root_stress_in_time(read_mesh_strength(self.config, self.line, place), self.line, place, self.response)
+        return root_stress_in_time(
+            read_mesh_strength(self.config, self.line, place), self.line, place, self.response
+        )
 
 
 def _wheel(case: TimeCase, at: str) -> Any:
@@ -102,7 +106,9 @@ def _wheel(case: TimeCase, at: str) -> Any:
 def _largest(case: TimeCase, at: str) -> float:
     """Of the pairs of a cycle, over the mesh, Pa."""
     root = case.root(at)
-    return typical_largest(root.passes[root.strength.decisive], passes_of_a_cycle(case.line, case.mesh(at)))
+    return typical_largest(
+        root.passes[root.strength.decisive], passes_of_a_cycle(case.line, case.mesh(at))
+    )
 
 
 def _fluctuation_ratio(case: TimeCase, at: str) -> float:
@@ -140,7 +146,9 @@ TIMES: dict[str, TimeCheck] = {
     "time.greatest_tooth_force": lambda case, at: case.tooth_force(at)[1],
     "time.root_stress": lambda case, at: float(_wheel(case, at).stress),
     "time.largest_root_stress": _largest,
-    "time.stress_ratio": lambda case, at: float(_wheel(case, at).stress / _wheel(case.without, at).stress),
+    "time.stress_ratio": lambda case, at: float(
+        _wheel(case, at).stress / _wheel(case.without, at).stress
+    ),
     "time.safety_paper": lambda case, at: float(_wheel(case, at).safety.paper),
     "time.safety_iso": lambda case, at: float(_wheel(case, at).safety.iso),
 }

@@ -24,7 +24,9 @@ def _fault_increment(case: Case, at: str) -> float:
     """What the fault adds to the compliance of its tooth and body."""
     side = case.faults[0].gear
     curvature = case.curvature(side, at)
-    faulty = structural_compliance(_faulty_tooth(case), curvature, case.structure_material, case.system.mesh)
+    faulty = structural_compliance(
+        _faulty_tooth(case), curvature, case.structure_material, case.system.mesh
+    )
     return float(faulty[0]) - float(structure(case, side, curvature)[0])
 
 
@@ -54,7 +56,13 @@ def _pit_over_crack(case: Case, at: str) -> float:
 def _smallest_step(case: Case, at: str) -> float:
     """Smallest growth of the loss at C along a series of severities ``fault key: value value ...``."""
     key, _, values = at.partition(":")
-    series = [0.0, *(stiffness_loss(read_case((*case.overrides, f"{key}={value}")), "C") for value in values.split())]
+    series = [
+        0.0,
+        *(
+            stiffness_loss(read_case((*case.overrides, f"{key}={value}")), "C")
+            for value in values.split()
+        ),
+    ]
     return float(np.diff(series).min())
 
 

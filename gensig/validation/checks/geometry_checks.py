@@ -43,7 +43,9 @@ def _junction_slope_step(gear: Gear) -> float:
     """Angle between root curve and involute where they join, by central differences of their points."""
     shift = 1e-5
     root = root_curve(gear, gear.pressure_angle + shift * np.array([1.0, -1.0]))
-    flank = involute_point(gear, gear.junction_curvature_radius * (1.0 + shift * np.array([-1.0, 1.0])))
+    flank = involute_point(
+        gear, gear.junction_curvature_radius * (1.0 + shift * np.array([-1.0, 1.0]))
+    )
     slopes = [np.arctan2(np.diff(y)[0], np.diff(x)[0]) for x, y in (root, flank)]
     return float(abs(slopes[0] - slopes[1]))
 
@@ -84,7 +86,9 @@ GEOMETRY: dict[str, Check] = {
     "half_pitch_angle": _of_gear(lambda gear: float(np.pi / gear.n_teeth)),
     "junction_curvature_radius": _of_gear(lambda gear: gear.junction_curvature_radius),
     "root_chord_abscissa": _of_gear(lambda gear: float(tooth_profile(gear).abscissa[0])),
-    "junction_radius": _of_gear(lambda gear: float(np.hypot(gear.base_radius, gear.junction_curvature_radius))),
+    "junction_radius": _of_gear(
+        lambda gear: float(np.hypot(gear.base_radius, gear.junction_curvature_radius))
+    ),
     "junction_abscissa": _of_gear(lambda gear: _junction(gear, 0)),
     "junction_half_thickness": _of_gear(lambda gear: _junction(gear, 1)),
     "junction_gap": _of_gear(_junction_gap),

@@ -11,14 +11,27 @@ import numpy as np
 from gensig.mesh.thermal.body_heat import BodyHeat, face_surface, tooth_surface
 from gensig.mesh.thermal.heat import flash_temperature
 from gensig.options.compose import compose
-from gensig.systems.hot_pair import COLD, TRUE, Duty, HotState, Variant, hot_state, stiffness_variants, sweep
+from gensig.systems.hot_pair import (
+    COLD,
+    TRUE,
+    Duty,
+    HotState,
+    Variant,
+    hot_state,
+    stiffness_variants,
+    sweep,
+)
 from gensig.systems.registry import read_duty
 from gensig.validation.rows import printed_value
 
 HotCheck = Callable[["HotCase", str], float]
 
 # range of each sweep of the thermal paper, SI
-SWEEPS = {"friction": (0.03, 0.07), "torque": (12e3, 36e3), "speed": (125.66370614359172, 628.3185307179587)}
+SWEEPS = {
+    "friction": (0.03, 0.07),
+    "torque": (12e3, 36e3),
+    "speed": (125.66370614359172, 628.3185307179587),
+}
 
 
 @dataclass(frozen=True, eq=False)
@@ -61,7 +74,10 @@ def _single_change(case: HotCase, at: str) -> float:
 
 
 def _contact_ratio_change(case: HotCase, at: str) -> float:
-    return case.variants[at].transverse_contact_ratio / case.variants[COLD].transverse_contact_ratio - 1.0
+    return (
+        case.variants[at].transverse_contact_ratio / case.variants[COLD].transverse_contact_ratio
+        - 1.0
+    )
 
 
 def _even_flash(case: HotCase, at: str) -> float:
@@ -81,7 +97,9 @@ def _surface_rise(case: HotCase, at: str) -> float:
     gear = getattr(case.duty.system.pair, at)
     body: BodyHeat = getattr(case.state, at)
     heat = case.duty.heat.at_speed(case.duty.speed)
-    return body.to_oil / (heat.face_convection * face_surface(gear) + heat.tooth_convection * tooth_surface(gear))
+    return body.to_oil / (
+        heat.face_convection * face_surface(gear) + heat.tooth_convection * tooth_surface(gear)
+    )
 
 
 def _teeth_per_kelvin(case: HotCase, at: str) -> float:
@@ -93,7 +111,8 @@ def _teeth_per_kelvin(case: HotCase, at: str) -> float:
 def _rise_for_printed(case: HotCase, at: str) -> float:
     """Rise of both gears at which the apparent stiffness is above the cold one by as much as is printed."""
     printed = [
-        printed_value("helical_heat_paper", f"{name}.reference_root") for name in ("cold.mesh_mean", "hot.mesh_mean")
+        printed_value("helical_heat_paper", f"{name}.reference_root")
+        for name in ("cold.mesh_mean", "hot.mesh_mean")
     ]
     needed = float(case.variants[COLD].approach.mean()) * (1.0 - printed[0] / printed[1])
     return needed / _teeth_per_kelvin(case, at)
@@ -117,7 +136,9 @@ def _mean_single_difference(case: HotCase, at: str) -> float:
     ours = read_hot_case(("system=helical_pair", "gear=chongqing_40_162", "heat=chongqing_rated"))
     curves = [one.variants[TRUE] for one in (case, ours)]
     place = np.linspace(0.0, 1.0, 201)[1:-1]
-    analytic, best = (np.interp(place, one.position / one.position[-1], one.single) for one in curves)
+    analytic, best = (
+        np.interp(place, one.position / one.position[-1], one.single) for one in curves
+    )
     return float(np.mean(np.abs(best - analytic)) / np.mean(best))
 
 
@@ -125,8 +146,12 @@ HOT: dict[str, HotCheck] = {
     "heat.friction_heat": lambda case, at: case.state.friction_heat,
     "heat.even_flash": _even_flash,
     "heat.largest_flash": lambda case, at: float(case.state.flash.max()),
-    "heat.tooth_rise": lambda case, at: getattr(case.state, at).tooth - case.duty.heat.oil_temperature,
-    "heat.bore_rise": lambda case, at: float(getattr(case.state, at).temperature[0]) - case.duty.heat.oil_temperature,
+    "heat.tooth_rise": lambda case, at: (
+        getattr(case.state, at).tooth - case.duty.heat.oil_temperature
+    ),
+    "heat.bore_rise": lambda case, at: (
+        float(getattr(case.state, at).temperature[0]) - case.duty.heat.oil_temperature
+    ),
     "heat.surface_rise": _surface_rise,
     "heat.mesh_stiffness": _mesh,
     "heat.single_pair_stiffness": _single,

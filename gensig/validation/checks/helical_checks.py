@@ -70,6 +70,8 @@ SLICED: dict[str, SlicedCheck] = {
     "sliced.single_pair_stiffness": lambda case, at: float(case.system.single_pair()[1].max()),
     "sliced.mesh_stiffness": lambda case, at: float(case.result.contact.stiffness.mean()),
     "sliced.stiffness_per_width": _single_per_width,
-    "sliced.iso6336_stiffness_per_width": lambda case, at: single_stiffness(case.system.pair, allow_extrapolation=True),
+    "sliced.iso6336_stiffness_per_width": lambda case, at: single_stiffness(
+        case.system.pair, allow_extrapolation=True
+    ),
     "sliced.depth_of_modification": _depth_of_all,
 }

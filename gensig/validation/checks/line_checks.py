@@ -27,7 +27,11 @@ def _ratios_ignored(line: ShaftLine) -> ShaftLine:
     for mesh in line.meshes:
         one, other = line.gears[mesh.driving], line.gears[mesh.driven]
         stiffness = mesh.stiffness * one.base_radius * other.base_radius
-        shafts.append(Shaft(first=one.node, second=other.node, stiffness=stiffness, loss_factor=mesh.loss_factor))
+        shafts.append(
+            Shaft(
+                first=one.node, second=other.node, stiffness=stiffness, loss_factor=mesh.loss_factor
+            )
+        )
     return ShaftLine(nodes=line.nodes, shafts=(*line.shafts, *shafts))
 
 
@@ -36,7 +40,9 @@ def _crank_only(line: ShaftLine) -> ShaftLine:
     own = ShaftLine(nodes=line.nodes, shafts=line.shafts).parts[0]
     if own != tuple(range(len(own))):
         raise ConfigError("crank_only: the nodes of the crank line must come first in the table")
-    return ShaftLine(nodes=line.nodes[: len(own)], shafts=tuple(s for s in line.shafts if s.first in own))
+    return ShaftLine(
+        nodes=line.nodes[: len(own)], shafts=tuple(s for s in line.shafts if s.first in own)
+    )
 
 
 VARIANTS: dict[str, Callable[[ShaftLine], ShaftLine]] = {
@@ -63,4 +69,7 @@ def _kinetic_share(case: DriveLine, at: str) -> float:
     return float(_modes(case.line).kinetic_share[mode, case.numbers.index(number)])
 
 
-LINES: dict[str, LineCheck] = {"line.natural_frequency": _frequency, "line.kinetic_share": _kinetic_share}
+LINES: dict[str, LineCheck] = {
+    "line.natural_frequency": _frequency,
+    "line.kinetic_share": _kinetic_share,
+}

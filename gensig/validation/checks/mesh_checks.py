@@ -73,7 +73,9 @@ def _mesh_stiffness_at(case: Case, at: str) -> float:
 def mean_mesh_stiffness(case: Case, at: str) -> float:
     """Mean tangent stiffness over a cycle, the single or the double zone."""
     first, last = _zone(case, at)
-    return float(mesh_stiffness(case, first + (last - first) * (np.arange(N_MEAN) + 0.5) / N_MEAN).mean())
+    return float(
+        mesh_stiffness(case, first + (last - first) * (np.arange(N_MEAN) + 0.5) / N_MEAN).mean()
+    )
 
 
 def _double_roll(case: Case, at: str) -> Array:
@@ -84,7 +86,9 @@ def _double_roll(case: Case, at: str) -> Array:
 def _double_zone_stiffness(case: Case, at: str) -> float:
     """At a share of the double zone, or its largest value."""
     if at == "max":
-        return float(mesh_stiffness(case, np.linspace(0.001, 0.999, 999) * _zone(case, "double")[1]).max())
+        return float(
+            mesh_stiffness(case, np.linspace(0.001, 0.999, 999) * _zone(case, "double")[1]).max()
+        )
     return float(mesh_stiffness(case, _double_roll(case, at))[0])
 
 
@@ -126,7 +130,9 @@ MESH: dict[str, Check] = {
     "mean_stiffness": _mean_stiffness,
     "mesh_stiffness": _mesh_stiffness_at,
     "mean_mesh_stiffness": mean_mesh_stiffness,
-    "double_over_single": lambda case, at: mean_mesh_stiffness(case, "double") / _mean_stiffness(case, "single"),
+    "double_over_single": lambda case, at: (
+        mean_mesh_stiffness(case, "double") / _mean_stiffness(case, "single")
+    ),
     "double_zone_stiffness": _double_zone_stiffness,
     "load_share": _load_share,
     "coupled_over_sum": _coupled_over_sum,

@@ -42,14 +42,21 @@ class RunUpCase:
         """
         system = self.system
         gears = system.pair.pinion, system.pair.wheel
-        run = Run(system=system, faults=(), specimen=perfect_specimen(*gears), gearbox=nominal_gearbox(len(CHANNELS)))
+        run = Run(
+            system=system,
+            faults=(),
+            specimen=perfect_specimen(*gears),
+            gearbox=nominal_gearbox(len(CHANNELS)),
+        )
         dynamics = pair_dynamics(run)
         amplitude = system.flanks.transmission_error().harmonics[:N_ORDERS]
         order, speed = np.arange(1, N_ORDERS + 1), to_si("speed_rpm", 1.0) * SPEEDS_RPM
         frequency = np.outer(speed, order * system.pair.pinion.n_teeth).ravel()
         push = dynamics.mean_mesh_stiffness * np.tile(amplitude, len(speed))
         force = np.asarray(push[:, None] * dynamics.approach_direction(), dtype=np.complex128)
-        felt = accelerations(dynamics, frequency, force)[:, [dynamics.dofs.index(name) for name in CHANNELS]]
+        felt = accelerations(dynamics, frequency, force)[
+            :, [dynamics.dofs.index(name) for name in CHANNELS]
+        ]
         return 10.0 * np.log10((np.abs(felt) ** 2).reshape(len(speed), -1).sum(axis=1) / 2.0)
 
     def beside(self, variant: str | None) -> RunUpCase:

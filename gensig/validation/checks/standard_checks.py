@@ -50,5 +50,7 @@ STANDARD: dict[str, Check] = {
     "iso_low_load_factor": _low_load_factor,
     "line_load": _line_load,
     "single_per_width": lambda case, at: largest_pair_stiffness(case) / case.pair.pinion.face_width,
-    "mesh_per_width": lambda case, at: mean_mesh_stiffness(case, "cycle") / case.pair.pinion.face_width,
+    "mesh_per_width": lambda case, at: (
+        mean_mesh_stiffness(case, "cycle") / case.pair.pinion.face_width
+    ),
 }

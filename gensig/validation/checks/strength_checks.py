@@ -87,7 +87,9 @@ STRENGTH: dict[str, StrengthCheck] = {
     "root.stress_factor": _stress_factor,
     "root.tangential_force": lambda case, at: _under(case, at).tangential_force,
     "root.normal_force": lambda case, at: _under(case, at).flanks.mesh_force,
-    "root.normal_force_per_width": lambda case, at: _under(case, at).flanks.mesh_force / case.pair.face_width,
+    "root.normal_force_per_width": lambda case, at: (
+        _under(case, at).flanks.mesh_force / case.pair.face_width
+    ),
     "root.torque": lambda case, at: _under(case, at).flanks.torque,
     "root.safety_paper": _safety("paper"),
     "root.safety_iso": _safety("iso"),

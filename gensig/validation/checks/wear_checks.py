@@ -23,10 +23,22 @@ WearCheck = Callable[["WearPoint", str], float]
 
 # the paper's fits as printed; it does not print the ranges they were fitted on
 EQ_25 = FittedLaw(
-    form="logarithm", a=709.3, b=127.3, c=0.0, torque=(10.0, 100.0), speed=(12.57, 12.57), largest_error=0
+    form="logarithm",
+    a=709.3,
+    b=127.3,
+    c=0.0,
+    torque=(10.0, 100.0),
+    speed=(12.57, 12.57),
+    largest_error=0,
 )
 EQ_26 = FittedLaw(
-    form="exponential", a=675.68, b=0.1753, c=0.0, torque=(200, 200), speed=(1.57, 12.57), largest_error=0
+    form="exponential",
+    a=675.68,
+    b=0.1753,
+    c=0.0,
+    torque=(200, 200),
+    speed=(1.57, 12.57),
+    largest_error=0,
 )
 # even grids on which fits of the paper's own law come out with its printed figures: found, not printed
 TORQUES = tuple(np.arange(10.0, 101.0, 10.0))
@@ -89,7 +101,10 @@ def _equation_15(point: WearPoint, at: str) -> float:
     pair, angle = point.case.pair, point.at(point.case.path.pressure_angle[0], at)
     radius, z1, z2 = pair.pinion.base_radius, pair.pinion.n_teeth, pair.wheel.n_teeth
     tangent = math.tan(angle)
-    own = radius * tangent - radius * z1 / ((z2 + z1) * math.tan(pair.working_pressure_angle)) * tangent**2
+    own = (
+        radius * tangent
+        - radius * z1 / ((z2 + z1) * math.tan(pair.working_pressure_angle)) * tangent**2
+    )
     return own * point.at(point.case.path.relative_curvature, at)
 
 
@@ -158,7 +173,9 @@ def _printed_exponent(point: WearPoint, at: str) -> float:
 
 def _printed_ratio(point: WearPoint, at: str) -> float:
     """Eq. (26) over eq. (25) at the case's torque and speed, which both are said to hold for."""
-    return float(EQ_26.formula(point.case.torque, point.speed)) / float(EQ_25.formula(point.case.torque, point.speed))
+    return float(EQ_26.formula(point.case.torque, point.speed)) / float(
+        EQ_25.formula(point.case.torque, point.speed)
+    )
 
 
 WEAR: dict[str, WearCheck] = {
@@ -166,7 +183,9 @@ WEAR: dict[str, WearCheck] = {
     "wear.pressure_angle": lambda point, at: point.at(point.case.path.pressure_angle[0], at),
     "wear.factor": lambda point, at: point.case.options.wear_factor("pinion"),
     "wear.sliding": _sliding,
-    "wear.sliding_root_over_tip": lambda point, at: abs(_sliding(point, "A") / _sliding(point, "E")),
+    "wear.sliding_root_over_tip": lambda point, at: abs(
+        _sliding(point, "A") / _sliding(point, "E")
+    ),
     "wear.sliding_root_times_tip": lambda point, at: _sliding(point, "A") * _sliding(point, "E"),
     "wear.sliding_at_pitch": lambda point, at: abs(_sliding(point, "C") / _sliding(point, "A")),
     "wear.pressure": _pressure,
@@ -176,7 +195,9 @@ WEAR: dict[str, WearCheck] = {
     "wear.wheel_per_mesh": _per_mesh(1),
     "wear.both_per_mesh": _per_mesh(None),
     "wear.pitch_over": lambda point, at: _per_mesh(0)(point, "C") / _per_mesh(0)(point, at),
-    "wear.pinion_root_over_wheel_tip": lambda point, at: _per_mesh(0)(point, "A") / _per_mesh(1)(point, "A"),
+    "wear.pinion_root_over_wheel_tip": lambda point, at: (
+        _per_mesh(0)(point, "A") / _per_mesh(1)(point, "A")
+    ),
     "wear.band_time": _band_time,
     "wear.rate": _rate,
     "wear.life": _life,

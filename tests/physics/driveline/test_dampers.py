@@ -11,13 +11,20 @@ from gensig.driveline.linear.matrices import line_matrices
 from gensig.driveline.linear.modal import natural_modes
 from gensig.driveline.linear.shaft_line import Node, Shaft, ShaftLine
 
-STIFFNESS = 1.0  # of the spring that holds the one disc, whose inertia is 1: its frequency is 1 rad/s
+STIFFNESS = (
+    1.0  # of the spring that holds the one disc, whose inertia is 1: its frequency is 1 rad/s
+)
 RATIOS = (0.1, 0.3)
 
 
 def one_disc(speeds):
     """A disc on a spring to the ground under one harmonic torque of 1 N m at half the speed."""
-    line = LinearLine(mass=np.eye(1), stiffness=STIFFNESS * np.eye(1), loss=np.zeros((1, 1)), damping=np.zeros((1, 1)))
+    line = LinearLine(
+        mass=np.eye(1),
+        stiffness=STIFFNESS * np.eye(1),
+        loss=np.zeros((1, 1)),
+        damping=np.zeros((1, 1)),
+    )
     spring = Elements(directions=np.ones((1, 1)), stiffness=np.array([STIFFNESS]), loss=np.zeros(1))
     torque = np.cos(2.0 * np.pi * np.arange(64) / 64)[None]
     return seen_from_nodes(line, spring, 0, lambda speed: torque, speeds, {1: 0}, n_orders=1)
@@ -38,7 +45,9 @@ def test_the_tuned_damper_of_one_disc_is_den_hartogs(ratio):
     assert_allclose(own, 1.0 / (1.0 + ratio), rtol=0.01)
     damping_ratio = found.damping / (2.0 * found.ring_inertia * own)
     assert_allclose(damping_ratio, np.sqrt(3.0 * ratio / (8.0 * (1.0 + ratio))), rtol=0.1)
-    other = TorsionalDamper(node=1, ring_inertia=ratio, damping=found.damping, stiffness=1.2 * found.stiffness)
+    other = TorsionalDamper(
+        node=1, ring_inertia=ratio, damping=found.damping, stiffness=1.2 * found.stiffness
+    )
     assert peak(seen, other) > 1.1 * peak(seen, found)
 
 
@@ -49,15 +58,21 @@ def test_the_viscous_damper_of_one_disc_is_den_hartogs(ratio):
     (found,) = tune_dampers(seen, [ratio], viscous=True)
     assert found.stiffness == 0.0
     assert_allclose(peak(seen, found), 1.0 + 2.0 / ratio, rtol=2e-3)
-    assert_allclose(found.damping, 2.0 * ratio / np.sqrt(2.0 * (1.0 + ratio) * (2.0 + ratio)), rtol=0.02)
+    assert_allclose(
+        found.damping, 2.0 * ratio / np.sqrt(2.0 * (1.0 + ratio) * (2.0 + ratio)), rtol=0.02
+    )
 
 
 def chain(*dampers):
     """Three discs on two shafts, one more disc behind a soft one, with dampers."""
-    nodes = tuple(Node(name=f"disc {place}", inertia=inertia) for place, inertia in enumerate((0.4, 0.2, 0.3, 1.0)))
+    nodes = tuple(
+        Node(name=f"disc {place}", inertia=inertia)
+        for place, inertia in enumerate((0.4, 0.2, 0.3, 1.0))
+    )
     stiffness = (9e3, 2e4, 5e3)
     shafts = tuple(
-        Shaft(first=place, second=place + 1, stiffness=one, loss_factor=0.03) for place, one in enumerate(stiffness)
+        Shaft(first=place, second=place + 1, stiffness=one, loss_factor=0.03)
+        for place, one in enumerate(stiffness)
     )
     return with_dampers(ShaftLine(nodes=nodes, shafts=shafts), (1, 2, 3, 4), dampers)
 
@@ -76,13 +91,22 @@ def test_dampers_on_top_of_a_solution_are_the_line_solved_again():
     speeds = (60.0, 180.0, 400.0)
     bare, _ = closed_line(line_matrices(chain()[0]))
     elements = Elements(directions=SPRING, stiffness=np.array([2e4]), loss=np.array([600.0]))
-    seen = seen_from_nodes(bare, elements, 0, lambda speed: torque, speeds, {2: 1, 3: 2}, n_orders=20)
+    seen = seen_from_nodes(
+        bare, elements, 0, lambda speed: torque, speeds, {2: 1, 3: 2}, n_orders=20
+    )
     damped, numbers = chain(*DAMPERS)
     assert numbers == (1, 2, 3, 4, 5, 6)
     whole, _ = closed_line(line_matrices(damped))
     loads = np.vstack([torque, np.zeros((2, 64))])
-    longer = Elements(directions=np.hstack([SPRING, np.zeros((1, 2))]), stiffness=np.array([2e4]), loss=elements.loss)
-    again = [steady_response(whole, loads, speed, n_orders=20).element_forces(longer)[1][0] for speed in speeds]
+    longer = Elements(
+        directions=np.hstack([SPRING, np.zeros((1, 2))]),
+        stiffness=np.array([2e4]),
+        loss=elements.loss,
+    )
+    again = [
+        steady_response(whole, loads, speed, n_orders=20).element_forces(longer)[1][0]
+        for speed in speeds
+    ]
     assert_allclose(seen.force_with(DAMPERS), again, rtol=1e-9)
     assert not np.allclose(seen.force_with(()), again, rtol=1e-2)
 
@@ -103,7 +127,10 @@ def test_a_damper_only_takes_energy():
 
 
 def test_a_ring_that_a_fluid_holds_turns_freely_and_shifts_no_mode():
-    bare, damped = natural_modes(line_matrices(chain()[0])), natural_modes(line_matrices(chain(DAMPERS[0])[0]))
+    bare, damped = (
+        natural_modes(line_matrices(chain()[0])),
+        natural_modes(line_matrices(chain(DAMPERS[0])[0])),
+    )
     assert (bare.n_rigid, damped.n_rigid) == (1, 2)
     assert_allclose(damped.frequency[2:], bare.frequency[1:], rtol=1e-9)
     assert np.all(damped.damping_ratio[2:] > bare.damping_ratio[1:])

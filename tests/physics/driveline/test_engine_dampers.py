@@ -47,7 +47,10 @@ def load(line):
 
 
 def test_dampers_of_the_configuration_are_those_added_and_those_tuned_with(line):
-    damped, read = with_own_dampers(line, DAMPERS), read_engine_line(compose("generate", (*ENGINE, AS_KEYS)))
+    damped, read = (
+        with_own_dampers(line, DAMPERS),
+        read_engine_line(compose("generate", (*ENGINE, AS_KEYS))),
+    )
     assert read.drive.numbers == damped.drive.numbers == (*range(1, 68), 68, 69)
     assert read.ratios[68] == read.ratios[21] == 0.5
     mesh = mesh_between(line, (21, 45))
@@ -62,7 +65,11 @@ def test_root_stress_follows_the_tooth_force(config, line, load):
     strength = read_mesh_strength(config, line, mesh)
     found = dynamic_root_stress(strength, line, mesh, load)
     # ISO: F_t Y_F Y_S / (b m), engine reference, section 4: 2.498 at 20 mm and 3 mm
-    assert_allclose(found.gears["wheel"].stress, load.greatest * np.cos(np.radians(20.0)) * 2.498 / 6e-5, rtol=1e-3)
+    assert_allclose(
+        found.gears["wheel"].stress,
+        load.greatest * np.cos(np.radians(20.0)) * 2.498 / 6e-5,
+        rtol=1e-3,
+    )
     for name, stress in found.passes.items():
         assert stress.shape[0] == 54  # 54 teeth meet in a cycle, which is one turn of the pump
         assert np.all(stress <= found.history.stress[name] * (1.0 + 1e-12))
@@ -77,14 +84,23 @@ def test_dampers_on_the_pump_drive_lower_the_load_there_and_leave_the_flywheel(l
     damped, mesh = with_own_dampers(line, DAMPERS), mesh_between(line, (21, 45))
     response = damped.response(SPEED, TORQUE)
     assert tooth_load(damped, mesh, response).largest < 0.75 * load.largest
-    assert_allclose(response.fluctuation()[13], line.response(SPEED, TORQUE).fluctuation()[13], rtol=0.02)
-    worse = with_own_dampers(line, (TorsionalDamper(node=45, ring_inertia=0.1, damping=0.0, stiffness=1e9),))
-    assert tooth_load(worse, mesh, worse.response(SPEED, TORQUE)).largest > load.largest  # a locked ring: inertia alone
+    assert_allclose(
+        response.fluctuation()[13], line.response(SPEED, TORQUE).fluctuation()[13], rtol=0.02
+    )
+    worse = with_own_dampers(
+        line, (TorsionalDamper(node=45, ring_inertia=0.1, damping=0.0, stiffness=1e9),)
+    )
+    assert (
+        tooth_load(worse, mesh, worse.response(SPEED, TORQUE)).largest > load.largest
+    )  # a locked ring: inertia alone
 
 
 def test_a_force_that_never_closes_the_mesh_is_refused(config, line):
     mesh = mesh_between(line, (21, 45))
     with pytest.raises(ConfigError, match="its force never closes the driving flanks"):
         dynamic_root_stress(
-            read_mesh_strength(config, line, mesh), line, mesh, ToothLoad(speed=SPEED, force=np.full(8, -1.0))
+            read_mesh_strength(config, line, mesh),
+            line,
+            mesh,
+            ToothLoad(speed=SPEED, force=np.full(8, -1.0)),
         )

@@ -36,7 +36,9 @@ def engine(*words):
 def passage():
     """Up and down through the second mode, which order 5 meets at 825 r/min, teeth that do not part."""
     line = engine("system.backlash_um=0", "system.loss_factor.gear_mesh=0")
-    return line, sweep_response(line, LOW, HIGH, SECONDS, 0.0, own={}, nodes=(FLYWHEEL,), n_orders=20)
+    return line, sweep_response(
+        line, LOW, HIGH, SECONDS, 0.0, own={}, nodes=(FLYWHEEL,), n_orders=20
+    )
 
 
 def test_a_sweep_of_a_line_without_play_is_the_linear_line(passage):
@@ -58,7 +60,8 @@ def test_a_sweep_of_a_line_without_play_is_the_linear_line(passage):
 def test_a_resonance_is_met_late_either_way(passage):
     _, sweep = passage
     up, down = (
-        float(way.speeds @ way.angle[0, :, ORDER_5] / way.angle[0, :, ORDER_5].sum()) for way in (sweep.up, sweep.down)
+        float(way.speeds @ way.angle[0, :, ORDER_5] / way.angle[0, :, ORDER_5].sum())
+        for way in (sweep.up, sweep.down)
     )
     assert up > down + 0.5 * RPM
     at = sweep.difference[0]
@@ -68,13 +71,16 @@ def test_a_resonance_is_met_late_either_way(passage):
 def test_the_course_goes_up_and_comes_back():
     course = sweep_course(70.0, 180.0, 3.0, 500.0)
     assert_allclose(
-        np.interp([-1.0, 0.0, 1.5, 3.0, 4.5, 6.0, 7.0], course.time, course.speed), [70, 70, 125, 180, 125, 70, 70]
+        np.interp([-1.0, 0.0, 1.5, 3.0, 4.5, 6.0, 7.0], course.time, course.speed),
+        [70, 70, 125, 180, 125, 70, 70],
     )
     assert np.all(course.torque == 500.0)
 
 
 def test_too_short_a_sweep_is_refused():
-    with pytest.raises(ConfigError, match=r"passes too few cycles at its low end; give 0\.81 s or more"):
+    with pytest.raises(
+        ConfigError, match=r"passes too few cycles at its low end; give 0\.81 s or more"
+    ):
         sweep_response(engine(), 650 * RPM, 1750 * RPM, 0.2, 0.0, own={}, nodes=(14,), n_orders=10)
     with pytest.raises(ConfigError, match="from a positive speed up to a higher one"):
         sweep_response(engine(), 1750 * RPM, 650 * RPM, 5.0, 0.0, own={}, nodes=(14,), n_orders=10)
@@ -82,7 +88,9 @@ def test_too_short_a_sweep_is_refused():
 
 def test_a_steady_line_has_its_amplitude_in_the_spectrum():
     time = np.arange(round(0.5 * RATE)) / RATE
-    frequencies, spectra = amplitude_spectra(np.array([0.3 * np.sin(2 * np.pi * 40.0 * time) + 5.0 * time + 2.0]))
+    frequencies, spectra = amplitude_spectra(
+        np.array([0.3 * np.sin(2 * np.pi * 40.0 * time) + 5.0 * time + 2.0])
+    )
     assert frequencies[spectra[0].argmax()] == 40.0
     assert_allclose(spectra[0].max(), 0.3, rtol=0.01)
 
@@ -116,7 +124,10 @@ def test_root_stress_in_time_of_a_force_that_repeats_is_that_of_one_cycle():
     assert_allclose(typical_largest(passes, 54), one.max(), rtol=2e-3)
     shift = int(
         np.flatnonzero(
-            [np.allclose(np.roll(one, -k, axis=0)[:50], passes[:50], atol=0.01 * one.max()) for k in range(54)]
+            [
+                np.allclose(np.roll(one, -k, axis=0)[:50], passes[:50], atol=0.01 * one.max())
+                for k in range(54)
+            ]
         )[0]
     )
     assert_allclose(np.roll(one, -shift, axis=0)[:54], passes[54:108], atol=0.01 * one.max())

@@ -28,7 +28,9 @@ def changed(path, value):
     return values
 
 
-@pytest.mark.parametrize(("rpm", "torque"), [(650, 0.0), (1200, 3000.0), (1688, 12680.0), (1750, 13600.0)])
+@pytest.mark.parametrize(
+    ("rpm", "torque"), [(650, 0.0), (1200, 3000.0), (1688, 12680.0), (1750, 13600.0)]
+)
 def test_power_of_the_gas_is_that_of_all_it_drives(rpm, torque):
     found = torques_of(option(), rpm * RPM, torque)
     ratio = np.array(list(ratio_of_teeth().values()))
@@ -41,7 +43,9 @@ def test_power_of_the_gas_is_that_of_all_it_drives(rpm, torque):
 def test_reference_point_is_that_of_the_class():
     found = torques_of(option())
     assert_allclose(found.pressure.max() * 1e-6, 17.0, rtol=0.01)
-    assert_allclose(found.indicated_torque / 20, 697.0, rtol=0.02)  # the independent estimate with the same sizes
+    assert_allclose(
+        found.indicated_torque / 20, 697.0, rtol=0.02
+    )  # the independent estimate with the same sizes
     consumption = found.fuel_volume * 840 * 20 / CYCLE * SPEED / (TORQUE * SPEED)  # kg/J
     assert 0.18 < consumption * 3.6e9 / 1e3 < 0.22  # kg/kWh of a good diesel
 
@@ -63,7 +67,9 @@ def test_harmonics_of_one_cylinder_are_as_estimated_independently():
     estimated = [2.33, 3.44, 2.89, 2.70, 2.22, 1.86, 1.56, 1.27, 1.01, 0.81, 0.65, 0.53]
     gas = found.indicated_torque
     assert_allclose(np.abs(amplitude[:12]) / gas, estimated, rtol=0.08)
-    assert 0.05 < abs(amplitude[19]) / gas < 0.15  # 0.08 estimated: the steepness of combustion decides it
+    assert (
+        0.05 < abs(amplitude[19]) / gas < 0.15
+    )  # 0.08 estimated: the steepness of combustion decides it
     assert mean > 0.0
 
 
@@ -95,7 +101,10 @@ def test_pump_pulses_follow_the_firing_and_the_load():
 
 
 def test_quadratic_loads_follow_the_speed_and_constant_ones_do_not():
-    slow, fast = torques_of(option(), 800 * RPM, 0.0).on(NODES), torques_of(option(), 1600 * RPM, 0.0).on(NODES)
+    slow, fast = (
+        torques_of(option(), 800 * RPM, 0.0).on(NODES),
+        torques_of(option(), 1600 * RPM, 0.0).on(NODES),
+    )
     assert_allclose(fast[42].mean(), 4.0 * slow[42].mean(), rtol=1e-12)
     assert_allclose(fast[66].mean(), slow[66].mean(), rtol=1e-12)
 
@@ -126,7 +135,9 @@ def test_a_measured_pressure_gives_the_torque_back(tmp_path):
 
 def test_a_measured_pressure_below_the_friction_is_refused(tmp_path):
     values, _ = pressure_file(tmp_path, scale=0.02)
-    with pytest.raises(ConfigError, match=r"gives 281 N m, below the .* N m of friction and drives"):
+    with pytest.raises(
+        ConfigError, match=r"gives 281 N m, below the .* N m of friction and drives"
+    ):
         torques_of(values, torque=None)
 
 
@@ -143,7 +154,10 @@ def test_a_torque_below_the_friction_is_refused():
         torques_of(option(), torque=-10.0)
     values = changed("friction_mean_pressure_mpa", 0.0)
     values["loads"], values["injection_pump"], values["valves"] = None, None, None
-    with pytest.raises(ConfigError, match=r"the torque of the gas, 0 N m with friction and drives, is below the 2.4"):
+    with pytest.raises(
+        ConfigError,
+        match=r"the torque of the gas, 0 N m with friction and drives, is below the 2.4",
+    ):
         torques_of(values, torque=0.0)
 
 
@@ -151,35 +165,107 @@ def test_a_torque_below_the_friction_is_refused():
     ("path", "value", "message"),
     [
         ("throw_nodes", [13, 12], "excitation.throw_nodes has 2 different nodes for 10 throws"),
-        ("throw_nodes", [99, 12, 11, 10, 9, 8, 7, 6, 5, 4], "excitation.throw_nodes: the shaft line has no node 99"),
-        ("throw_nodes", [20, 12, 11, 10, 9, 8, 7, 6, 5, 4], "node 20 turns 0.5 times as fast as the crank; it needs 1"),
+        (
+            "throw_nodes",
+            [99, 12, 11, 10, 9, 8, 7, 6, 5, 4],
+            "excitation.throw_nodes: the shaft line has no node 99",
+        ),
+        (
+            "throw_nodes",
+            [20, 12, 11, 10, 9, 8, 7, 6, 5, 4],
+            "node 20 turns 0.5 times as fast as the crank; it needs 1",
+        ),
         ("throw_nodes", [1.5], "excitation.throw_nodes = [1.5] is not a list of whole numbers"),
         ("valve_nodes.A", [1, 2], "excitation.valve_nodes.A has 2 nodes for 10 throws"),
-        ("valve_nodes.A", [67] * 10, "node 67 turns 1.475 times as fast as the crank; it needs 0.5"),
+        (
+            "valve_nodes.A",
+            [67] * 10,
+            "node 67 turns 1.475 times as fast as the crank; it needs 0.5",
+        ),
         ("valve_nodes.C", [], "excitation.valve_nodes: no bank 'C'; there are A, B"),
-        ("valves.intake.cam.lift_mm", 0, "excitation.valves.intake.cam.lift_mm = 0 must be positive"),
+        (
+            "valves.intake.cam.lift_mm",
+            0,
+            "excitation.valves.intake.cam.lift_mm = 0 must be positive",
+        ),
         ("valves.intake.cam", 3, "excitation.valves.intake.cam = 3 must be a group of keys"),
-        ("valves.intake.open_deg", 3, "excitation.valves.intake: unknown key 'open_deg'; did you mean 'opening_deg'?"),
-        ("injection_pump.cylinders", ["A1"], "excitation.injection_pump.cylinders must name a different cylinder"),
-        ("injection_pump.nodes", "46", "excitation.injection_pump.nodes = '46' is not a list of whole numbers"),
-        ("injection_pump.cam.follower", 1, "excitation.injection_pump.cam.follower = 1 is not text"),
+        (
+            "valves.intake.open_deg",
+            3,
+            "excitation.valves.intake: unknown key 'open_deg'; did you mean 'opening_deg'?",
+        ),
+        (
+            "injection_pump.cylinders",
+            ["A1"],
+            "excitation.injection_pump.cylinders must name a different cylinder",
+        ),
+        (
+            "injection_pump.nodes",
+            "46",
+            "excitation.injection_pump.nodes = '46' is not a list of whole numbers",
+        ),
+        (
+            "injection_pump.cam.follower",
+            1,
+            "excitation.injection_pump.cam.follower = 1 is not text",
+        ),
         ("injection_pump.diameter_cm", 1, "unknown key 'diameter_cm'; did you mean 'diameter_mm'?"),
-        ("loads.fresh_water_pump.node", 99, "excitation.loads.fresh_water_pump.node: the shaft line has no node 99"),
-        ("loads.fresh_water_pump.law", "cubic", "excitation.loads.fresh_water_pump.law = 'cubic'; allowed: constant"),
-        ("loads.fresh_water_pump.torque_nm", -1, "excitation.loads.fresh_water_pump.torque_nm = -1 must not be"),
+        (
+            "loads.fresh_water_pump.node",
+            99,
+            "excitation.loads.fresh_water_pump.node: the shaft line has no node 99",
+        ),
+        (
+            "loads.fresh_water_pump.law",
+            "cubic",
+            "excitation.loads.fresh_water_pump.law = 'cubic'; allowed: constant",
+        ),
+        (
+            "loads.fresh_water_pump.torque_nm",
+            -1,
+            "excitation.loads.fresh_water_pump.torque_nm = -1 must not be",
+        ),
         ("dynamometer.node", 99, "excitation.dynamometer.node: the shaft line has no node 99"),
-        ("dynamometer.disturbance_share", 2, "excitation.dynamometer.disturbance_share = 2 must lie in 0..1"),
-        ("dynamometer.disturbance_frequency_hz", 0, "disturbance_frequency_hz = 0 must be positive"),
-        ("reference.speed_rpm", 0, "excitation.reference: speed_rpm and torque_nm must be positive"),
-        ("friction_mean_pressure_mpa", -1, "excitation.friction_mean_pressure_mpa = -1 must not be negative"),
-        ("friction_mean_pressure_mpa", "much", "excitation.friction_mean_pressure_mpa = 'much' is not a number"),
+        (
+            "dynamometer.disturbance_share",
+            2,
+            "excitation.dynamometer.disturbance_share = 2 must lie in 0..1",
+        ),
+        (
+            "dynamometer.disturbance_frequency_hz",
+            0,
+            "disturbance_frequency_hz = 0 must be positive",
+        ),
+        (
+            "reference.speed_rpm",
+            0,
+            "excitation.reference: speed_rpm and torque_nm must be positive",
+        ),
+        (
+            "friction_mean_pressure_mpa",
+            -1,
+            "excitation.friction_mean_pressure_mpa = -1 must not be negative",
+        ),
+        (
+            "friction_mean_pressure_mpa",
+            "much",
+            "excitation.friction_mean_pressure_mpa = 'much' is not a number",
+        ),
         ("pressure.file", 3, "excitation.pressure.file = 3 is not text"),
         ("pressure.kind", "otto", "excitation.pressure: unknown key 'kind'"),
-        ("pressure.boost_pressure", 1, "'boost_pressure' has the wrong unit; write it as 'boost_pressure_mpa'"),
+        (
+            "pressure.boost_pressure",
+            1,
+            "'boost_pressure' has the wrong unit; write it as 'boost_pressure_mpa'",
+        ),
         ("kind", "motor", "excitation.kind = 'motor'; allowed: engine"),
         ("sound", 1, "excitation: unknown key 'sound'"),
         ("cylinder.bore_mm", "wide", "excitation.cylinder.bore_mm = 'wide' is not a number"),
-        ("layout.firing_order", ["A1"] * 20, "excitation.layout.firing_order repeats A1 (places 1 and 2)"),
+        (
+            "layout.firing_order",
+            ["A1"] * 20,
+            "excitation.layout.firing_order repeats A1 (places 1 and 2)",
+        ),
     ],
 )
 def test_what_makes_no_engine_is_refused_in_one_line(path, value, message):
@@ -192,9 +278,14 @@ def test_toothed_wheels_are_read_by_name():
     wheels = read_wheels(option())
     assert {name: wheel.node for name, wheel in wheels.items()} == {"flywheel": 14, "pump_end": 45}
     assert read_wheels(option(toothed_wheels=None)) == {}
-    with pytest.raises(ConfigError, match=r"excitation\.toothed_wheels\.flywheel\.n_teeth = 2 must lie in 4\.\.1000"):
+    with pytest.raises(
+        ConfigError,
+        match=r"excitation\.toothed_wheels\.flywheel\.n_teeth = 2 must lie in 4\.\.1000",
+    ):
         read_wheels(changed("toothed_wheels.flywheel.n_teeth", 2))
-    without_node = {key: one for key, one in option()["toothed_wheels"]["flywheel"].items() if key != "node"}
+    without_node = {
+        key: one for key, one in option()["toothed_wheels"]["flywheel"].items() if key != "node"
+    }
     with pytest.raises(ConfigError, match=r"excitation\.toothed_wheels\.flywheel: missing node"):
         read_wheels(option(toothed_wheels={"flywheel": without_node}))
 
@@ -210,7 +301,9 @@ def test_missing_keys_are_named():
 
 def test_finer_cycles_give_the_same_torques():
     engine = read_engine(option())
-    coarse, fine = (engine_torques(engine, SPEED, TORQUE, ratio_of_teeth(), n_points=n) for n in (2880, 11520))
+    coarse, fine = (
+        engine_torques(engine, SPEED, TORQUE, ratio_of_teeth(), n_points=n) for n in (2880, 11520)
+    )
     _, one = cycle_orders(coarse.on(NODES), 40)
     _, other = cycle_orders(fine.on(NODES), 40)
     assert np.max(np.abs(one - other)) < 2e-3 * np.max(np.abs(other))

@@ -4,7 +4,16 @@ from dataclasses import dataclass
 
 import numpy as np
 import pytest
-from engine_cases import RPM, SPEED, engine_line, option, ratio_of_teeth, ratios, response_of, torques_of
+from engine_cases import (
+    RPM,
+    SPEED,
+    engine_line,
+    option,
+    ratio_of_teeth,
+    ratios,
+    response_of,
+    torques_of,
+)
 from numpy.testing import assert_allclose
 
 from gensig.driveline.excitation.cycle import cycle_angles
@@ -40,7 +49,9 @@ def chain(loss_factor=0.0, damping=0.0, grounded=True):
 
 def cycle_torque(seed=0, n_orders=12, n_dofs=3):
     rng = np.random.default_rng(seed)
-    amplitudes = rng.standard_normal((n_dofs, n_orders)) + 1j * rng.standard_normal((n_dofs, n_orders))
+    amplitudes = rng.standard_normal((n_dofs, n_orders)) + 1j * rng.standard_normal(
+        (n_dofs, n_orders)
+    )
     return over_cycle(amplitudes, N), amplitudes
 
 
@@ -50,7 +61,9 @@ def test_orders_of_a_torque_give_it_back():
     assert_allclose(mean, 3.0, rtol=1e-12)
     assert_allclose(found, amplitudes, rtol=1e-9)
     angle = cycle_angles(N)
-    by_hand = sum(np.real(c * np.exp(0.5j * k * angle)) for k, c in enumerate(amplitudes[0], start=1))
+    by_hand = sum(
+        np.real(c * np.exp(0.5j * k * angle)) for k, c in enumerate(amplitudes[0], start=1)
+    )
     assert_allclose(torque[0], by_hand, atol=1e-9)
 
 
@@ -63,12 +76,17 @@ def test_response_here_to_a_torque_there_is_that_there_to_one_here(damper):
     assert np.max(np.abs(receptance - np.swapaxes(receptance, 1, 2)) / scale) < 1e-9
     force = np.zeros((4, 67), dtype=complex)
     force[:, 13] = 1.0
-    assert_allclose(line.response(force, frequencies), receptance[:, :, 13], rtol=1e-6, atol=1e-9 * scale.max())
+    assert_allclose(
+        line.response(force, frequencies), receptance[:, :, 13], rtol=1e-6, atol=1e-9 * scale.max()
+    )
 
 
 def test_one_disc_on_a_shaft_is_the_closed_form():
     one = LinearLine(
-        mass=np.array([[2.0]]), stiffness=np.array([[800.0]]), loss=np.array([[40.0]]), damping=np.array([[3.0]])
+        mass=np.array([[2.0]]),
+        stiffness=np.array([[800.0]]),
+        loss=np.array([[40.0]]),
+        damping=np.array([[3.0]]),
     )
     w = np.array([5.0, 20.0, 70.0])
     found = one.response(np.ones((3, 1), dtype=complex), w)[:, 0]
@@ -95,7 +113,9 @@ def test_the_whole_engine_takes_no_more_than_it_gets():
     found = steady_response(line, torque, SPEED, n_orders=80)
     power_in = 0.5 * np.sum(np.real(np.conj(found.speed_deviation) * amplitudes))
     w = SPEED * found.orders
-    power_lost = 0.5 * np.real(np.einsum("io,ij,jo,o->", np.conj(found.angle), line.loss, found.angle, w))
+    power_lost = 0.5 * np.real(
+        np.einsum("io,ij,jo,o->", np.conj(found.angle), line.loss, found.angle, w)
+    )
     assert_allclose(power_in, power_lost, rtol=1e-6)
 
 
@@ -127,10 +147,16 @@ def test_slow_torques_bend_the_line_statically_and_fast_ones_move_the_masses():
     slow = steady_response(line, torque, 1e-3, n_orders=2)
     assert_allclose(slow.angle, np.linalg.solve(line.stiffness, amplitudes), rtol=1e-6)
     fast = steady_response(line, torque, 1e6, n_orders=2)
-    assert_allclose(fast.angle, -np.linalg.solve(line.mass, amplitudes) / np.square(1e6 * fast.orders), rtol=1e-4)
+    assert_allclose(
+        fast.angle,
+        -np.linalg.solve(line.mass, amplitudes) / np.square(1e6 * fast.orders),
+        rtol=1e-4,
+    )
     mean, carried = slow.element_forces(springs)
     assert_allclose(mean, 0.0, atol=1e-9)
-    assert_allclose(carried[2], -amplitudes[2], rtol=1e-4)  # the last shaft carries what acts on the last disc
+    assert_allclose(
+        carried[2], -amplitudes[2], rtol=1e-4
+    )  # the last shaft carries what acts on the last disc
 
 
 def test_mean_torques_are_carried_through_and_must_balance():
@@ -143,7 +169,9 @@ def test_mean_torques_are_carried_through_and_must_balance():
     assert_allclose(mean, [50.0, 50.0], rtol=1e-9)
     assert abs(np.sum(np.diag(line.mass) * found.twist)) < 1e-12
     torque[2] += 1.0
-    with pytest.raises(SimulationError, match=r"the mean torques leave 0.5774 N m on a line that nothing holds"):
+    with pytest.raises(
+        SimulationError, match=r"the mean torques leave 0.5774 N m on a line that nothing holds"
+    ):
         steady_response(line, torque, 60.0, n_orders=12)
 
 
@@ -167,7 +195,9 @@ def test_fluctuation_is_half_the_peak_to_peak():
 def test_more_orders_than_usual_change_little():
     line, _, _ = engine_line()
     torque = torques_of(option()).on(NODES)
-    few, usual, many = (steady_response(line, torque, SPEED, n_orders=n).fluctuation() for n in (60, 200, 400))
+    few, usual, many = (
+        steady_response(line, torque, SPEED, n_orders=n).fluctuation() for n in (60, 200, 400)
+    )
     assert_allclose(few[[2, 13]], many[[2, 13]], rtol=0.02)
     assert_allclose(usual[[2, 13, 44, 64]], many[[2, 13, 44, 64]], rtol=0.03)
 
@@ -245,13 +275,17 @@ def test_what_is_no_line_is_refused():
     with pytest.raises(ValueError, match="stiffness must be symmetric"):
         LinearLine(mass=line.mass, stiffness=skew, loss=line.loss, damping=line.damping)
     with pytest.raises(ValueError, match=r"loss \(2, 2\) must be a finite matrix \(3, 3\)"):
-        LinearLine(mass=line.mass, stiffness=line.stiffness, loss=np.zeros((2, 2)), damping=line.damping)
+        LinearLine(
+            mass=line.mass, stiffness=line.stiffness, loss=np.zeros((2, 2)), damping=line.damping
+        )
     with pytest.raises(ValueError, match=r"n_orders = 40 must lie in 1\.\.31"):
         cycle_orders(np.zeros((3, 64)), 40)
     with pytest.raises(ValueError, match="24 points of a cycle cannot hold 12 orders"):
         over_cycle(np.zeros((3, 12), dtype=complex), 24)
     with pytest.raises(ValueError, match="must be positive"):
         steady_response(line, np.zeros((3, 64)), 0.0, n_orders=4)
-    undamped = LinearLine(mass=np.eye(1), stiffness=np.eye(1), loss=np.zeros((1, 1)), damping=np.zeros((1, 1)))
+    undamped = LinearLine(
+        mass=np.eye(1), stiffness=np.eye(1), loss=np.zeros((1, 1)), damping=np.zeros((1, 1))
+    )
     with pytest.raises(SimulationError, match="excited at its natural frequency"):
         undamped.response(np.ones((1, 1), dtype=complex), np.array([1.0]))

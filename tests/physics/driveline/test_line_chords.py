@@ -58,28 +58,43 @@ class TestLaw:
         table, force = helical
         rolls = np.linspace(0.05, 30.05, 61)
         errors = dict(zip(("pinion_error", "wheel_error"), mesh.errors, strict=True))
-        found = chord_equilibrium(table, chord_states(table, rolls * table.pair.base_pitch, **errors), share * force)
-        forces = [law_at(mesh, turned, approach)[0] for turned, approach in zip(rolls, found.approach, strict=True)]
+        found = chord_equilibrium(
+            table, chord_states(table, rolls * table.pair.base_pitch, **errors), share * force
+        )
+        forces = [
+            law_at(mesh, turned, approach)[0]
+            for turned, approach in zip(rolls, found.approach, strict=True)
+        ]
         assert_allclose(forces, share * force, rtol=1e-3, atol=0)
 
     @pytest.mark.parametrize("approach", [2e-5, 6e-5, -1.5e-4])
-    def test_force_and_torque_of_the_passing_teeth_are_slopes_of_one_potential(self, mesh, approach):
+    def test_force_and_torque_of_the_passing_teeth_are_slopes_of_one_potential(
+        self, mesh, approach
+    ):
         mesh = replace(mesh, backlash=1e-4)
         for turned in (0.313, 2.711, 9.173):
             found = law_at(mesh, turned, approach)
-            below, above = (law_at(mesh, turned + off, approach)[layout.STORED] for off in (-1e-7, 1e-7))
+            below, above = (
+                law_at(mesh, turned + off, approach)[layout.STORED] for off in (-1e-7, 1e-7)
+            )
             assert_allclose(found[layout.ALONG], -(above - below) / 2e-7, rtol=1e-3, atol=1e-6)
-            below, above = (law_at(mesh, turned, approach + off)[layout.STORED] for off in (-1e-10, 1e-10))
+            below, above = (
+                law_at(mesh, turned, approach + off)[layout.STORED] for off in (-1e-10, 1e-10)
+            )
             assert_allclose(found[layout.FORCE], (above - below) / 2e-10, rtol=1e-4, atol=0)
 
     def test_all_springs_of_a_pair_are_damped_by_its_first_touch(self, mesh):
         still, fast = law_at(mesh, 0.4, 3e-5), law_at(mesh, 0.4, 3e-5, rate=10.0)
-        assert_allclose(fast[layout.FORCE], (1.0 + 10.0 * DAMPING) * still[layout.FORCE], rtol=1e-12, atol=0)
+        assert_allclose(
+            fast[layout.FORCE], (1.0 + 10.0 * DAMPING) * still[layout.FORCE], rtol=1e-12, atol=0
+        )
         assert law_at(mesh, 0.4, 3e-5, rate=-1e4)[layout.FORCE] == pytest.approx(0.0, abs=0.0)
 
     def test_the_missing_tooth_is_missing_on_both_flanks_once_a_turn(self, helical, mesh):
         n_teeth = helical[0].pair.pinion.n_teeth
-        sound = replace(mesh, rows=np.maximum(mesh.rows, 0), coast_rows=np.zeros_like(mesh.coast_rows))
+        sound = replace(
+            mesh, rows=np.maximum(mesh.rows, 0), coast_rows=np.zeros_like(mesh.coast_rows)
+        )
         for approach in (3e-5, -mesh.backlash - 3e-5):
             ratio = np.array([
                 law_at(mesh, turned, approach)[0] / law_at(sound, turned, approach)[0]
@@ -95,10 +110,17 @@ class TestLaw:
         mesh = placed(sliced_pair_mesh, table)
         pair, pitch = table.pair, table.pair.base_pitch
         middle = 0.5 * pair.face_width * math.tan(pair.base_helix_angle)
-        for position in (0.1, 0.35, 0.8):  # of the middle of the face, past the pitch point, pitches
+        for position in (
+            0.1,
+            0.35,
+            0.8,
+        ):  # of the middle of the face, past the pitch point, pitches
             front = (pair.pitch_point + middle) / pitch + position
             back = (pair.pitch_point + middle) / pitch + 0.5 - position
-            one, other = law_at(mesh, front + 9.0, 3e-5)[0], law_at(mesh, back + 9.0, -mesh.backlash - 3e-5)[0]
+            one, other = (
+                law_at(mesh, front + 9.0, 3e-5)[0],
+                law_at(mesh, back + 9.0, -mesh.backlash - 3e-5)[0],
+            )
             assert_allclose(other, -one, rtol=1e-9, atol=0)
 
     def test_springs_begin_at_0_and_grow(self, mesh):
@@ -116,7 +138,9 @@ class TestZeroHelix:
         for turned in (0.2, 1.7, 2.4, 23.9):
             for approach in (1e-5, 4e-5, -one.backlash - 2e-5):
                 expected = law_at(one, turned, approach, 1e-2, 1e3)
-                assert_allclose(law_at(other, turned, approach, 1e-2, 1e3), expected, rtol=1e-9, atol=1e-12)
+                assert_allclose(
+                    law_at(other, turned, approach, 1e-2, 1e3), expected, rtol=1e-9, atol=1e-12
+                )
 
     def test_spur_teeth_in_slices_move_as_the_spur_mesh(self, machine, dynamics_of):
         """As their statics, to 1e-4 of the approach with linear contact: docs/theory/helical_mesh.md."""

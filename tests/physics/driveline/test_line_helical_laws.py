@@ -70,7 +70,9 @@ def test_constant_stiffness_stays_a_choice_and_the_flywheel_hardly_feels_it():
     line, other = running("false", "constant"), running("false", "sliced")
     assert all(len(mesh.depth) == 1 for mesh in line.line.meshes)
     found = [
-        one.run(SOLVER, duration=0.3, channels=[("speed", one.dof(14))], settling=0.3).signals["speed", one.dof(14)]
+        one.run(SOLVER, duration=0.3, channels=[("speed", one.dof(14))], settling=0.3).signals[
+            "speed", one.dof(14)
+        ]
         for one in (line, other)
     ]
     assert np.std(found[0] - found[1]) < 0.05 * np.std(found[0])
@@ -83,7 +85,8 @@ def test_our_stiffness_is_of_the_size_of_the_tables():
     config = read_request(["system=engine_gear_train", "excitation=engine_v20"]).config
     own = own_meshes(line.machine, config, SPEED, TORQUE)
     ratio = [
-        mean_mesh_stiffness(own[place].table, abs(force)) / line.machine.drive.line.meshes[place].stiffness
+        mean_mesh_stiffness(own[place].table, abs(force))
+        / line.machine.drive.line.meshes[place].stiffness
         for place, force in enumerate(line.mesh_force)
     ]
     odd = line.machine.mesh_names.index("19/32")
@@ -94,10 +97,19 @@ def test_our_stiffness_is_of_the_size_of_the_tables():
 def test_a_fault_that_vanishes_is_the_sound_machine_and_a_missing_tooth_is_not():
     record = machine("system.record_mesh=[3,66]")
     sound = simulated(record)
-    tiny = simulated(record, {"kind": "broken", "gear": "wheel", "tooth": 10, "broken_height_mm": 0.0})
+    tiny = simulated(
+        record, {"kind": "broken", "gear": "wheel", "tooth": 10, "broken_height_mm": 0.0}
+    )
     gone = simulated(record, {"kind": "missing_tooth", "gear": "wheel", "tooth": 10})
-    assert_allclose(tiny.acceleration, sound.acceleration, rtol=1e-9, atol=1e-9 * np.abs(sound.acceleration).max())
-    assert np.std(gone.acceleration[1] - sound.acceleration[1]) > 0.01 * np.std(sound.acceleration[1])
+    assert_allclose(
+        tiny.acceleration,
+        sound.acceleration,
+        rtol=1e-9,
+        atol=1e-9 * np.abs(sound.acceleration).max(),
+    )
+    assert np.std(gone.acceleration[1] - sound.acceleration[1]) > 0.01 * np.std(
+        sound.acceleration[1]
+    )
     assert max(sound.integration_error, gone.integration_error) < 1e-3
 
 
@@ -117,7 +129,9 @@ def test_the_faulty_tooth_is_on_its_gear_in_all_its_meshes_and_nowhere_else(mesh
         assert (one.rows == -1).any() == (name in faulty)
 
 
-@pytest.mark.parametrize(("kind", "same", "other"), [("pitting", True, False), ("crack", True, True)])
+@pytest.mark.parametrize(
+    ("kind", "same", "other"), [("pitting", True, False), ("crack", True, True)]
+)
 def test_pits_stay_on_their_flank_and_cracks_are_felt_from_behind(kind, same, other):
     """Both mates of the crank gear meet one flank of it; the idler is driven on one and drives with the other."""
     faults = {
@@ -139,20 +153,27 @@ def test_a_tooth_comes_to_its_mates_when_the_gear_has_turned_from_one_to_the_oth
     drive, place = record.engine.drive, record.place
     pairs, meshes = drive.pairs, drive.line.meshes
     teeth = 7, 5
-    start = ToothStart(teeth=teeth, phase=start_rolls(drive, turned)[place] / pairs[place].base_pitch)
+    start = ToothStart(
+        teeth=teeth, phase=start_rolls(drive, turned)[place] / pairs[place].base_pitch
+    )
     for other, (here, there) in neighbours(drive, place).items():
         gear = (pairs[place].pinion, pairs[place].wheel)[here]
         there_first = tooth_there(drive, (place, here), (other, there), start, turned)
         past = [
-            start_rolls(drive, turned)[m] / pairs[m].base_pitch - pairs[m].pitch_point / pairs[m].base_pitch
+            start_rolls(drive, turned)[m] / pairs[m].base_pitch
+            - pairs[m].pitch_point / pairs[m].base_pitch
             for m in (place, other)
         ]
         # tooth 0 has gone by so many pitches past the pitch point of each
         gone = (past[1] + there_first) - (past[0] + teeth[here])
         node = drive.line.gears[(meshes[place].driving, meshes[place].driven)[here]].node
         sense = math.copysign(1.0, drive.line.speed_ratio[node])
-        angles = [meshes[m].center_line + side * math.pi for m, side in ((place, here), (other, there))]
-        expected = sense * (angles[0] - angles[1]) * gear.n_teeth / (2.0 * math.pi) + 0.5 * (here - there)
+        angles = [
+            meshes[m].center_line + side * math.pi for m, side in ((place, here), (other, there))
+        ]
+        expected = sense * (angles[0] - angles[1]) * gear.n_teeth / (2.0 * math.pi) + 0.5 * (
+            here - there
+        )
         off = (gone - expected + 0.5 * gear.n_teeth) % gear.n_teeth - 0.5 * gear.n_teeth
         assert abs(off) < 0.01
 
@@ -160,17 +181,27 @@ def test_a_tooth_comes_to_its_mates_when_the_gear_has_turned_from_one_to_the_oth
 def test_meshes_stand_where_the_crank_puts_them():
     record = machine("system.record_mesh=[19,20]")
     drive = record.engine.drive
-    for start in (Start(tooth_pinion=7, tooth_wheel=3, phase=0.25), Start(tooth_pinion=30, tooth_wheel=3, phase=0.9)):
+    for start in (
+        Start(tooth_pinion=7, tooth_wheel=3, phase=0.25),
+        Start(tooth_pinion=30, tooth_wheel=3, phase=0.9),
+    ):
         turned = record.crank_angle(start)
-        assert_allclose((start_phase(drive, record.place, turned) - start.phase + 0.5) % 1.0, 0.5, atol=1e-9)
+        assert_allclose(
+            (start_phase(drive, record.place, turned) - start.phase + 0.5) % 1.0, 0.5, atol=1e-9
+        )
         line = record.line(Run(system=record, faults=(), start=start)).line
         for place, mesh in enumerate(line.meshes):
-            middle = mesh.start_phase - first_slice_lead(drive.pairs[place]) / drive.pairs[place].base_pitch
+            middle = (
+                mesh.start_phase
+                - first_slice_lead(drive.pairs[place]) / drive.pairs[place].base_pitch
+            )
             expected = start_rolls(drive, turned)[place] / drive.pairs[place].base_pitch
             assert_allclose((middle - expected + 0.5) % 1.0, 0.5, atol=1e-9)
 
 
 def test_slices_in_phase_are_refused():
-    record = read_machine(read_request([*RECORDS, "system.record_mesh=[3,66]", "mesh.slices_in_phase=true"]).config)
+    record = read_machine(
+        read_request([*RECORDS, "system.record_mesh=[3,66]", "mesh.slices_in_phase=true"]).config
+    )
     with pytest.raises(ConfigError, match="a line has the helix in"):
         record.check()

@@ -52,7 +52,10 @@ class TestLinear:
         n, inverse = 6, np.linalg.inv(line.mass)
         system = np.zeros((2 * n + 1, 2 * n + 1))
         system[:n, n : 2 * n] = np.eye(n)
-        system[n : 2 * n, :n], system[n : 2 * n, n : 2 * n] = -inverse @ line.stiffness, -inverse @ line.damping
+        system[n : 2 * n, :n], system[n : 2 * n, n : 2 * n] = (
+            -inverse @ line.stiffness,
+            -inverse @ line.damping,
+        )
         system[n : 2 * n, -1] = inverse @ torques
         return (expm(system * cls.DURATION) @ np.concatenate([*start, [1.0]]))[: 2 * n]
 
@@ -60,7 +63,9 @@ class TestLinear:
     @classmethod
     def error(cls, line, start, torques, exact):
         def measured(n_steps):
-            q, v, _ = state_after(line, start, cls.DURATION, n_steps, torques=constant_torques(torques))
+            q, v, _ = state_after(
+                line, start, cls.DURATION, n_steps, torques=constant_torques(torques)
+            )
             return np.linalg.norm(np.concatenate([q, v]) - exact) / np.linalg.norm(exact)
 
         return measured
@@ -75,7 +80,9 @@ class TestLinear:
         line = chain(6, loss=0.0)
         for n_steps in (50, 5000):
             q, v, told = state_after(line, start, self.DURATION, n_steps)
-            energy = [0.5 * (b @ line.mass @ b + a @ line.stiffness @ a) for a, b in (start, (q, v))]
+            energy = [
+                0.5 * (b @ line.mass @ b + a @ line.stiffness @ a) for a, b in (start, (q, v))
+            ]
             assert_allclose(energy[1], energy[0], rtol=1e-11, atol=0)
             assert told.energy_residual < 1e-11
 
@@ -88,8 +95,12 @@ class TestLinear:
     def test_a_full_mass_matrix_is_taken(self, line, start):
         """The same chain in other coordinates."""
         turn = np.eye(6) + 0.3 * np.eye(6, k=1)
-        parts = {name: turn.T @ getattr(line, name) @ turn for name in ("mass", "damping", "stiffness")}
-        other = GearedLine(names=line.names, rotation=np.linalg.solve(turn, line.rotation), meshes=(), **parts)
+        parts = {
+            name: turn.T @ getattr(line, name) @ turn for name in ("mass", "damping", "stiffness")
+        }
+        other = GearedLine(
+            names=line.names, rotation=np.linalg.solve(turn, line.rotation), meshes=(), **parts
+        )
         moved = tuple(np.linalg.solve(turn, part) for part in start)
         q, v, _ = state_after(line, start, self.DURATION, 3000)
         q_1, v_1, _ = state_after(other, moved, self.DURATION, 3000)
@@ -100,7 +111,12 @@ class TestLinear:
 class TestTorquesAndCourse:
     def test_a_torque_over_the_angle_excites_its_order(self):
         """One inertia on a spring, a torque of order 2: the exact steady amplitude."""
-        inertia, spring, damper, amplitude = 0.1, 4e4, 4.0, 0.05  # so small that its own twist does not shift it
+        inertia, spring, damper, amplitude = (
+            0.1,
+            4e4,
+            4.0,
+            0.05,
+        )  # so small that its own twist does not shift it
         line = GearedLine(
             names=("disc",), mass=np.array([[inertia]]), damping=np.array([[damper]]), stiffness=np.array([[spring]]),
             rotation=np.ones(1), meshes=(),
@@ -129,7 +145,9 @@ class TestTorquesAndCourse:
         nodes = np.arange(4000) / 4000 * 2 * np.pi
         table = -slope * np.where(nodes < np.pi, nodes, nodes - 2 * np.pi)
         start, quarter = np.array([1e-2]), 0.5 * np.pi * math.sqrt(inertia / slope)
-        q, v, _ = state_after(line, (start, np.zeros(1)), quarter, 4000, torques=[ShaftTorque(dof=0, table=table)])
+        q, v, _ = state_after(
+            line, (start, np.zeros(1)), quarter, 4000, torques=[ShaftTorque(dof=0, table=table)]
+        )
         assert_allclose(q / start, 0.0, rtol=0, atol=1e-5)
         assert_allclose(v / start, -math.sqrt(slope / inertia), rtol=1e-5, atol=0)
 
@@ -137,7 +155,12 @@ class TestTorquesAndCourse:
         line, course = chain(5), LineCourse(time=np.array([0.0, 0.2]), speed=np.array([50.0, 90.0]))
         torques = np.diag(line.mass) * 200.0
         q, v, _ = state_after(
-            line, (np.zeros(5), np.zeros(5)), 0.1, 2000, torques=constant_torques(torques), course=course
+            line,
+            (np.zeros(5), np.zeros(5)),
+            0.1,
+            2000,
+            torques=constant_torques(torques),
+            course=course,
         )
         assert_allclose(q, 0.0, rtol=0, atol=1e-15)
         assert_allclose(v, 0.0, rtol=0, atol=1e-12)
@@ -151,7 +174,9 @@ class TestTorquesAndCourse:
     def test_a_factor_over_the_knots_is_a_torque_over_time(self):
         line, course = chain(1), LineCourse(time=np.array([0.0, 0.1]), speed=np.array([50.0, 50.0]))
         ramp = ShaftTorque(dof=0, table=np.ones(1), factor=np.array([0.0, 3.0]))
-        _, v, _ = state_after(line, (np.zeros(1), np.zeros(1)), 0.1, 500, torques=[ramp], course=course)
+        _, v, _ = state_after(
+            line, (np.zeros(1), np.zeros(1)), 0.1, 500, torques=[ramp], course=course
+        )
         assert_allclose(v, 0.5 * 3.0 * 0.1 / line.mass[0, 0], rtol=1e-9, atol=0)
 
     def test_signals_are_low_passed_states(self):
@@ -165,5 +190,9 @@ class TestTorquesAndCourse:
         for sample in (0, 30, 60):
             n_steps = 8 * (sample + margin + 1)
             q, v, _ = state_after(line, start, n_steps / 64000.0, n_steps)
-            assert_allclose(motion.signals["angle", 0][sample], q[0], rtol=0, atol=1e-5 * np.abs(start[0]).max())
-            assert_allclose(motion.signals["speed", 3][sample], v[3], rtol=0, atol=1e-4 * np.abs(v).max())
+            assert_allclose(
+                motion.signals["angle", 0][sample], q[0], rtol=0, atol=1e-5 * np.abs(start[0]).max()
+            )
+            assert_allclose(
+                motion.signals["speed", 3][sample], v[3], rtol=0, atol=1e-4 * np.abs(v).max()
+            )

@@ -48,10 +48,14 @@ def test_without_play_it_is_the_linear_line():
 
     From the first sample on: it starts in the linear vibration, so that little has to settle.
     """
-    whole = running_line(engine(*CLOSED), steady_course(SPEED, TORQUE), governor=GOVERNOR, turned=2.0)
+    whole = running_line(
+        engine(*CLOSED), steady_course(SPEED, TORQUE), governor=GOVERNOR, turned=2.0
+    )
     for share, most in ((1.0, 0.15), (0.01, 0.003)):
         torques = tuple(replace(one, table=share * one.table) for one in whole.torques)
-        linear = replace(whole.linear, angle=share * whole.linear.angle, twist=share * whole.linear.twist)
+        linear = replace(
+            whole.linear, angle=share * whole.linear.angle, twist=share * whole.linear.twist
+        )
         line = replace(whole, torques=torques, linear=linear)
         _, found, exact = deviations(line, (14, 17, 13), settling=0.0)
         for one, other in zip(found, exact, strict=True):
@@ -64,23 +68,34 @@ def test_with_play_its_teeth_part_and_its_energies_balance():
     drive = line.machine.mesh_names.index("21/45")
     assert motion.contact_loss[drive] > 0.1
     assert motion.energy_residual < 1e-3
-    assert np.std(found[0]) == pytest.approx(np.std(linear[0]), rel=0.1)  # the flywheel hardly feels the gears
+    assert np.std(found[0]) == pytest.approx(
+        np.std(linear[0]), rel=0.1
+    )  # the flywheel hardly feels the gears
     assert np.std(found[1]) > 1.3 * np.std(linear[1])  # a pump gear that is let go does
 
 
 def test_meshes_stand_where_the_crank_puts_them():
     record = machine()
-    for start in (Start(tooth_pinion=7, tooth_wheel=3, phase=0.25), Start(tooth_pinion=50, tooth_wheel=3, phase=0.9)):
+    for start in (
+        Start(tooth_pinion=7, tooth_wheel=3, phase=0.25),
+        Start(tooth_pinion=50, tooth_wheel=3, phase=0.9),
+    ):
         turned = record.crank_angle(start)
         roll = start_rolls(record.engine.drive, turned)[record.place] / record.pair.base_pitch
         assert_allclose(roll, start.phase, atol=1e-9)
-    one, next_tooth = (record.crank_angle(Start(tooth_pinion=tooth, tooth_wheel=0, phase=0.0)) for tooth in (4, 5))
-    assert_allclose((next_tooth - one) % (4 * np.pi), 4 * np.pi / 54, rtol=1e-9)  # the camshaft turns half as fast
+    one, next_tooth = (
+        record.crank_angle(Start(tooth_pinion=tooth, tooth_wheel=0, phase=0.0)) for tooth in (4, 5)
+    )
+    assert_allclose(
+        (next_tooth - one) % (4 * np.pi), 4 * np.pi / 54, rtol=1e-9
+    )  # the camshaft turns half as fast
 
 
 def test_a_run_up_follows_its_course_and_drives_its_own_inertia():
     time = np.arange(-0.6, 0.5, 5e-3)
-    course = EngineCourse(time=time, speed=SPEED * (0.8 + 0.2 * time), torque=np.full(len(time), 3000.0))
+    course = EngineCourse(
+        time=time, speed=SPEED * (0.8 + 0.2 * time), torque=np.full(len(time), 3000.0)
+    )
     line = running_line(engine(), course, governor=GOVERNOR)
     motion = line.run(SOLVER, duration=0.2, channels=[("angle", line.dof(17))], settling=0.3)
     assert_allclose(np.gradient(motion.nominal_speed, 1 / 10240.0), 0.2 * SPEED, rtol=1e-6)
@@ -98,10 +113,19 @@ def test_a_fault_that_vanishes_is_the_sound_machine_and_a_missing_tooth_is_not()
     sound = simulated(record)
     again = simulated(record)
     np.testing.assert_array_equal(sound.acceleration, again.acceleration)
-    tiny = simulated(record, {"kind": "broken", "gear": "wheel", "tooth": 10, "broken_height_mm": 0.0})
+    tiny = simulated(
+        record, {"kind": "broken", "gear": "wheel", "tooth": 10, "broken_height_mm": 0.0}
+    )
     gone = simulated(record, {"kind": "missing_tooth", "gear": "wheel", "tooth": 10})
-    assert_allclose(tiny.acceleration, sound.acceleration, rtol=1e-9, atol=1e-9 * np.abs(sound.acceleration).max())
-    assert np.std(gone.acceleration[1] - sound.acceleration[1]) > 0.01 * np.std(sound.acceleration[1])
+    assert_allclose(
+        tiny.acceleration,
+        sound.acceleration,
+        rtol=1e-9,
+        atol=1e-9 * np.abs(sound.acceleration).max(),
+    )
+    assert np.std(gone.acceleration[1] - sound.acceleration[1]) > 0.01 * np.std(
+        sound.acceleration[1]
+    )
     assert sound.integration_check == "energy"
     assert sound.integration_error < 1e-3
 
@@ -128,7 +152,10 @@ def test_speeds_are_those_of_the_gear_ratios():
 
 
 def test_a_fine_wheel_without_errors_shows_the_shaft():
-    words = [f"excitation.toothed_wheels.flywheel.{key}" for key in ("eccentricity_error_deg=0", "tooth_error_deg=0")]
+    words = [
+        f"excitation.toothed_wheels.flywheel.{key}"
+        for key in ("eccentricity_error_deg=0", "tooth_error_deg=0")
+    ]
     record = machine(*words, "sensing.channels=[flywheel_speed]")
     line = record.line(Run(system=record, faults=()))
     motion = line.run(SOLVER, duration=0.1, channels=[("speed", line.dof(14))], settling=0.3)

@@ -3,7 +3,16 @@
 import numpy as np
 import pytest
 from lane_tools import advance
-from line_tools import INERTIAS, RADII, STIFFNESS, constant_torques, order_of, state_after, steps, two_gears
+from line_tools import (
+    INERTIAS,
+    RADII,
+    STIFFNESS,
+    constant_torques,
+    order_of,
+    state_after,
+    steps,
+    two_gears,
+)
 from numpy.testing import assert_allclose
 from scipy.integrate import solve_ivp
 from scipy.linalg import eigh
@@ -23,12 +32,18 @@ class TestRippledMesh:
     @classmethod
     def run(cls):
         u = np.arange(512) / 512
-        stiffness = STIFFNESS * (1 + 0.2 * np.cos(2 * np.pi * u) + 0.05 * np.cos(4 * np.pi * u))[None]
-        line = two_gears(stiffness=stiffness, gap=3e-6 * np.sin(2 * np.pi * u)[None], damping=2e-4, backlash=1e-4)
+        stiffness = (
+            STIFFNESS * (1 + 0.2 * np.cos(2 * np.pi * u) + 0.05 * np.cos(4 * np.pi * u))[None]
+        )
+        line = two_gears(
+            stiffness=stiffness, gap=3e-6 * np.sin(2 * np.pi * u)[None], damping=2e-4, backlash=1e-4
+        )
         torques = constant_torques([200.0, -400.0])
         course = constant_speed(400.0)
         start = static_start(line, course, torques), np.zeros(2)
-        return lambda n_steps: state_after(line, start, 0.02, n_steps, torques=torques, course=course)
+        return lambda n_steps: state_after(
+            line, start, 0.02, n_steps, torques=torques, course=course
+        )
 
     def test_order_two(self, run):
         exact = run(128000)
@@ -161,7 +176,10 @@ class TestAgainstThePair:
 
     def test_the_same_rest(self, dynamics, line):
         found = static_start(
-            line, constant_speed(dynamics.operating.speed), constant_torques(dynamics.system().force), time=0.0
+            line,
+            constant_speed(dynamics.operating.speed),
+            constant_torques(dynamics.system().force),
+            time=0.0,
         )
         expected = dynamics.static_start(0.0)
         assert_allclose(found, expected, rtol=0, atol=1e-6 * np.abs(expected).max())
@@ -179,7 +197,8 @@ class TestLowRank:
     @classmethod
     def welded(cls, engine):
         stiffness = engine.stiffness + sum(
-            mesh.stiffness[0, 0] * np.outer(mesh.direction, mesh.direction) for mesh in engine.meshes
+            mesh.stiffness[0, 0] * np.outer(mesh.direction, mesh.direction)
+            for mesh in engine.meshes
         )
         return GearedLine(
             names=engine.names, mass=engine.mass, damping=engine.damping, stiffness=stiffness,
@@ -188,7 +207,9 @@ class TestLowRank:
 
     def test_the_printed_frequencies(self, welded):
         n = 65  # rotations
-        found = np.sqrt(np.abs(eigh(welded.stiffness[:n, :n], welded.mass[:n, :n], eigvals_only=True))) / (2 * np.pi)
+        found = np.sqrt(
+            np.abs(eigh(welded.stiffness[:n, :n], welded.mass[:n, :n], eigvals_only=True))
+        ) / (2 * np.pi)
         assert_allclose(found[1:5], [28.31, 68.72, 162.06, 215.97], rtol=0, atol=0.01)
 
     def test_the_same_motion(self, engine, welded):
@@ -196,7 +217,9 @@ class TestLowRank:
         rng = np.random.default_rng(2)
         start = rng.normal(0, 1e-4, len(engine.names)), rng.normal(0, 0.1, len(engine.names))
         n_steps, duration = 4000, 0.04
-        (q, v, told), (q_1, v_1, _) = (state_after(line, start, duration, n_steps) for line in (engine, welded))
+        (q, v, told), (q_1, v_1, _) = (
+            state_after(line, start, duration, n_steps) for line in (engine, welded)
+        )
         assert_allclose(q, q_1, rtol=0, atol=1e-8 * np.abs(q_1).max())
         assert_allclose(v, v_1, rtol=0, atol=1e-8 * np.abs(v_1).max())
         assert told.energy_residual < 1e-6

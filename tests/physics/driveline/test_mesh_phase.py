@@ -22,17 +22,27 @@ def train(config, tmp_path):
 
     def make(teeth, center_lines, shifts=None, driven_first=False):
         shifts = shifts or [0.0] * len(teeth)
-        rows = ["node,inertia_kg_m2,stiffness_nm_per_rad,edge_from,edge_to,edge_kind,center_line_deg"]
+        rows = [
+            "node,inertia_kg_m2,stiffness_nm_per_rad,edge_from,edge_to,edge_kind,center_line_deg"
+        ]
         rows += [f"{place + 1},1e-3,1e6,{place + 1},{place + 2},gear_mesh,{angle}"
                  for place, angle in enumerate(center_lines)]  # fmt: skip
         rows.append(f"{len(teeth)},1e-3,,,,,")
         if driven_first:  # the last gear is the first node
             rows[1:] = rows[:0:-1]
-        gears = ["node,n_teeth,normal_module_mm,pressure_angle_deg,helix_angle_deg,face_width_mm,profile_shift"]
-        gears += [f"{place + 1},{z},2,20,0,20,{x}" for place, (z, x) in enumerate(zip(teeth, shifts, strict=True))]
+        gears = [
+            "node,n_teeth,normal_module_mm,pressure_angle_deg,helix_angle_deg,face_width_mm,profile_shift"
+        ]
+        gears += [
+            f"{place + 1},{z},2,20,0,20,{x}"
+            for place, (z, x) in enumerate(zip(teeth, shifts, strict=True))
+        ]
         for name, lines in (("line.csv", rows), ("gears.csv", gears)):
             (tmp_path / name).write_text("\n".join(lines), encoding="utf-8")
-        files = {"shafting_csv": str(tmp_path / "line.csv"), "gears_csv": str(tmp_path / "gears.csv")}
+        files = {
+            "shafting_csv": str(tmp_path / "line.csv"),
+            "gears_csv": str(tmp_path / "gears.csv"),
+        }
         return read_drive_line(config.with_keys("system", **files))
 
     return make
@@ -48,8 +58,16 @@ def misfit(line, turned=0.0):
     for mesh, pair in zip(line.line.meshes, line.pairs, strict=True):
         sense = math.copysign(1.0, line.line.speed_ratio[line.line.gears[mesh.driving].node])
         tilt = sense * pair.working_pressure_angle
-        one = angles[mesh.driving] + sense * pair.pinion.half_tooth_angle_base - (mesh.center_line - tilt)
-        other = angles[mesh.driven] + sense * pair.wheel.half_tooth_angle_base - (mesh.center_line + math.pi - tilt)
+        one = (
+            angles[mesh.driving]
+            + sense * pair.pinion.half_tooth_angle_base
+            - (mesh.center_line - tilt)
+        )
+        other = (
+            angles[mesh.driven]
+            + sense * pair.wheel.half_tooth_angle_base
+            - (mesh.center_line + math.pi - tilt)
+        )
         reach = sense * (pair.pinion.base_radius * one + pair.wheel.base_radius * other)
         found.append((reach - pair.tangent_length) / pair.base_pitch)
     return np.array(found)
@@ -101,7 +119,9 @@ def test_rolls_advance_as_the_meshing_frequencies_say(train):
     line = train(*TRAINS[2])
     pitch = np.array([pair.base_pitch for pair in line.pairs])
     gone = (start_rolls(line, 0.1) - start_rolls(line)) / pitch
-    assert_allclose(from_whole(gone - 0.1 / (2.0 * math.pi) * np.array(line.mesh_orders)), 0.0, atol=1e-9)
+    assert_allclose(
+        from_whole(gone - 0.1 / (2.0 * math.pi) * np.array(line.mesh_orders)), 0.0, atol=1e-9
+    )
     assert np.all(start_rolls(line, 0.1) >= 0.0)
     assert np.all(start_rolls(line, 0.1) < pitch)
 

@@ -39,7 +39,9 @@ def machine(*words):
 
 
 def simulated(record, *faults, start=None):
-    return record.simulate(tuple(one for fault in faults for one in read_faults(fault)), start=start)
+    return record.simulate(
+        tuple(one for fault in faults for one in read_faults(fault)), start=start
+    )
 
 
 def missing(gear, tooth=5):
@@ -63,7 +65,10 @@ def test_power_in_is_power_out_and_losses():
     for speed in (SPEED, 0.5 * SPEED):
         torques = line.torques(speed, TORQUE)
         mean = torques.on(line.drive.numbers).mean(axis=1)
-        power = {number: mean[place] * line.ratios[number] * speed for place, number in enumerate(line.drive.numbers)}
+        power = {
+            number: mean[place] * line.ratios[number] * speed
+            for place, number in enumerate(line.drive.numbers)
+        }
         assert_allclose(power[8], -TORQUE * speed, rtol=1e-12)
         assert_allclose(power[4], -9.0 * (speed / SPEED) ** 2 * speed / 3.0, rtol=1e-12)
         assert_allclose(power[1], -power[8] - power[4], rtol=1e-12)
@@ -72,7 +77,12 @@ def test_power_in_is_power_out_and_losses():
 def test_in_time_the_mean_forces_stay_and_the_energies_balance():
     record = machine("operating.duration_s=1")
     line = record.line(Run(system=record, faults=()))
-    channels = [("mesh_force", 0), ("mesh_force", 1), ("speed", line.dof(1)), ("speed", line.dof(8))]
+    channels = [
+        ("mesh_force", 0),
+        ("mesh_force", 1),
+        ("speed", line.dof(1)),
+        ("speed", line.dof(8)),
+    ]
     motion = line.run(SOLVER, duration=1.0, channels=channels, settling=0.3)
     for place, name in enumerate(line.machine.mesh_names):
         force = motion.signals["mesh_force", place]
@@ -124,7 +134,9 @@ def test_both_stages_sound_at_their_mesh_frequencies(name):
     assert own > 10.0 * between.max()
 
 
-@pytest.mark.parametrize(("name", "gear"), [("3/4", "pinion"), ("3/4", "wheel"), ("5/6", "pinion"), ("5/6", "wheel")])
+@pytest.mark.parametrize(
+    ("name", "gear"), [("3/4", "pinion"), ("3/4", "wheel"), ("5/6", "pinion"), ("5/6", "wheel")]
+)
 def test_a_missing_tooth_is_evident_once_a_turn_of_its_gear(name, gear):
     """The record less its sound twin is large where the tooth should be and nowhere else, turn by turn."""
     record = machine("operating.duration_s=1", f"system.record_mesh=[{name.replace('/', ',')}]")
@@ -176,8 +188,14 @@ def test_the_other_stage_stands_where_the_teeth_allow():
 
 @pytest.mark.parametrize(("law", "exponent"), [("constant", 0), ("linear", 1), ("quadratic", 2)])
 def test_a_run_up_follows_its_course_and_its_load_the_law(law, exponent):
-    words = (f"excitation.load.law={law}", "operating=ramp", "operating.speed_profile.first_factor=0.5")
-    record = machine(*words, "operating.speed_rpm=1746", "operating.torque_nm=60", "operating.duration_s=0.4")
+    words = (
+        f"excitation.load.law={law}",
+        "operating=ramp",
+        "operating.speed_profile.first_factor=0.5",
+    )
+    record = machine(
+        *words, "operating.speed_rpm=1746", "operating.torque_nm=60", "operating.duration_s=0.4"
+    )
     line = record.line(Run(system=record, faults=()))
     channels = [("angle", line.dof(8)), ("mesh_force", 0)]
     motion = line.run(SOLVER, duration=0.4, channels=channels, settling=0.3)
@@ -189,7 +207,9 @@ def test_a_run_up_follows_its_course_and_its_load_the_law(law, exponent):
     taken = TORQUE * speed**exponent + behind * np.gradient(motion.nominal_speed, 1.0 / 10240.0)
     early, late = slice(500, 1500), slice(-1500, -500)
     for part in (early, late):
-        assert_allclose(force[part].mean() * record.pair.pinion.base_radius, taken[part].mean(), rtol=0.02)
+        assert_allclose(
+            force[part].mean() * record.pair.pinion.base_radius, taken[part].mean(), rtol=0.02
+        )
     assert np.abs(motion.signals["angle", line.dof(8)]).max() < 0.2
 
 
@@ -197,7 +217,9 @@ def test_slip_damps_the_rigid_motion_and_ripple_shakes_at_its_order():
     line = driven(RIPPLE)
     slope = line.engine.dampers(line.ratios)
     assert_allclose(slope[1], 60.0 * 0.97 / (0.03 * SPEED), rtol=1e-12)
-    assert line.matrices().damping[0, 0] - line.drive.matrices().damping[0, 0] == pytest.approx(slope[1])
+    assert line.matrices().damping[0, 0] - line.drive.matrices().damping[0, 0] == pytest.approx(
+        slope[1]
+    )
     response = line.response(SPEED, TORQUE)
     lines = np.abs(response.angle[0])
     assert response.orders[int(lines.argmax())] == 6.0

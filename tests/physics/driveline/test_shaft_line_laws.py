@@ -56,7 +56,9 @@ def test_matrices_are_symmetric_and_store_no_negative_energy(line):
 
 def test_modes_are_orthogonal_and_hold_as_much_strain_as_kinetic_energy(line):
     found, matrices = line.modes(), line.matrices()
-    assert_allclose(found.shapes @ matrices.mass @ found.shapes.T, np.eye(len(found.shapes)), atol=1e-8)
+    assert_allclose(
+        found.shapes @ matrices.mass @ found.shapes.T, np.eye(len(found.shapes)), atol=1e-8
+    )
     square = (2.0 * np.pi * found.frequency) ** 2
     strain = found.shapes @ matrices.whole_stiffness @ found.shapes.T
     assert_allclose(strain, np.diag(square), atol=1e-8 * square.max())
@@ -68,7 +70,9 @@ def test_modes_are_orthogonal_and_hold_as_much_strain_as_kinetic_energy(line):
 def test_the_response_is_reciprocal(line):
     matrices, omega = line.matrices(merge_rigid=True), 2.0 * np.pi * 61.0
     dynamic = (
-        matrices.whole_stiffness + 1j * (matrices.loss_stiffness + omega * matrices.damping) - omega**2 * matrices.mass
+        matrices.whole_stiffness
+        + 1j * (matrices.loss_stiffness + omega * matrices.damping)
+        - omega**2 * matrices.mass
     )
     response = np.linalg.inv(dynamic)
     assert_allclose(response, response.T, rtol=0, atol=1e-9 * np.abs(response).max())
@@ -77,7 +81,9 @@ def test_the_response_is_reciprocal(line):
 def test_equal_loss_factors_damp_every_mode_by_half_of_it(lines):
     matrices = lines["engine"].matrices()
     uniform = replace(
-        matrices, loss_stiffness=0.06 * matrices.stiffness, mesh_loss_factor=np.full_like(matrices.mesh_stiffness, 0.06)
+        matrices,
+        loss_stiffness=0.06 * matrices.stiffness,
+        mesh_loss_factor=np.full_like(matrices.mesh_stiffness, 0.06),
     )
     found = natural_modes(uniform)
     assert_allclose(found.damping_ratio[1:], 0.03, rtol=1e-5, atol=0)
@@ -90,12 +96,16 @@ def test_viscous_losses_damp_each_mode_as_its_loss_factors_do(lines):
     ratio = natural_modes(shafts_only).damping_ratio
     viscous = with_viscous_losses(shafts_only)
     n = len(matrices.names)
-    k, c = (np.linalg.solve(matrices.mass, one) for one in (viscous.whole_stiffness, viscous.damping))
+    k, c = (
+        np.linalg.solve(matrices.mass, one) for one in (viscous.whole_stiffness, viscous.damping)
+    )
     rates = np.linalg.eigvals(np.block([[np.zeros((n, n)), np.eye(n)], [-k, -c]]))
     ringing = rates[rates.imag > 1.0]
     ringing = ringing[np.argsort(np.abs(ringing))]
     assert_allclose(-ringing.real / np.abs(ringing), ratio[1:], rtol=1e-6, atol=0)
-    assert_allclose(viscous.damping @ matrices.rigid.T, 0.0, atol=1e-9 * np.abs(viscous.damping).max())
+    assert_allclose(
+        viscous.damping @ matrices.rigid.T, 0.0, atol=1e-9 * np.abs(viscous.damping).max()
+    )
     assert np.all(natural_modes(viscous).damping_ratio[1:] >= ratio[1:] * (1 - 1e-9))
 
 
@@ -118,10 +128,13 @@ def two_discs(z=(20, 50), inertia=(1e-3, 2e-2), loss_factor=0.0):
 def test_two_discs_in_mesh_have_the_textbook_frequency():
     line = two_discs()
     equivalent = 1.0 / sum(
-        gear.base_radius**2 / node.inertia for gear, node in zip(line.gears, line.nodes, strict=True)
+        gear.base_radius**2 / node.inertia
+        for gear, node in zip(line.gears, line.nodes, strict=True)
     )
     found = natural_modes(line_matrices(line))
-    assert_allclose(found.frequency, [0.0, np.sqrt(2e8 / equivalent) / (2.0 * np.pi)], rtol=1e-12, atol=0)
+    assert_allclose(
+        found.frequency, [0.0, np.sqrt(2e8 / equivalent) / (2.0 * np.pi)], rtol=1e-12, atol=0
+    )
 
 
 def test_a_geared_line_has_the_frequencies_of_the_line_referred_to_one_shaft():
@@ -130,7 +143,10 @@ def test_a_geared_line_has_the_frequencies_of_the_line_referred_to_one_shaft():
     inertia, springs = (0.3, 1e-3, 2e-2, 0.5), (1e4, 2e8, 3e4)
     geared = ShaftLine(
         nodes=tuple(Node(name=str(place), inertia=value) for place, value in enumerate(inertia)),
-        shafts=(Shaft(first=0, second=1, stiffness=springs[0]), Shaft(first=2, second=3, stiffness=springs[2])),
+        shafts=(
+            Shaft(first=0, second=1, stiffness=springs[0]),
+            Shaft(first=2, second=3, stiffness=springs[2]),
+        ),
         gears=(replace(a, node=1), replace(b, node=2)),
         meshes=(GearMesh(driving=0, driven=1, stiffness=springs[1]),),
     )
@@ -151,7 +167,9 @@ def test_half_of_the_ring_is_where_a_best_viscous_damper_has_its_peak():
     square = spring / (disc + 0.5 * ring)
 
     def answer(omega, damper):
-        carried = -(omega**2) * ring * 1j * omega * damper / (-(omega**2) * ring + 1j * omega * damper)
+        carried = (
+            -(omega**2) * ring * 1j * omega * damper / (-(omega**2) * ring + 1j * omega * damper)
+        )
         return np.abs(1.0 / (spring - omega**2 * disc + carried))
 
     at_half = [answer(np.sqrt(square), damper) for damper in (1e-3, 10.0, 300.0, 1e8)]
@@ -169,7 +187,10 @@ def test_frequencies_do_not_depend_on_the_order_of_the_nodes(lines):
     place = {int(old): new for new, old in enumerate(order)}
     mixed = ShaftLine(
         nodes=tuple(line.nodes[old] for old in order),
-        shafts=tuple(replace(shaft, first=place[shaft.first], second=place[shaft.second]) for shaft in line.shafts),
+        shafts=tuple(
+            replace(shaft, first=place[shaft.first], second=place[shaft.second])
+            for shaft in line.shafts
+        ),
         gears=tuple(replace(gear, node=place[gear.node]) for gear in line.gears),
         meshes=line.meshes,
     )
@@ -199,7 +220,9 @@ def test_stiff_supports_leave_the_torsional_line(lines):
                                           stiffness_y=gear.support.stiffness_y * factor))
             for gear in lateral.gears
         )  # fmt: skip
-        found = natural_modes(line_matrices(replace(lateral, gears=gears), lateral=True)).frequency[:12]
+        found = natural_modes(line_matrices(replace(lateral, gears=gears), lateral=True)).frequency[
+            :12
+        ]
         apart.append(np.abs(found[1:] / torsion[1:] - 1.0).max())
     assert apart[0] > 0.02
     assert apart[1] < 0.02 * 0.2
@@ -209,7 +232,9 @@ def test_stiff_supports_leave_the_torsional_line(lines):
 def test_softer_meshes_and_heavier_discs_lower_every_mode(lines):
     line = lines["gearbox"].line
     before = natural_modes(line_matrices(line)).frequency
-    softer = replace(line, meshes=tuple(replace(mesh, stiffness=0.5 * mesh.stiffness) for mesh in line.meshes))
+    softer = replace(
+        line, meshes=tuple(replace(mesh, stiffness=0.5 * mesh.stiffness) for mesh in line.meshes)
+    )
     heavier = replace(line, nodes=(*line.nodes[:-1], replace(line.nodes[-1], inertia=0.06)))
     for changed in (softer, heavier):
         after = natural_modes(line_matrices(changed)).frequency
@@ -236,7 +261,9 @@ def test_the_single_pair_is_the_same_code_with_two_nodes(machine, dynamics_of, r
     stiffness[driver, driver] -= dynamics.drive_stiffness
     damping[driver, driver] = damping[driver, driver] if rotors else 0.0
     assert_allclose(np.diag(matrices.mass), own.mass[order], rtol=1e-14, atol=0)
-    assert_allclose(matrices.stiffness, stiffness[np.ix_(order, order)], rtol=1e-9, atol=1e-9 * stiffness.max())
+    assert_allclose(
+        matrices.stiffness, stiffness[np.ix_(order, order)], rtol=1e-9, atol=1e-9 * stiffness.max()
+    )
     without_driver = [place for place, name in enumerate(order) if name != driver]
     assert_allclose(
         matrices.damping[np.ix_(without_driver, without_driver)],
@@ -244,13 +271,19 @@ def test_the_single_pair_is_the_same_code_with_two_nodes(machine, dynamics_of, r
         rtol=1e-12,
         atol=0,
     )
-    assert_allclose(matrices.directions[0], dynamics.approach_direction()[order], rtol=1e-12, atol=1e-15)
+    assert_allclose(
+        matrices.directions[0], dynamics.approach_direction()[order], rtol=1e-12, atol=1e-15
+    )
     assert_allclose(matrices.mesh_stiffness, [dynamics.mean_mesh_stiffness], rtol=0, atol=0)
     assert_allclose(matrices.mesh_damping, [dynamics.mesh_damping], rtol=0, atol=0)
     direction = dynamics.approach_direction()
-    whole = (stiffness + dynamics.mean_mesh_stiffness * np.outer(direction, direction)) / own.mass[:, None]
+    whole = (stiffness + dynamics.mean_mesh_stiffness * np.outer(direction, direction)) / own.mass[
+        :, None
+    ]
     square = np.sort(np.abs(np.linalg.eigvals(whole)))
-    assert_allclose(line.modes().frequency[1:], np.sqrt(square[1:]) / (2.0 * np.pi), rtol=1e-6, atol=0)
+    assert_allclose(
+        line.modes().frequency[1:], np.sqrt(square[1:]) / (2.0 * np.pi), rtol=1e-6, atol=0
+    )
 
 
 def test_torsion_alone_of_the_pair_is_its_equivalent_mass_on_the_mesh(machine, dynamics_of):

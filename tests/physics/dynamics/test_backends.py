@@ -97,7 +97,8 @@ def test_a_record_by_another_backend(record, lsoda: str) -> None:
     core, other = record(DEFAULT_BACKEND), record(lsoda)
     damped = record(DEFAULT_BACKEND, **MORE_DAMPED)
     error, shown = (
-        in_band_error(found.acceleration[None], other.acceleration[None], 51200.0)[0] for found in (core, damped)
+        in_band_error(found.acceleration[None], other.acceleration[None], 51200.0)[0]
+        for found in (core, damped)
     )
     assert 0.0 < error < ACCURACY
     assert shown > 5 * ACCURACY
@@ -116,7 +117,9 @@ def test_backends_are_asked_what_they_can(machine, dynamics_of, lsoda: str) -> N
     check_machine(dynamics, other, 1e4)
     with pytest.raises(SimulationError, match="lsoda: 100 Hz is too slow"):
         check_machine(dynamics, other, 100.0)
-    assert [records_together(solver) for solver in (core, replace(core, precision="float32"), other)] == [8, 16, 1]
+    assert [
+        records_together(solver) for solver in (core, replace(core, precision="float32"), other)
+    ] == [8, 16, 1]
 
 
 def test_a_machine_that_a_backend_refuses_is_a_failed_record(record, lsoda: str) -> None:

@@ -30,7 +30,9 @@ LARGE = replace(SMALL, n_balls=9, ball_diameter=7.94e-3, pitch_diameter=39.04e-3
 LOOSE = replace(SMALL, radial_clearance=10e-6)
 TIGHT = replace(SMALL, radial_clearance=-5e-6)
 SHAFT = Shaft(diameter=18e-3, span=80e-3)
-BEARINGS = pytest.mark.parametrize("bearing", [SMALL, LARGE, LOOSE, TIGHT], ids=["6203", "6205", "loose", "tight"])
+BEARINGS = pytest.mark.parametrize(
+    "bearing", [SMALL, LARGE, LOOSE, TIGHT], ids=["6203", "6205", "loose", "tight"]
+)
 TIGHTER = pytest.mark.parametrize("bearing", [SMALL, LARGE], ids=["6203", "6205"])
 LOADS = pytest.mark.parametrize("load", [20.0, 460.0, 5000.0])
 
@@ -43,7 +45,9 @@ class TestHertz:
         expected = 4.0 / 3.0 * modulus * math.sqrt(radius / 2)
         found = point_contact_coefficient((1 / radius,) * 4, STEEL)
         assert_allclose(found, expected, rtol=1e-9, atol=0)
-        nearly = point_contact_coefficient((1 / radius, 1 / radius, 1 / radius, 1.001 / radius), STEEL)
+        nearly = point_contact_coefficient(
+            (1 / radius, 1 / radius, 1 / radius, 1.001 / radius), STEEL
+        )
         assert_allclose(nearly, expected, rtol=1e-3, atol=0)
 
     @TIGHTER
@@ -59,7 +63,12 @@ class TestHertz:
             second / (4.5 * (2 * ball + along + across) * first**3)
         )  # fmt: skip
         assert ratio > 10
-        assert_allclose(point_contact_coefficient((ball, ball, along, across), STEEL), expected, rtol=0.03, atol=0)
+        assert_allclose(
+            point_contact_coefficient((ball, ball, along, across), STEEL),
+            expected,
+            rtol=0.03,
+            atol=0,
+        )
 
     @TIGHTER
     def test_palmgren(self, bearing):
@@ -78,7 +87,9 @@ class TestEquilibrium:
         state = bearing_equilibrium(bearing, STEEL, load, positions)
         angle = positions[:, None] + 2 * np.pi * np.arange(bearing.n_balls) / bearing.n_balls
         assert_allclose((state.ball_load * np.cos(angle)).sum(axis=1), load, rtol=1e-9, atol=0)
-        assert_allclose((state.ball_load * np.sin(angle)).sum(axis=1), 0.0, rtol=0, atol=1e-9 * load)
+        assert_allclose(
+            (state.ball_load * np.sin(angle)).sum(axis=1), 0.0, rtol=0, atol=1e-9 * load
+        )
         assert np.all(state.ball_load >= 0.0)
         if bearing is not TIGHT:
             assert np.all(state.ball_load[np.cos(angle) < -0.2] == 0.0)
@@ -87,10 +98,15 @@ class TestEquilibrium:
     def test_the_tangent_is_the_change_of_force(self, bearing):
         """Two loads a little apart: displacement differs by compliance times the difference, along the load."""
         load, positions = 460.0, cage_positions(bearing)
-        low, here, high = (bearing_equilibrium(bearing, STEEL, load + d, positions) for d in (-0.01, 0.0, 0.01))
+        low, here, high = (
+            bearing_equilibrium(bearing, STEEL, load + d, positions) for d in (-0.01, 0.0, 0.01)
+        )
         compliance = np.linalg.inv(here.stiffness)[:, :, 1]
         assert_allclose(
-            (high.displacement - low.displacement) / 0.02, compliance, rtol=1e-3, atol=1e-4 * np.abs(compliance).max()
+            (high.displacement - low.displacement) / 0.02,
+            compliance,
+            rtol=1e-3,
+            atol=1e-4 * np.abs(compliance).max(),
         )
 
     def test_stribeck(self):
@@ -106,10 +122,14 @@ class TestEquilibrium:
         for position in (0.0, math.pi / SMALL.n_balls):
             state = bearing_equilibrium(SMALL, STEEL, 460.0, np.array([position]))
             assert abs(state.displacement[0, 0]) < 1e-12
-            assert_allclose(state.stiffness[0, 0, 1], 0.0, rtol=0, atol=1e-6 * state.stiffness[0, 1, 1])
+            assert_allclose(
+                state.stiffness[0, 0, 1], 0.0, rtol=0, atol=1e-6 * state.stiffness[0, 1, 1]
+            )
 
     def test_a_mirrored_cage_mirrors_the_equilibrium(self):
-        one, other = (bearing_equilibrium(LOOSE, STEEL, 460.0, np.array([angle])) for angle in (0.2, -0.2))
+        one, other = (
+            bearing_equilibrium(LOOSE, STEEL, 460.0, np.array([angle])) for angle in (0.2, -0.2)
+        )
         assert_allclose(one.displacement * [-1, 1], other.displacement, rtol=0, atol=1e-12)
         assert_allclose(one.stiffness[0, 0, 1], -other.stiffness[0, 0, 1], rtol=1e-5, atol=0)
         assert abs(one.stiffness[0, 0, 1]) > 1e5  # so the twin above says something
@@ -132,7 +152,10 @@ class TestStiffness:
     def test_it_grows_with_the_cube_root_of_the_load(self, bearing):
         one, other = (np.array(bearing_stiffness(bearing, STEEL, load)) for load in (50.0, 400.0))
         assert_allclose(other / one, 2.0, rtol=1e-6, atol=0)
-        loose = [bearing_stiffness(replace(bearing, radial_clearance=10e-6), STEEL, load)[0] for load in (50.0, 400.0)]
+        loose = [
+            bearing_stiffness(replace(bearing, radial_clearance=10e-6), STEEL, load)[0]
+            for load in (50.0, 400.0)
+        ]
         assert loose[1] / loose[0] > 2.2
 
     @pytest.mark.parametrize("bearing", [SMALL, LARGE, LOOSE], ids=["6203", "6205", "loose"])
@@ -143,7 +166,9 @@ class TestStiffness:
 
     def test_many_balls_without_clearance(self):
         """Half of the ring loaded by cos^1.5: across over along is (I_0.5 - I_2.5) / I_2.5 = 2/3, I_n of cos^n."""
-        across, along = bearing_stiffness(replace(SMALL, n_balls=50, pitch_diameter=0.2), STEEL, 460.0)
+        across, along = bearing_stiffness(
+            replace(SMALL, n_balls=50, pitch_diameter=0.2), STEEL, 460.0
+        )
         assert_allclose(across / along, 2 / 3, rtol=2e-3, atol=0)
 
     def test_a_symmetric_bearing_under_strong_preload_is_isotropic(self):
@@ -153,7 +178,10 @@ class TestStiffness:
         assert abs(loaded[1] / loaded[0] - 1) > 0.02  # a load takes the symmetry away
 
     def test_more_clearance_is_softer_across(self):
-        found = [bearing_stiffness(replace(SMALL, radial_clearance=p), STEEL, 460.0)[0] for p in (0.0, 5e-6, 20e-6)]
+        found = [
+            bearing_stiffness(replace(SMALL, radial_clearance=p), STEEL, 460.0)[0]
+            for p in (0.0, 5e-6, 20e-6)
+        ]
         assert found[0] > found[1] > found[2]
 
 
@@ -184,8 +212,14 @@ class TestSupport:
         ({"n_balls": 3}, "bearing.n_balls = 3 must lie in 5..60"),
         ({"ball_diameter": 0.0}, "bearing.ball_diameter_mm = 0 must be positive"),
         ({"pitch_diameter": 15e-3}, "8 balls of this size touch each other; give more than 17.63"),
-        ({"inner_groove_conformity": 0.5}, "bearing.inner_groove_conformity = 0.5 must lie in 0.505..0.6"),
-        ({"outer_groove_conformity": 0.7}, "bearing.outer_groove_conformity = 0.7 must lie in 0.505..0.6"),
+        (
+            {"inner_groove_conformity": 0.5},
+            "bearing.inner_groove_conformity = 0.5 must lie in 0.505..0.6",
+        ),
+        (
+            {"outer_groove_conformity": 0.7},
+            "bearing.outer_groove_conformity = 0.7 must lie in 0.505..0.6",
+        ),
         ({"radial_clearance": 2e-4}, "bearing.radial_clearance_um = 200 must lie in -20..100"),
     ],
 )

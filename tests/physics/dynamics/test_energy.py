@@ -39,10 +39,19 @@ class Balance(NamedTuple):
 def balance(dynamics, oversampling=OVERSAMPLING):
     """From static equilibrium."""
     step = 1 / (SAMPLING_RATE * oversampling)
-    q, v = trajectory(dynamics, dynamics.static_start(0.0), np.zeros(6), step, round(DURATION / step))
-    system, direction, time = dynamics.system(), dynamics.approach_direction(), np.arange(len(q)) * step
+    q, v = trajectory(
+        dynamics, dynamics.static_start(0.0), np.zeros(6), step, round(DURATION / step)
+    )
+    system, direction, time = (
+        dynamics.system(),
+        dynamics.approach_direction(),
+        np.arange(len(q)) * step,
+    )
     radius, speed = dynamics.table.pair.pinion.base_radius, dynamics.operating.speed
-    roll, roll_rate = dynamics.start_roll + radius * (speed * time + q[:, 2]), radius * (speed + v[:, 2])
+    roll, roll_rate = (
+        dynamics.start_roll + radius * (speed * time + q[:, 2]),
+        radius * (speed + v[:, 2]),
+    )
     law = laws(dynamics, np.column_stack([roll, q @ direction, v @ direction, roll_rate]), step)
     _, friction, moment_p, moment_w, _, stored, lost, _ = law.T
     speeds = v + np.array([0, 0, speed, 0, 0, speed / dynamics.table.pair.ratio])
@@ -63,9 +72,16 @@ def balance(dynamics, oversampling=OVERSAMPLING):
 @pytest.mark.parametrize("name", FAULTS)
 def test_the_states_seen_are_those_of_a_run_in_one_go(machine, dynamics_of, name):
     """The balance is that of what is recorded: the tables are read anew at every call."""
-    dynamics, step, n_steps = dynamics_of(machine(), FAULTS[name]), 1 / (SAMPLING_RATE * OVERSAMPLING), 4000
+    dynamics, step, n_steps = (
+        dynamics_of(machine(), FAULTS[name]),
+        1 / (SAMPLING_RATE * OVERSAMPLING),
+        4000,
+    )
     start = dynamics.static_start(0.0), np.zeros(6)
-    seen, whole = trajectory(dynamics, *start, step, n_steps), advance(dynamics, *start, step, 0, n_steps)
+    seen, whole = (
+        trajectory(dynamics, *start, step, n_steps),
+        advance(dynamics, *start, step, 0, n_steps),
+    )
     for one_by_one, at_once in zip(seen, whole[:2], strict=True):
         scale = np.abs(one_by_one).max(axis=0)
         # one read the tables at the roll of a step's begin, the other where that was foreseen
@@ -119,8 +135,13 @@ def test_friction_dissipates(case):
 @pytest.mark.parametrize("seed", [1, 2])
 def test_friction_of_rigid_gears_dissipates_at_every_position(xiamen, dynamics_of, seed):
     speed, ratio, rng = xiamen.operating.speed, xiamen.pair.ratio, np.random.default_rng(seed)
-    roll, rate = rng.uniform(0, 50, 500) * xiamen.pair.base_pitch, xiamen.pair.pinion.base_radius * speed
-    motions = np.column_stack([roll, rng.uniform(0, 20e-6, 500), rng.normal(0, 1e-3, 500), np.full(500, rate)])
+    roll, rate = (
+        rng.uniform(0, 50, 500) * xiamen.pair.base_pitch,
+        xiamen.pair.pinion.base_radius * speed,
+    )
+    motions = np.column_stack(
+        [roll, rng.uniform(0, 20e-6, 500), rng.normal(0, 1e-3, 500), np.full(500, rate)]
+    )
     normal, _, moment_p, moment_w, _, _, lost, _ = laws(dynamics_of(xiamen), motions).T
     assert np.all(moment_p * speed + moment_w * speed / ratio <= 1e-9)
     assert np.all(lost >= 0)
@@ -137,7 +158,9 @@ def test_action_equals_reaction(xiamen, dynamics_of):
         q[5] -= (rng.uniform(1e-6, 2e-5) - q @ direction) / xiamen.pair.wheel.base_radius
         v = rng.normal(0, 1e-3, 6)
         acceleration = right_hand_side(dynamics, 0.0, q, v)
-        force = system.mass * acceleration - system.force + system.stiffness @ q + system.damping @ v
+        force = (
+            system.mass * acceleration - system.force + system.stiffness @ q + system.damping @ v
+        )
         assert force[1] > 0
         assert_allclose(force[1], -force[4], rtol=1e-9, atol=1e-6)
         assert_allclose(force[0], -force[3], rtol=1e-9, atol=1e-6)

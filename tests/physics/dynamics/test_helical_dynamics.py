@@ -69,7 +69,9 @@ class TestZeroHelix:
             found = chord_equilibrium(table, chord_states(table, roll), force)
             for name in ("approach", "load", "stiffness"):
                 exact = getattr(expected, name)
-                assert_allclose(getattr(found, name), exact, rtol=1e-9, atol=1e-12 * np.abs(exact).max())
+                assert_allclose(
+                    getattr(found, name), exact, rtol=1e-9, atol=1e-12 * np.abs(exact).max()
+                )
 
     def test_friction_and_mean_stiffness_are_the_spur_pairs(self, spur):
         chords = with_table(spur, as_chords(spur.table))
@@ -80,7 +82,10 @@ class TestZeroHelix:
 def gears(dynamics):
     """Contact at the pitch point, seen from the two gears' centres in x, y, z, and the push on the wheel, (3,) each."""
     pair = dynamics.table.pair
-    across, hand = math.tan(pair.working_pressure_angle), math.copysign(1.0, pair.pinion.helix_angle)
+    across, hand = (
+        math.tan(pair.working_pressure_angle),
+        math.copysign(1.0, pair.pinion.helix_angle),
+    )
     pinion, wheel = (np.array([r, -abs(r) * across * s, 0.0]) for r, s in (
         (pair.pinion.base_radius, 1.0), (-pair.wheel.base_radius, -1.0)))  # fmt: skip
     return pinion, wheel, np.array([0.0, -1.0, hand * math.tan(pair.base_helix_angle)])
@@ -117,7 +122,9 @@ class TestForces:
         for q in rng.normal(0, 1e-5, (20, 12)):
             pinion = q[[0, 1, 6]] + np.cross([q[7], q[8], -q[2]], at_pinion)
             wheel = q[[3, 4, 9]] + np.cross([q[10], q[11], q[5]], at_wheel)
-            assert_allclose(one.approach_direction() @ q, push @ (pinion - wheel), rtol=1e-10, atol=1e-18)
+            assert_allclose(
+                one.approach_direction() @ q, push @ (pinion - wheel), rtol=1e-10, atol=1e-18
+            )
 
     def test_action_equals_reaction_and_moments_balance(self, one):
         """What the mesh does to both gears together is nothing, about any axis."""
@@ -126,7 +133,9 @@ class TestForces:
                                                                       roll_torque="classical")))  # fmt: skip
         still_system = still.system()
         acceleration = right_hand_side(still, 0.0, start, np.zeros(12))
-        force = still_system.mass * acceleration - still_system.force + still_system.stiffness @ start
+        force = (
+            still_system.mass * acceleration - still_system.force + still_system.stiffness @ start
+        )
         at_pinion, at_wheel, push = gears(one)
         normal = force[1]
         assert normal > 0.5 * one.mesh_force
@@ -134,7 +143,9 @@ class TestForces:
         assert_allclose(force[[3, 4, 9]], normal * push, rtol=1e-6, atol=1e-6 * normal)
         assert_allclose(abs(force[6]), normal * math.tan(pair.base_helix_angle), rtol=1e-6, atol=0)
         # over the tangential force at the pitch circle it is the tangent of the helix angle there
-        tangential = normal * pair.pinion.base_radius / (0.5 * pair.center_distance * 2 / (1 + pair.ratio))
+        tangential = (
+            normal * pair.pinion.base_radius / (0.5 * pair.center_distance * 2 / (1 + pair.ratio))
+        )
         lead = math.tan(pair.base_helix_angle) / math.cos(pair.working_pressure_angle)
         assert_allclose(abs(force[6]) / tangential, lead, rtol=1e-6, atol=0)
         for arm, places, sign in ((at_pinion, (7, 8, 2), -1.0), (at_wheel, (10, 11, 5), 1.0)):
@@ -147,7 +158,11 @@ class TestForces:
         """Fingers of the hand of the helix along the rotation, about -z: the thumb is the thrust on the driver."""
         start = one.static_start(0.0)
         assert math.copysign(1.0, start[6]) == -hand
-        assert_allclose(start[6] * one.pinion.support.stiffness_z, -start[9] * one.wheel.support.stiffness_z, rtol=1e-9)
+        assert_allclose(
+            start[6] * one.pinion.support.stiffness_z,
+            -start[9] * one.wheel.support.stiffness_z,
+            rtol=1e-9,
+        )
 
 
 class TestStatics:
@@ -189,32 +204,54 @@ class TestStatics:
 
     def test_slowly_turned_the_gears_follow_their_statics(self, helical):
         """At 30 r/min, the mean normal force and the approach are those of the equilibrium."""
-        slow = replace(helical, operating=replace(helical.operating, speed=helical.operating.speed / 60))
+        slow = replace(
+            helical, operating=replace(helical.operating, speed=helical.operating.speed / 60)
+        )
         q, _ = moved(slow, 3000, step=1e-5)
         radius = slow.table.pair.pinion.base_radius
         time = 1e-5 * np.arange(len(q))
         late = slice(2000, None, 50)
         roll = slow.start_roll + radius * (slow.operating.speed * time + q[:, 2])
-        static = chord_equilibrium(slow.table, chord_states(slow.table, roll[late]), slow.mesh_force)
+        static = chord_equilibrium(
+            slow.table, chord_states(slow.table, roll[late]), slow.mesh_force
+        )
         approach = (q @ slow.approach_direction())[late]
         assert_allclose(approach, static.approach, rtol=0.01, atol=0)
-        wrong = chord_equilibrium(slow.table, chord_states(slow.table, roll[late]), 1.05 * slow.mesh_force)
+        wrong = chord_equilibrium(
+            slow.table, chord_states(slow.table, roll[late]), 1.05 * slow.mesh_force
+        )
         assert np.abs(approach / wrong.approach - 1).max() > 0.01
 
 
 def balance(dynamics, n_steps=6000):
     """Residual of energy less work over the largest energy in the mesh, and the energy stored in the mesh, J."""
     q, v = moved(dynamics, n_steps)
-    system, direction, time = dynamics.system(), dynamics.approach_direction(), np.arange(len(q)) * STEP
-    radius, speed, ratio = dynamics.table.pair.pinion.base_radius, dynamics.operating.speed, dynamics.table.pair.ratio
-    roll, roll_rate = dynamics.start_roll + radius * (speed * time + q[:, 2]), radius * (speed + v[:, 2])
+    system, direction, time = (
+        dynamics.system(),
+        dynamics.approach_direction(),
+        np.arange(len(q)) * STEP,
+    )
+    radius, speed, ratio = (
+        dynamics.table.pair.pinion.base_radius,
+        dynamics.operating.speed,
+        dynamics.table.pair.ratio,
+    )
+    roll, roll_rate = (
+        dynamics.start_roll + radius * (speed * time + q[:, 2]),
+        radius * (speed + v[:, 2]),
+    )
     law = laws(dynamics, np.column_stack([roll, q @ direction, v @ direction, roll_rate]), STEP)
     _, friction, moment_p, moment_w, _, stored, lost, _ = law.T
     speeds = v + speed * system.rotation
     springs = [dof for dof in range(12) if dof not in (2, 5)]
     k, c = np.diag(system.stiffness), np.diag(system.damping)
     drive = system.force[2] - k[2] * q[:, 2] - c[2] * v[:, 2]
-    power = drive * speeds[:, 2] + system.force[5] * speeds[:, 5] - v[:, springs] ** 2 @ c[springs] - lost
+    power = (
+        drive * speeds[:, 2]
+        + system.force[5] * speeds[:, 5]
+        - v[:, springs] ** 2 @ c[springs]
+        - lost
+    )
     power += friction * (v[:, 0] - v[:, 3]) + moment_p * speeds[:, 2] + moment_w * speeds[:, 5]
     energy = 0.5 * (speeds**2 @ system.mass + q[:, springs] ** 2 @ k[springs]) + stored
     work = np.concatenate([[0.0], np.cumsum(0.5 * (power[1:] + power[:-1])) * STEP])
@@ -239,9 +276,14 @@ class TestEnergy:
     def test_the_stored_energy_is_the_work_of_the_force(self, helical):
         """Pressed together at one place, over all chords."""
         approach, roll = np.linspace(0.0, 2.5e-5, 2001), 0.6 * helical.table.pair.base_pitch
-        found = laws(helical, np.column_stack([np.full_like(approach, roll), approach, 0 * approach, 0 * approach]))
+        found = laws(
+            helical,
+            np.column_stack([np.full_like(approach, roll), approach, 0 * approach, 0 * approach]),
+        )
         force, stored = found[:, 0], found[:, 5]
-        work = np.concatenate([[0.0], np.cumsum(0.5 * (force[1:] + force[:-1]) * np.diff(approach))])
+        work = np.concatenate(
+            [[0.0], np.cumsum(0.5 * (force[1:] + force[:-1]) * np.diff(approach))]
+        )
         assert_allclose(stored, work, rtol=0, atol=2e-3 * work[-1])
 
     def test_the_roll_torque_is_the_slope_of_that_energy(self, helical):
@@ -279,14 +321,18 @@ class TestChords:
     def test_back_flanks_use_the_chord_of_the_set_load(self, helical):
         pair, table = helical.table.pair, helical.table
         approach = -pair.backlash - np.linspace(0.0, 1e-5, 11)
-        motion = np.column_stack([np.full(11, 0.3 * pair.base_pitch), approach, np.zeros(11), np.zeros(11)])
+        motion = np.column_stack(
+            [np.full(11, 0.3 * pair.base_pitch), approach, np.zeros(11), np.zeros(11)]
+        )
         found = laws(helical, motion)[:, 0]
         alone = replace(table, **{
             name: np.repeat(getattr(table, name)[:, :, table.set_chord, None], len(table.depth), axis=2)
             for name in ("compliance", "compliance_slope", "gap", "gap_slope")
         })  # fmt: skip
         assert found[-1] < -100.0
-        assert_allclose(found, laws(replace(helical, table=alone), motion)[:, 0], rtol=1e-12, atol=1e-9)
+        assert_allclose(
+            found, laws(replace(helical, table=alone), motion)[:, 0], rtol=1e-12, atol=1e-9
+        )
 
 
 class TestSlices:
@@ -310,17 +356,34 @@ class TestSlices:
 
 
 class TestRecords:
-    def integrated(self, machines, channels=("pinion_y", "pinion_z", "wheel_z"), precision="float64", tell_mesh=False):
+    def integrated(
+        self,
+        machines,
+        channels=("pinion_y", "pinion_z", "wheel_z"),
+        precision="float64",
+        tell_mesh=False,
+    ):
         solver = Solver(oversampling=8, precision=precision, max_error=None)
-        return integrate(machines, solver, sampling_rate=51200.0, duration=0.02, channels=channels, tell_mesh=tell_mesh)
+        return integrate(
+            machines,
+            solver,
+            sampling_rate=51200.0,
+            duration=0.02,
+            channels=channels,
+            tell_mesh=tell_mesh,
+        )
 
     @pytest.mark.parametrize("precision", ["float64", "float32"])
-    def test_a_record_has_the_same_bits_alone_and_beside_others(self, helical, xiamen, spur, precision):
+    def test_a_record_has_the_same_bits_alone_and_beside_others(
+        self, helical, xiamen, spur, precision
+    ):
         narrow = with_table(spur, Slices(xiamen, 0.5 * HELIX).table(DEPTH[:3]))
         machines = [
             helical,
             narrow,
-            replace(helical, start_phase=0.9, pinion_error=np.random.default_rng(1).normal(0, 2e-6, 23)),
+            replace(
+                helical, start_phase=0.9, pinion_error=np.random.default_rng(1).normal(0, 2e-6, 23)
+            ),
         ]
         together = self.integrated(machines, precision=precision).acceleration
         for lane, machine in enumerate(machines):
@@ -334,7 +397,9 @@ class TestRecords:
         assert (strength > 1e-3).all()
 
     def test_float32_agrees(self, helical):
-        wide, narrow = (self.integrated([helical], precision=p).acceleration[0] for p in ("float64", "float32"))
+        wide, narrow = (
+            self.integrated([helical], precision=p).acceleration[0] for p in ("float64", "float32")
+        )
         assert_allclose(narrow, wide, rtol=0, atol=2e-3 * np.abs(wide).max())
 
     def test_the_loads_of_the_teeth_are_told(self, helical):

@@ -17,7 +17,9 @@ def in_band(acceleration):
     """Spectrum from 20 Hz to 20 kHz under a Hann window, (channel, line)."""
     n = acceleration.shape[-1]
     frequency = np.fft.rfftfreq(n, 1 / SAMPLING_RATE)
-    return np.fft.rfft(acceleration * np.hanning(n), axis=-1)[:, (frequency >= 20) & (frequency <= 20e3)]
+    return np.fft.rfft(acceleration * np.hanning(n), axis=-1)[
+        :, (frequency >= 20) & (frequency <= 20e3)
+    ]
 
 
 @pytest.fixture(scope="module")
@@ -25,13 +27,18 @@ def errors(machine):
     """Largest relative error of a channel by oversampling, against 64."""
 
     def spectrum(oversampling):
-        changes = {"operating.duration_s": 0.05, "solver.oversampling": oversampling, "solver.max_error": None}
+        changes = {
+            "operating.duration_s": 0.05,
+            "solver.oversampling": oversampling,
+            "solver.max_error": None,
+        }
         system = machine(changes)
         return in_band(system.simulate().acceleration)
 
     exact = spectrum(64)
     return {
-        n: (np.linalg.norm(spectrum(n) - exact, axis=1) / np.linalg.norm(exact, axis=1)).max() for n in (4, 5, 8, 16)
+        n: (np.linalg.norm(spectrum(n) - exact, axis=1) / np.linalg.norm(exact, axis=1)).max()
+        for n in (4, 5, 8, 16)
     }
 
 
@@ -69,11 +76,20 @@ class TestSettled:
 
 class TestSpeed:
     @pytest.mark.parametrize(("speed_rpm", "torque_nm"), [(1800, 20), (1800, 100), (900, 5)])
-    def test_mean_speed_is_the_set_speed_and_does_not_tell_the_fault(self, machine, speed_rpm, torque_nm):
+    def test_mean_speed_is_the_set_speed_and_does_not_tell_the_fault(
+        self, machine, speed_rpm, torque_nm
+    ):
         system = machine(
-            {"operating.speed_rpm": speed_rpm, "operating.torque_nm": torque_nm, "operating.duration_s": 0.4}
+            {
+                "operating.speed_rpm": speed_rpm,
+                "operating.torque_nm": torque_nm,
+                "operating.duration_s": 0.4,
+            }
         )
-        speeds = [system.simulate(faults).mean_speed / system.operating.speed for faults in ((), (MISSING,))]
+        speeds = [
+            system.simulate(faults).mean_speed / system.operating.speed
+            for faults in ((), (MISSING,))
+        ]
         assert_allclose(speeds, 1.0, rtol=0, atol=1e-5)
 
     def test_a_source_far_too_soft_would_show(self, machine):
@@ -113,5 +129,7 @@ class TestSidebandProof:
         assert self.level(machine, speed_rpm, turns, oversampling=16).max() < 1e-5
 
     def test_a_small_crack_shows(self, machine, speed_rpm, turns):
-        crack = Crack(gear="pinion", tooth=3, crack_depth=0.5e-3, crack_angle=np.pi / 4, crack_start="arc_mid")
+        crack = Crack(
+            gear="pinion", tooth=3, crack_depth=0.5e-3, crack_angle=np.pi / 4, crack_start="arc_mid"
+        )
         assert self.level(machine, speed_rpm, turns, (crack,)).max() > 5e-4

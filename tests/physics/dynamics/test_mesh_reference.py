@@ -64,7 +64,12 @@ class Reference:
             position = roll - index * self.pair.base_pitch
             row, there = np.array([position, 0.0, 0.0, 0.0, 0.0]), True
             for side, start, error, tilt in (
-                (self.table.pinion, self.d.start_tooth_pinion, self.d.pinion_error, self.d.pinion_tilt),
+                (
+                    self.table.pinion,
+                    self.d.start_tooth_pinion,
+                    self.d.pinion_error,
+                    self.d.pinion_tilt,
+                ),
                 (self.table.wheel, self.d.start_tooth_wheel, self.d.wheel_error, self.d.wheel_tilt),
             ):
                 tooth = (index + start) % len(side.kind)
@@ -85,7 +90,9 @@ class Reference:
         tried = chain.from_iterable(combinations(range(n), size) for size in range(n + 1))
         for chosen in map(list, tried):
             force = np.zeros(n)
-            force[chosen] = np.linalg.solve(flexibility[np.ix_(chosen, chosen)], (approach - gap)[chosen])
+            force[chosen] = np.linalg.solve(
+                flexibility[np.ix_(chosen, chosen)], (approach - gap)[chosen]
+            )
             slack = flexibility @ force - (approach - gap)
             if np.all(force[chosen] > 0) and np.all(slack >= -1e-15):
                 return force
@@ -98,7 +105,10 @@ class Reference:
         pair_rate = rate - gap_slope * roll_rate
         load = np.maximum(0.0, elastic * (1 + self.damping * pair_rate))
         x = np.clip(
-            (position - self.pair.pitch_point) / (0.5 * self.options.friction_transition * self.pair.base_pitch), -1, 1
+            (position - self.pair.pitch_point)
+            / (0.5 * self.options.friction_transition * self.pair.base_pitch),
+            -1,
+            1,
         )
         sliding = self.options.friction_coefficient * load * x * (1.5 - 0.5 * x**2)
         arm = self.pair.start_curvature_radius + np.clip(position, 0, self.pair.path_of_contact)
@@ -128,18 +138,36 @@ class Reference:
         where = 2 * self.pair.pitch_point + 0.5 * pitch - roll - n * pitch
         inside = (where >= position[0]) & (where < position[-1])
         where, n = where[inside], n[inside]
-        sides = (self.table.pinion, self.d.start_tooth_pinion), (self.table.wheel, self.d.start_tooth_wheel)
-        there = np.all([side.present[side.kind[(start - n) % len(side.kind)]] for side, start in sides], axis=0)
-        c, c_slope, gap, gap_slope = sum(columns(side, 0, where[there], position) for side, _ in sides)
+        sides = (
+            (self.table.pinion, self.d.start_tooth_pinion),
+            (self.table.wheel, self.d.start_tooth_wheel),
+        )
+        there = np.all(
+            [side.present[side.kind[(start - n) % len(side.kind)]] for side, start in sides], axis=0
+        )
+        c, c_slope, gap, gap_slope = sum(
+            columns(side, 0, where[there], position) for side, _ in sides
+        )
         squeezed = -approach - self.pair.backlash
         elastic = self.loads(c, gap, squeezed)
         # backwards: both rates change sign, and so do the forces that answer
         pair_rate = -rate - gap_slope * -roll_rate
         load = np.maximum(0.0, elastic * (1 + self.damping * pair_rate))
         own, shared = c - self.table.shared_compliance, self.table.shared_compliance
-        stored = elastic @ (squeezed - gap) - 0.5 * own @ elastic**2 - 0.5 * shared * elastic.sum() ** 2
+        stored = (
+            elastic @ (squeezed - gap) - 0.5 * own @ elastic**2 - 0.5 * shared * elastic.sum() ** 2
+        )
         along = -(load @ gap_slope + 0.5 * elastic**2 @ c_slope)
-        return -load.sum(), 0.0, 0.0, 0.0, along, stored, (load - elastic) @ pair_rate, -float(np.sum(load > 0))
+        return (
+            -load.sum(),
+            0.0,
+            0.0,
+            0.0,
+            along,
+            stored,
+            (load - elastic) @ pair_rate,
+            -float(np.sum(load > 0)),
+        )
 
     def acceleration(self, time, q, v, mesh=None):
         """q'' at one instant; ``mesh`` may stand in for the reference's own mesh law."""
@@ -149,7 +177,12 @@ class Reference:
         normal, friction, moment_p, moment_w, along, _, _ = (mesh or self.mesh)(
             roll, direction @ q, direction @ v, r_p * (self.d.operating.speed + v[2])
         )
-        force = self.system.force - self.system.stiffness @ q - self.system.damping @ v - normal * direction
+        force = (
+            self.system.force
+            - self.system.stiffness @ q
+            - self.system.damping @ v
+            - normal * direction
+        )
         force += np.array([friction, 0, moment_p + r_p * along, -friction, 0, moment_w])
         return force / self.system.mass
 
@@ -165,7 +198,10 @@ def dynamics(request, xiamen, dynamics_of):
 def random_states(dynamics, n, seed):
     """Roll, approach, its rate and the roll's rate, (n, 4)."""
     rng = np.random.default_rng(seed)
-    pitch, speed = dynamics.table.pair.base_pitch, dynamics.operating.speed * dynamics.table.pair.pinion.base_radius
+    pitch, speed = (
+        dynamics.table.pair.base_pitch,
+        dynamics.operating.speed * dynamics.table.pair.pinion.base_radius,
+    )
     return np.column_stack(
         [
             rng.uniform(0, 8, n) * pitch,
@@ -178,16 +214,26 @@ def random_states(dynamics, n, seed):
 
 def test_mesh_law_agrees_for_random_states(dynamics):
     reference, states = Reference(dynamics, 1e-6), random_states(dynamics, 300, seed=7)
-    found, expected = laws(dynamics, states)[:, :7], np.array([reference.mesh(*state) for state in states])
+    found, expected = (
+        laws(dynamics, states)[:, :7],
+        np.array([reference.mesh(*state) for state in states]),
+    )
     scale = np.array([1, 1, 0.1, 0.1, 1, 1e-5, 1e-2]) * np.maximum(1.0, expected[:, :1])
     assert_allclose(found / scale, expected / scale, rtol=1e-9, atol=1e-9)
     assert (expected[:, 0] > 0).sum() > 200
 
 
 def test_back_flanks_agree_for_random_states(dynamics):
-    reference, states, rng = Reference(dynamics, 1e-6), random_states(dynamics, 300, seed=17), np.random.default_rng(1)
+    reference, states, rng = (
+        Reference(dynamics, 1e-6),
+        random_states(dynamics, 300, seed=17),
+        np.random.default_rng(1),
+    )
     states[:, 1] = -dynamics.table.pair.backlash - rng.uniform(0, 40e-6, 300)
-    found, expected = laws(dynamics, states), np.array([reference.coast(*state) for state in states])
+    found, expected = (
+        laws(dynamics, states),
+        np.array([reference.coast(*state) for state in states]),
+    )
     scale = np.array([1, 1, 0.1, 0.1, 1, 1e-5, 1e-2, 1]) * np.maximum(1.0, -expected[:, :1])
     assert_allclose(found / scale, expected / scale, rtol=1e-9, atol=1e-9)
     assert (expected[:, 7] == -2).sum() > 50
@@ -212,12 +258,16 @@ def test_only_the_consistent_law_has_a_force_along_the_roll(machine, dynamics_of
 def test_a_motion_against_the_back_flanks(machine, dynamics_of):
     """Two teeth missing under a light load: the pinion runs ahead into the back flanks."""
     light = machine({"operating.torque_nm": 2})
-    dynamics = dynamics_of(light, (MissingTooth(gear="pinion", tooth=3), MissingTooth(gear="pinion", tooth=4)))
+    dynamics = dynamics_of(
+        light, (MissingTooth(gear="pinion", tooth=3), MissingTooth(gear="pinion", tooth=4))
+    )
     step, direction = 1 / (51200 * 8), dynamics.approach_direction()
     q, v = trajectory(dynamics, dynamics.static_start(0.0), np.zeros(6), step, 8000)
     reference, backlash, n_seen = Reference(dynamics, step), light.pair.backlash, 0
     for n in np.flatnonzero(q @ direction < -backlash):
-        expected = reference.acceleration(n * step, q[n], v[n], lambda *state: reference.coast(*state)[:7])
+        expected = reference.acceleration(
+            n * step, q[n], v[n], lambda *state: reference.coast(*state)[:7]
+        )
         found = right_hand_side(dynamics, n * step, q[n], v[n])
         assert_allclose(found, expected, rtol=1e-9, atol=1e-9 * np.abs(expected).max())
         n_seen += 1
@@ -278,7 +328,9 @@ def runge_kutta(reference, law, time, q, v, step, n_parts):
     """The classical formula in ``n_parts``, on the compiled mesh law."""
 
     def slope(t, y):
-        return np.concatenate([y[6:], reference.acceleration(t, y[:6], y[6:], lambda *state: law(*state)[:7])])
+        return np.concatenate(
+            [y[6:], reference.acceleration(t, y[:6], y[6:], lambda *state: law(*state)[:7])]
+        )
 
     y, h = np.concatenate([q, v]), step / n_parts
     for part in range(n_parts):
@@ -300,7 +352,11 @@ def test_a_step_with_an_entry_or_exit_is_taken_in_parts(machine, dynamics_of, ov
     """
     xiamen = machine({"mesh.contact": "linear"})
     dynamics, step = dynamics_of(xiamen), 1 / (51200 * oversampling)
-    reference, law, direction = Reference(dynamics, step), law_of(dynamics, step), dynamics.approach_direction()
+    reference, law, direction = (
+        Reference(dynamics, step),
+        law_of(dynamics, step),
+        dynamics.approach_direction(),
+    )
     n_steps = round(2 / dynamics.mesh_frequency / step)
     q, v = trajectory(dynamics, dynamics.static_start(0.0), np.zeros(6), step, n_steps)
     states = np.hstack([q, v])
@@ -314,7 +370,9 @@ def test_a_step_with_an_entry_or_exit_is_taken_in_parts(machine, dynamics_of, ov
     scale = np.abs(np.diff(states, axis=0)).max(axis=0)
 
     def off(places, n_parts):
-        expected = [runge_kutta(reference, law, n * step, q[n], v[n], step, n_parts) for n in places]
+        expected = [
+            runge_kutta(reference, law, n * step, q[n], v[n], step, n_parts) for n in places
+        ]
         return np.abs((states[places + 1] - expected) / scale).max(axis=1)
 
     assert np.all(off(events, 64) < 0.15 * off(events, 1))

@@ -20,14 +20,21 @@ from gensig.systems.run import Run
 RATE = 51200.0
 QUICK = {"operating.duration_s": 0.1, "solver.max_error": None}
 MISSING = (MissingTooth(gear="pinion", tooth=3),)
-CRACK = (Crack(gear="wheel", tooth=5, crack_depth=1e-3, crack_angle=np.pi / 4, crack_start="arc_mid"),)
+CRACK = (
+    Crack(gear="wheel", tooth=5, crack_depth=1e-3, crack_angle=np.pi / 4, crack_start="arc_mid"),
+)
 LAWS = {"one_sided": {}, "paper": {"mesh.law": "paper"}}
 
 
 @pytest.fixture(scope="module")
 def record(machine):
     def simulated(changes=None, faults=(), **other):
-        run = Run(system=machine({**QUICK, **(changes or {})}), faults=tuple(faults), tell_mesh=True, **other)
+        run = Run(
+            system=machine({**QUICK, **(changes or {})}),
+            faults=tuple(faults),
+            tell_mesh=True,
+            **other,
+        )
         (found,) = simulate_together([run])
         return found
 
@@ -46,7 +53,12 @@ def starts(rows):
 
 def test_shares_of_the_loaded_teeth_are_all_of_the_load(sound):
     mesh = sound.mesh
-    assert mesh.load_share.shape == mesh.pinion_tooth.shape == mesh.wheel_tooth.shape == (N_PAIRS, 5120)
+    assert (
+        mesh.load_share.shape
+        == mesh.pinion_tooth.shape
+        == mesh.wheel_tooth.shape
+        == (N_PAIRS, 5120)
+    )
     assert_allclose(mesh.load_share.sum(axis=0), 1.0, rtol=0, atol=1e-12)
     assert ((mesh.pinion_tooth == NO_TOOTH) == (mesh.load_share == 0.0)).all()
     assert ((mesh.wheel_tooth == NO_TOOTH) == (mesh.load_share == 0.0)).all()
@@ -125,7 +137,9 @@ def test_nothing_changes_by_being_told(machine, precision):
 class TestDetectability:
     def test_is_the_root_of_energy_over_noise(self):
         residual = np.array([[3.0, 0.0, 4.0], [0.0, 2.0, 0.0]])
-        assert_allclose(detectability(residual, np.array([25.0, 1.0])), math.sqrt(1.0 + 4.0), rtol=1e-12, atol=0)
+        assert_allclose(
+            detectability(residual, np.array([25.0, 1.0])), math.sqrt(1.0 + 4.0), rtol=1e-12, atol=0
+        )
 
     def test_is_what_a_matched_filter_reaches(self):
         """Share of right answers of the best detector among records with and without the residual."""
@@ -135,12 +149,17 @@ class TestDetectability:
         threshold = 0.5 * (template * residual).sum()
         scores = [
             [
-                (template * (there * residual + np.sqrt(noise)[:, None] * rng.standard_normal((2, 400)))).sum()
+                (
+                    template
+                    * (there * residual + np.sqrt(noise)[:, None] * rng.standard_normal((2, 400)))
+                ).sum()
                 for _ in range(4000)
             ]
             for there in (0, 1)
         ]
-        right = 0.5 * (np.mean(np.array(scores[0]) < threshold) + np.mean(np.array(scores[1]) > threshold))
+        right = 0.5 * (
+            np.mean(np.array(scores[0]) < threshold) + np.mean(np.array(scores[1]) > threshold)
+        )
         half = 0.5 * detectability(residual, noise)
         assert_allclose(right, 0.5 * (1.0 + math.erf(half / math.sqrt(2.0))), rtol=0, atol=0.02)
 

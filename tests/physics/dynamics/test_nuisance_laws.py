@@ -42,7 +42,11 @@ def at(machine):
     def make(speed_rpm=1800.0, start=None, low_cutoff_hz=None, **courses):
         system = machine({"operating.speed_rpm": speed_rpm, "operating.duration_s": DURATION,
                           "sensing.sensor.low_cutoff_hz": low_cutoff_hz})  # fmt: skip
-        return Run(system=replace(system, operating=replace(system.operating, **courses)), faults=(), start=start)
+        return Run(
+            system=replace(system, operating=replace(system.operating, **courses)),
+            faults=(),
+            start=start,
+        )
 
     return make
 
@@ -71,7 +75,10 @@ def test_unbalance_grows_with_the_square_of_the_speed_and_what_the_machine_answe
         assert np.abs(measured[mine]).min() > 0.0
     for speed in (900.0, 3600.0):
         assert_allclose(np.abs(found[speed]), np.abs(found[1800.0]), rtol=1e-4, atol=0)
-    mass, rated = at().system.pinion.mass if gear == "pinion" else at().system.wheel.mass, 1800 * 2 * np.pi / 60
+    mass, rated = (
+        at().system.pinion.mass if gear == "pinion" else at().system.wheel.mass,
+        1800 * 2 * np.pi / 60,
+    )
     eccentricity = 6.3e-3 / (rated * (1.0 if gear == "pinion" else 23 / 84))
     assert_allclose(np.abs(found[1800.0]), mass * eccentricity, rtol=1e-4, atol=0)
 
@@ -85,12 +92,20 @@ def test_its_angle_is_fixed_to_tooth_0(at):
         angle = run.system.operating.speed * times
         later = replace(run, start=Start(tooth_pinion=4, tooth_wheel=6, phase=0.25))
         turned = heard(run, [tones], angle + 2 * np.pi / 23)  # a pitch of either gear
-        assert_allclose(heard(later, [tones], angle), turned, rtol=0, atol=1e-9 * np.abs(turned).max())
-        other = replace(run, start=Start(tooth_pinion=4 if gear == "wheel" else 3, tooth_wheel=5, phase=0.25))
+        assert_allclose(
+            heard(later, [tones], angle), turned, rtol=0, atol=1e-9 * np.abs(turned).max()
+        )
+        other = replace(
+            run, start=Start(tooth_pinion=4 if gear == "wheel" else 3, tooth_wheel=5, phase=0.25)
+        )
         assert_allclose(heard(other, [tones], angle), heard(run, [tones], angle), rtol=0, atol=0)
-        whole = replace(run, start=Start(tooth_pinion=3 + n_teeth, tooth_wheel=5 + n_teeth, phase=0.25))
+        whole = replace(
+            run, start=Start(tooth_pinion=3 + n_teeth, tooth_wheel=5 + n_teeth, phase=0.25)
+        )
         if gear == "pinion":
-            assert_allclose(heard(whole, [tones], angle), heard(run, [tones], angle), rtol=0, atol=1e-9)
+            assert_allclose(
+                heard(whole, [tones], angle), heard(run, [tones], angle), rtol=0, atol=1e-9
+            )
 
 
 def test_a_neighbour_is_heard_at_its_orders_however_the_shaft_wobbles(at):
@@ -120,7 +135,10 @@ def test_on_a_ramp_it_is_what_the_force_does_in_time(at):
     (tones,) = tones_of(run, UNBALANCE)
     times = np.arange(-2000, round(DURATION * RATE)) / RATE
     nominal = run.system.operating.nominal(times)
-    force = np.real(tones.force[0, 0] * np.exp(1j * nominal.angle)) * (nominal.speed / run.system.operating.speed) ** 2
+    force = (
+        np.real(tones.force[0, 0] * np.exp(1j * nominal.angle))
+        * (nominal.speed / run.system.operating.speed) ** 2
+    )
     body = run.system.pinion
     c, k = body.support.damping_x / body.mass, body.support.stiffness_x / body.mass
     _, expected, _ = lsim(([1.0 / body.mass, 0.0, 0.0], [1.0, c, k]), force, times - times[0])

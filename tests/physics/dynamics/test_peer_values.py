@@ -37,9 +37,8 @@ PAIRS = {
 }
 SIDES = ("pinion", "wheel")
 N_PHASES = 20
-QUADRATURE = (
-    1e-4  # of single terms, some of them 1 % of a pair; part of it the cutter tip, 0.38 m here, 0.37995 m there
-)
+# Of single terms, some of them 1 % of a pair. Part of it is the cutter tip: 0.38 m here, 0.37995 m there.
+QUADRATURE = 1e-4
 OF_A_PAIR = 2e-5
 
 
@@ -59,7 +58,11 @@ class Peer:
     def curvature(self, side, quantity="pair_stiffness"):
         """Curvature radii of one flank at the points of a quantity, (point,) m."""
         radius = 1e-3 * np.array(
-            [float(row["pinion_curvature_radius_mm"]) for row in self.rows if row["quantity"] == quantity]
+            [
+                float(row["pinion_curvature_radius_mm"])
+                for row in self.rows
+                if row["quantity"] == quantity
+            ]
         )
         return radius if side == "pinion" else self.system.pair.tangent_length - radius
 
@@ -72,7 +75,10 @@ class Peer:
 
 def ross_half_angle(gear):
     """b1 / r without the clearance in b1."""
-    return gear.root_half_angle - 2 * gear.clearance_coefficient * math.tan(gear.pressure_angle) / gear.n_teeth
+    return (
+        gear.root_half_angle
+        - 2 * gear.clearance_coefficient * math.tan(gear.pressure_angle) / gear.n_teeth
+    )
 
 
 def body(gear, curvature, material, *, half_angle=None, to_contact=False):
@@ -84,7 +90,9 @@ def body(gear, curvature, material, *, half_angle=None, to_contact=False):
         bore_radius=gear.bore_radius,
         face_width=gear.face_width,
         root_half_angle=half_angle or gear.root_half_angle,
-        base_radius=involute_point(gear, curvature)[0] * np.cos(angle) if to_contact else gear.base_radius,
+        base_radius=involute_point(gear, curvature)[0] * np.cos(angle)
+        if to_contact
+        else gear.base_radius,
     )
     return fillet_foundation_compliance(stand_in, angle, material, allow_extrapolation=True)
 
@@ -96,7 +104,9 @@ def pair_stiffness(peer, pinion, wheel):
     for side, curvature in (("pinion", pinion), ("wheel", wheel)):
         gear = peer.gear(side)
         total = total + tooth_compliance(healthy_tooth(gear), curvature, material).total
-        total = total + body(gear, curvature, material, half_angle=ross_half_angle(gear), to_contact=True)
+        total = total + body(
+            gear, curvature, material, half_angle=ross_half_angle(gear), to_contact=True
+        )
     return 1 / total
 
 
@@ -108,7 +118,9 @@ def ross_path(peer, share):
     pinion, wheel = peer.gear("pinion"), peer.gear("wheel")
     start = math.atan(pinion.junction_curvature_radius / pinion.base_radius)
     advance = share * (math.acos(pinion.base_radius / pinion.tip_radius) - start)
-    from_tip = math.acos(wheel.base_radius / wheel.tip_radius) - advance * pinion.n_teeth / wheel.n_teeth
+    from_tip = (
+        math.acos(wheel.base_radius / wheel.tip_radius) - advance * pinion.n_teeth / wheel.n_teeth
+    )
     return pinion.base_radius * np.tan(start + advance), wheel.base_radius * np.tan(from_tip)
 
 
@@ -121,7 +133,10 @@ def stored():
 @pytest.fixture(scope="module")
 def peers(machine, stored):
     return {
-        pair: Peer(system=machine({**PAPER, **changes}), rows=tuple(row for row in stored if row["pair"] == pair))
+        pair: Peer(
+            system=machine({**PAPER, **changes}),
+            rows=tuple(row for row in stored if row["pair"] == pair),
+        )
         for pair, changes in PAIRS.items()
     }
 
@@ -137,7 +152,9 @@ def test_every_stored_pair_is_compared(stored):
 
 
 def test_line_of_action_agrees(peer):
-    assert_allclose(peer.ross("contact_ratio"), peer.system.pair.transverse_contact_ratio, rtol=1e-8, atol=0)
+    assert_allclose(
+        peer.ross("contact_ratio"), peer.system.pair.transverse_contact_ratio, rtol=1e-8, atol=0
+    )
 
 
 @pytest.mark.parametrize("term", ["bending", "shear", "axial"])
@@ -153,8 +170,13 @@ def test_another_root_or_reach_would_show(peer, side):
     gear, curvature = getattr(peer.system.pair, side), peer.curvature(side)
     ross = peer.ross(f"{side}_shear_compliance")
     sharp = healthy_tooth(replace(gear, cutter_tip_radius_coefficient=0.3))
-    assert np.all(np.abs(tooth_compliance(sharp, curvature, peer.system.material).shear / ross - 1) > 5 * QUADRATURE)
-    short = tooth_compliance(healthy_tooth(gear), curvature, peer.system.material, reach="to_centreline").shear
+    assert np.all(
+        np.abs(tooth_compliance(sharp, curvature, peer.system.material).shear / ross - 1)
+        > 5 * QUADRATURE
+    )
+    short = tooth_compliance(
+        healthy_tooth(gear), curvature, peer.system.material, reach="to_centreline"
+    ).shear
     assert np.all(short / ross < 0.97)
 
 
@@ -167,7 +189,9 @@ def test_contact_term_agrees(peer):
 @pytest.mark.parametrize("side", SIDES)
 def test_body_fit_agrees_at_the_same_half_angle(peer, side):
     gear = peer.gear(side)
-    same = SimpleNamespace(**{key: getattr(gear, key) for key in ("name", "root_radius", "bore_radius")})
+    same = SimpleNamespace(
+        **{key: getattr(gear, key) for key in ("name", "root_radius", "bore_radius")}
+    )
     same.root_half_angle = peer.ross(f"{side}_root_half_angle")[0]
     at_ross, at_ours = (body_coefficients(each, allow_extrapolation=True) for each in (same, gear))
     for letter in "LMPQ":
@@ -180,7 +204,10 @@ def test_body_fit_agrees_at_the_same_half_angle(peer, side):
 def test_ross_body_term_starts_beside_its_own_root_curve(peer, side):
     """ROSS's root curve meets the root circle at our theta_f; its body term takes another one, without c*."""
     gear = peer.gear(side)
-    curve, term = peer.ross(f"{side}_root_curve_half_angle")[0], peer.ross(f"{side}_root_half_angle")[0]
+    curve, term = (
+        peer.ross(f"{side}_root_curve_half_angle")[0],
+        peer.ross(f"{side}_root_half_angle")[0],
+    )
     assert_allclose(gear.root_half_angle, curve, rtol=1e-8, atol=0)
     assert_allclose(ross_half_angle(gear), term, rtol=1e-8, atol=0)
     assert_allclose(curve / term, 1.0643, rtol=1e-4, atol=0)
@@ -206,7 +233,9 @@ def test_single_pair_differs_by_the_body_term_only(peer):
     found = pair_stiffness(peer, peer.curvature("pinion"), peer.curvature("wheel"))
     assert_allclose(found, ross, rtol=OF_A_PAIR, atol=0)
     curves = peer.system.stiffness_curves(n_positions=401)
-    position = (peer.curvature("pinion") - peer.system.pair.start_curvature_radius) / peer.system.pair.base_pitch
+    position = (
+        peer.curvature("pinion") - peer.system.pair.start_curvature_radius
+    ) / peer.system.pair.base_pitch
     ratio = np.interp(position, curves.contact_position, curves.single_pair_stiffness) / ross
     assert np.all((ratio > 1.04) & (ratio < 1.10))
 
@@ -221,7 +250,9 @@ def test_mesh_differs_by_the_body_term_and_where_contacts_are(peer):
         pitches = np.array([s for s in (newest, newest + 1) if s <= pair.transverse_contact_ratio])
         pinion = np.asarray(pair.pinion_curvature(pitches * pair.base_pitch))
         at_same_place = pair_stiffness(peer, pinion, pair.tangent_length - pinion).sum()
-        at_own_place = pair_stiffness(peer, *ross_path(peer, pitches / pair.transverse_contact_ratio)).sum()
+        at_own_place = pair_stiffness(
+            peer, *ross_path(peer, pitches / pair.transverse_contact_ratio)
+        ).sum()
         assert_allclose(at_same_place, same_place[index], rtol=OF_A_PAIR, atol=0)
         assert_allclose(at_own_place, own_place[index], rtol=OF_A_PAIR, atol=0)
 
@@ -243,7 +274,11 @@ def test_document_shows_the_stored_values(stored):
     for line in text.splitlines():
         pair = line.removeprefix("### ") if line.startswith("### ") else pair
         cells = [cell.strip() for cell in line.strip("|").split("|")]
-        if len(cells) > 4 and (pair, cells[0], cells[1]) in known and re.fullmatch(r"[\d.]+", cells[3]):
+        if (
+            len(cells) > 4
+            and (pair, cells[0], cells[1]) in known
+            and re.fullmatch(r"[\d.]+", cells[3])
+        ):
             expected = known[pair, cells[0], cells[1]] * scales[cells[2]]
             assert_allclose(float(cells[3]), expected, rtol=6e-5, atol=0, err_msg=line)
             n_lines += 1

@@ -15,7 +15,9 @@ ORDER = (5, 0, 3, 6, 1, 7, 2, 4)
 
 @pytest.fixture(scope="module")
 def config():
-    request = read_request(["experiment=quickstart", "plan.n_records=8", "plan.n_units=2", "operating.duration_s=0.05"])
+    request = read_request(
+        ["experiment=quickstart", "plan.n_records=8", "plan.n_units=2", "operating.duration_s=0.05"]
+    )
     return request.config.with_keys("dataset", store_clean=True)
 
 
@@ -36,9 +38,9 @@ def in_order(config, plan):
 
 
 def same(one, two):
-    return all(one.signals[key].tobytes() == two.signals[key].tobytes() for key in one.signals) and str(
-        one.values
-    ) == str(two.values)
+    return all(
+        one.signals[key].tobytes() == two.signals[key].tobytes() for key in one.signals
+    ) and str(one.values) == str(two.values)
 
 
 def test_alone_or_after_others_the_bits_are_the_same(config, plan, in_order):
@@ -55,8 +57,14 @@ def test_in_blocks_the_bits_are_the_same(config, plan, in_order, size):
         if not known:
             records._TWINS.clear()
         rows = [plan.record(index) for index in ORDER]
-        found = [one for first in range(0, 8, size) for one in simulate_records(config, rows[first : first + size])]
-        assert [index for index, one in zip(ORDER, found, strict=True) if not same(one, in_order[index])] == []
+        found = [
+            one
+            for first in range(0, 8, size)
+            for one in simulate_records(config, rows[first : first + size])
+        ]
+        assert [
+            index for index, one in zip(ORDER, found, strict=True) if not same(one, in_order[index])
+        ] == []
 
 
 def test_one_that_cannot_be_leaves_its_block_alone(config, plan, in_order):
@@ -80,22 +88,37 @@ class TestNoise:
     def test_the_noise_level_leaves_the_clean_signal_alone(self, config, plan, in_order):
         row = plan.record(3)
         loud = simulate_record(config, {**row, "params/sensing.snr_db": 0.0, "snr_db": 0.0})
-        assert loud.signals["acceleration_clean"].tobytes() == in_order[3].signals["acceleration_clean"].tobytes()
-        assert loud.signals["acceleration"].tobytes() != in_order[3].signals["acceleration"].tobytes()
+        assert (
+            loud.signals["acceleration_clean"].tobytes()
+            == in_order[3].signals["acceleration_clean"].tobytes()
+        )
+        assert (
+            loud.signals["acceleration"].tobytes() != in_order[3].signals["acceleration"].tobytes()
+        )
 
     def test_the_floor_is_the_same_for_every_class_of_a_group(self, plan, in_order):
-        floors = np.array([in_order[index].signals["noise_power"] for index in range(8)]).reshape(2, 4, -1)
+        floors = np.array([in_order[index].signals["noise_power"] for index in range(8)]).reshape(
+            2, 4, -1
+        )
         assert_allclose(floors, np.broadcast_to(floors[:, :1], floors.shape), rtol=1e-12, atol=0)
         assert np.abs(floors[0] / floors[1] - 1).max() > 0.01
 
     def test_a_floor_that_follows_the_record_would_tell_the_class(self, config, plan):
         own = config.with_keys("sensing", snr_reference="record")
-        floors = np.array([found.signals["noise_power"] for found in simulated(own, plan, range(4)).values()])
+        floors = np.array(
+            [found.signals["noise_power"] for found in simulated(own, plan, range(4)).values()]
+        )
         assert np.abs(floors / floors[0] - 1).max() > 0.05
 
     def test_achieved_signal_to_noise_ratio(self, config, plan):
         own = config.with_keys("operating", duration_s=0.5)
-        row = {**plan.record(0), "params/sensing.snr_db": 12.0, "snr_db": 12.0, "label": 0, "faults_json": "[]"}
+        row = {
+            **plan.record(0),
+            "params/sensing.snr_db": 12.0,
+            "snr_db": 12.0,
+            "label": 0,
+            "faults_json": "[]",
+        }
         found = simulate_record(own, row)
         noise = found.signals["acceleration"].astype(float) - found.signals["acceleration_clean"]
         assert_allclose(np.var(noise, axis=1), found.signals["noise_power"], rtol=0.04, atol=0)
@@ -105,9 +128,13 @@ class TestNoise:
 
     def test_no_noise_is_the_clean_signal(self, config, plan):
         own = config.with_keys("sensing", snr_db=None)
-        row = {key: value for key, value in plan.record(1).items() if key != "params/sensing.snr_db"}
+        row = {
+            key: value for key, value in plan.record(1).items() if key != "params/sensing.snr_db"
+        }
         found = simulate_record(own, row)
-        assert found.signals["acceleration"].tobytes() == found.signals["acceleration_clean"].tobytes()
+        assert (
+            found.signals["acceleration"].tobytes() == found.signals["acceleration_clean"].tobytes()
+        )
 
 
 def test_a_sham_record_is_healthy_under_its_label(config, plan, in_order):
@@ -115,7 +142,10 @@ def test_a_sham_record_is_healthy_under_its_label(config, plan, in_order):
     index = next(k for k in range(8) if plan.record(k)["label_name"] == "missing_tooth")
     found, real = simulate_record(sham, plan.record(index)), in_order[index]
     assert found.signals["fault_multihot"].tolist() == real.signals["fault_multihot"].tolist()
-    assert np.abs(found.signals["acceleration_clean"]).max() < np.abs(real.signals["acceleration_clean"]).max()
+    assert (
+        np.abs(found.signals["acceleration_clean"]).max()
+        < np.abs(real.signals["acceleration_clean"]).max()
+    )
 
 
 def test_values_of_a_record(config, plan, in_order):

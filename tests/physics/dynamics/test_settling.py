@@ -34,14 +34,18 @@ def made(machine, changes, faults=()):
         system=system,
         faults=tuple(faults),
         specimen=draw_specimen(rng, system.pair.pinion, system.pair.wheel, system.quality),
-        gearbox=draw_gearbox(rng, len(system.sensing.channels), system.quality, system.sensing.gain_scatter),
+        gearbox=draw_gearbox(
+            rng, len(system.sensing.channels), system.quality, system.sensing.gain_scatter
+        ),
     )
 
 
 @pytest.fixture(scope="module")
 def runs(machine):
     """Slow, usual with a fault, fast, and with motor and load."""
-    crack = Crack(gear="pinion", tooth=3, crack_depth=1e-3, crack_angle=np.pi / 4, crack_start="arc_mid")
+    crack = Crack(
+        gear="pinion", tooth=3, crack_depth=1e-3, crack_angle=np.pi / 4, crack_start="arc_mid"
+    )
     return [
         made(machine, {"operating.speed_rpm": 600}),
         made(machine, {}, [crack]),
@@ -85,7 +89,9 @@ def test_a_shorter_settling_would_leave_more(runs, steady, monkeypatch):
 
 def test_machines_that_begin_in_different_stages_keep_their_bits(runs, machine):
     """A quick drive begins when the others' steps have changed already; it does so alone too."""
-    quick = [made(machine, {"operating.drive_frequency_hz": frequency}) for frequency in (9, 14, 300)]
+    quick = [
+        made(machine, {"operating.drive_frequency_hz": frequency}) for frequency in (9, 14, 300)
+    ]
     together = simulate_together([*quick, *runs[:2]])
     for one, other in zip(quick, together, strict=False):
         (alone,) = simulate_together([one])
@@ -123,9 +129,15 @@ def test_stages_become_finer_and_end_before_the_record(dynamics_of, xiamen):
 
 
 @pytest.mark.filterwarnings("ignore::gensig.dynamics.integrator.CoarseStepWarning")
-def test_no_stage_takes_longer_steps_than_are_stable_nor_shorter_than_the_record(dynamics_of, xiamen):
+def test_no_stage_takes_longer_steps_than_are_stable_nor_shorter_than_the_record(
+    dynamics_of, xiamen
+):
     dynamics = dynamics_of(xiamen)
     oversampling = xiamen.solver.oversampling
     assert [steps for steps, _ in settling_stages(dynamics, 2, SAMPLING_RATE)] == [1, 2, 2]
     assert coarsest_oversampling(dynamics, oversampling, SAMPLING_RATE) == 1
-    assert [steps for steps, _ in settling_stages(dynamics, oversampling, SAMPLING_RATE / 2)] == [2, 2, 3]
+    assert [steps for steps, _ in settling_stages(dynamics, oversampling, SAMPLING_RATE / 2)] == [
+        2,
+        2,
+        3,
+    ]

@@ -50,14 +50,21 @@ class TestEccentricity:
         """The flank in contact stands back by e cos(rotation since the tooth that stands back most was at C)."""
         pair = xiamen.pair
         gear = getattr(pair, name)
-        turned = (rolls(xiamen) - pair.pitch_point) / gear.base_radius - 2 * np.pi / gear.n_teeth * most
+        turned = (
+            rolls(xiamen) - pair.pitch_point
+        ) / gear.base_radius - 2 * np.pi / gear.n_teeth * most
         expected = SIZE * np.cos(turned)
         found = late(xiamen, eccentric(pair, name, most))
-        assert_allclose(found, expected, rtol=0, atol=0.03 * SIZE)  # second order in the turn from C: 2.5 % at A
+        assert_allclose(
+            found, expected, rtol=0, atol=0.03 * SIZE
+        )  # second order in the turn from C: 2.5 % at A
 
     def test_offsets_alone_step_from_tooth_to_tooth(self, xiamen, name, most):
         """Why the offsets of an eccentric gear grow along the path: else the mesh repeats what no gear does."""
-        found = [late(xiamen, eccentric(xiamen.pair, name, most, smooth=smooth)) for smooth in (True, False)]
+        found = [
+            late(xiamen, eccentric(xiamen.pair, name, most, smooth=smooth))
+            for smooth in (True, False)
+        ]
         steps = [np.abs(np.diff(values)).max() for values in found]
         turn = 1.0 / getattr(xiamen.pair, name).base_radius * np.diff(rolls(xiamen))[0]
         assert steps[0] < 2.5 * SIZE * turn
@@ -77,8 +84,22 @@ def test_an_eccentric_specimen_is_the_runout_fault(xiamen, name):
 
 class TestProfile:
     FORMS = (
-        ProfileError(gear="pinion", tooth="all", profile_slope=3 * UM, profile_form=2 * UM, profile_waves=1, limit=1.0),
-        ProfileError(gear="wheel", tooth="all", profile_slope=-4 * UM, profile_form=0.0, profile_waves=1, limit=1.0),
+        ProfileError(
+            gear="pinion",
+            tooth="all",
+            profile_slope=3 * UM,
+            profile_form=2 * UM,
+            profile_waves=1,
+            limit=1.0,
+        ),
+        ProfileError(
+            gear="wheel",
+            tooth="all",
+            profile_slope=-4 * UM,
+            profile_form=0.0,
+            profile_waves=1,
+            limit=1.0,
+        ),
     )
 
     def deviation(self, pair, position):
@@ -86,17 +107,24 @@ class TestProfile:
         back = 0.0
         for name, form in zip(GEARS, self.FORMS, strict=True):
             gear = getattr(pair, name)
-            low, high = gear.junction_curvature_radius, np.sqrt(gear.tip_radius**2 - gear.base_radius**2)
+            low, high = (
+                gear.junction_curvature_radius,
+                np.sqrt(gear.tip_radius**2 - gear.base_radius**2),
+            )
             share = (np.asarray(getattr(pair, f"{name}_curvature")(position)) - low) / (high - low)
             wave = 0.5 * (1 - np.cos(2 * np.pi * form.profile_waves * share))
             back = back + form.profile_slope * (share - 0.5) + form.profile_form * wave
         return back
 
     def test_where_one_pair_carries_the_wheel_lags_by_the_deviation(self, xiamen):
-        specimen = replace(perfect_specimen(xiamen.pair.pinion, xiamen.pair.wheel), forms=self.FORMS)
+        specimen = replace(
+            perfect_specimen(xiamen.pair.pinion, xiamen.pair.wheel), forms=self.FORMS
+        )
         pair, roll = xiamen.pair, rolls(xiamen)
         position = roll % pair.base_pitch
-        alone = (position > pair.path_of_contact - 0.9 * pair.base_pitch) & (position < 0.9 * pair.base_pitch)
+        alone = (position > pair.path_of_contact - 0.9 * pair.base_pitch) & (
+            position < 0.9 * pair.base_pitch
+        )
         assert alone.mean() > 0.09
         found = late(xiamen, specimen)[alone]
         assert_allclose(found, self.deviation(pair, position[alone]), rtol=0, atol=0.02 * UM)
@@ -107,28 +135,41 @@ class TestProfile:
         pair = xiamen.pair
         for name, towards_tip in (("pinion", 1.0), ("wheel", -1.0)):
             gear = getattr(pair, name)
-            involute = np.sqrt(gear.tip_radius**2 - gear.base_radius**2) - gear.junction_curvature_radius
+            involute = (
+                np.sqrt(gear.tip_radius**2 - gear.base_radius**2) - gear.junction_curvature_radius
+            )
             slope = 3 * UM
             form = ProfileError(
-                gear=name, tooth="all", profile_slope=slope, profile_form=0.0, profile_waves=1, limit=1.0
+                gear=name,
+                tooth="all",
+                profile_slope=slope,
+                profile_form=0.0,
+                profile_waves=1,
+                limit=1.0,
             )
             perfect = perfect_specimen(pair.pinion, pair.wheel)
             tilted = replace(perfect, **{f"{name}_tilt": towards_tip * slope / involute})
             found, expected = late(xiamen, tilted), late(xiamen, replace(perfect, forms=(form,)))
-            assert_allclose(found - found.mean(), expected - expected.mean(), rtol=0, atol=0.02 * slope)
+            assert_allclose(
+                found - found.mean(), expected - expected.mean(), rtol=0, atol=0.02 * slope
+            )
             assert np.ptp(expected) > 0.1 * slope
 
     def test_faults_come_on_top(self, xiamen):
         """A specimen's flank with a fault stands back by both, and its sound teeth by the specimen's form alone."""
         fault = one("pitch_error", tooth=4, pitch_error_um=12)
         tables = [xiamen.mesh_table(some) for some in (self.FORMS, (*self.FORMS, fault))]
-        assert_allclose(tables[1].pinion.gap[tables[1].pinion.kind[3]], tables[0].pinion.gap[1], rtol=0, atol=0)
+        assert_allclose(
+            tables[1].pinion.gap[tables[1].pinion.kind[3]], tables[0].pinion.gap[1], rtol=0, atol=0
+        )
         further = tables[1].pinion.gap[tables[1].pinion.kind[4]] - tables[0].pinion.gap[1]
         assert_allclose(further[on_path(tables[0])], 12 * UM, rtol=1e-9, atol=0)
 
     def test_the_mesh_stiffness_that_damps_is_that_of_the_commonest_teeth(self, xiamen):
         """They carry the specimen's form, under which the second pair touches later: softer than perfect gears."""
-        specimen = replace(perfect_specimen(xiamen.pair.pinion, xiamen.pair.wheel), forms=self.FORMS)
+        specimen = replace(
+            perfect_specimen(xiamen.pair.pinion, xiamen.pair.wheel), forms=self.FORMS
+        )
         sound, cracked, perfect = (
             pair_dynamics(Run(system=xiamen, faults=faults, specimen=some)).mean_mesh_stiffness
             for some, faults in ((specimen, ()), (specimen, (one("crack"),)), (None, ()))
@@ -140,7 +181,9 @@ class TestProfile:
 def test_drawn_backlash_asks_for_no_further_tables(xiamen):
     perfect = perfect_specimen(xiamen.pair.pinion, xiamen.pair.wheel)
     nominal, wider = (
-        pair_dynamics(Run(system=xiamen, faults=(), specimen=replace(perfect, backlash_factor=factor)))
+        pair_dynamics(
+            Run(system=xiamen, faults=(), specimen=replace(perfect, backlash_factor=factor))
+        )
         for factor in (1.0, 1.2)
     )
     assert wider.table.pinion is nominal.table.pinion
@@ -151,10 +194,14 @@ def test_drawn_backlash_asks_for_no_further_tables(xiamen):
 @pytest.mark.parametrize("misalignment", [-12.0, 12.0])
 def test_misalignment_softens_the_mesh(machine, misalignment):
     system = machine()
-    form = one("misalignment", gear="pinion", tooth="all", misalignment_um=misalignment, limit_um=100)
+    form = one(
+        "misalignment", gear="pinion", tooth="all", misalignment_um=misalignment, limit_um=100
+    )
     perfect = perfect_specimen(system.pair.pinion, system.pair.wheel)
     stiffness = [
-        pair_dynamics(Run(system=system, faults=(), specimen=replace(perfect, forms=forms))).mean_mesh_stiffness
+        pair_dynamics(
+            Run(system=system, faults=(), specimen=replace(perfect, forms=forms))
+        ).mean_mesh_stiffness
         for forms in ((), (form,))
     ]
     assert stiffness[1] < 0.98 * stiffness[0]
@@ -168,7 +215,9 @@ def test_the_mesh_state_knows_no_fault_of_a_sound_specimen(machine):
     assert len(specimen.forms) == 2
     states = []
     for faults in ((), (one("pitch_error", tooth=3, pitch_error_um=5),)):
-        (record,) = simulate_together([Run(system=system, faults=faults, specimen=specimen, tell_mesh=True)])
+        (record,) = simulate_together(
+            [Run(system=system, faults=faults, specimen=specimen, tell_mesh=True)]
+        )
         states.append(record.mesh)
     assert not states[0].fault_engaged.any()
     assert 0.02 < states[1].fault_engaged.mean() < 0.2
@@ -179,6 +228,9 @@ def test_a_drawn_specimen_moves_the_motion_little_but_surely(machine):
     pair = system.pair
     records = [
         system.simulate(specimen=specimen).acceleration
-        for specimen in (None, draw_specimen(np.random.default_rng(3), pair.pinion, pair.wheel, system.quality))
+        for specimen in (
+            None,
+            draw_specimen(np.random.default_rng(3), pair.pinion, pair.wheel, system.quality),
+        )
     ]
     assert 0.02 < (records[1] - records[0]).std() / records[0].std() < 3.0

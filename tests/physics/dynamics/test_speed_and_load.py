@@ -44,9 +44,12 @@ def followed(frequency, drive=5.0, damping=0.7):
 
 def test_a_walk_without_scatter_is_none(run):
     still, found = simulated(
-        run({"operating.duration_s": 0.05}), run({"operating.duration_s": 0.05, SPEED: {**WALK, "scatter": 0.0}})
+        run({"operating.duration_s": 0.05}),
+        run({"operating.duration_s": 0.05, SPEED: {**WALK, "scatter": 0.0}}),
     )
-    assert_allclose(found.acceleration, still.acceleration, rtol=0, atol=1e-9 * still.acceleration.std())
+    assert_allclose(
+        found.acceleration, still.acceleration, rtol=0, atol=1e-9 * still.acceleration.std()
+    )
     assert_allclose(found.mean_speed, still.mean_speed, rtol=1e-12, atol=0)
 
 
@@ -71,10 +74,14 @@ def test_the_shaft_follows_a_slow_walk(run):
     assert np.ptp(off) < 0.2 * np.abs(np.cumsum(course - one.system.operating.speed)[-1] / RATE)
 
 
-@pytest.mark.parametrize(("ripple", "frequency"), [({"order": 1}, 30.0), ({"frequency_hz": 10}, 10.0)])
+@pytest.mark.parametrize(
+    ("ripple", "frequency"), [({"order": 1}, 30.0), ({"frequency_hz": 10}, 10.0)]
+)
 def test_of_a_speed_ripple_comes_what_the_drive_lets_through(run, ripple, frequency):
     share, duration = 0.01, 0.2
-    one = run({"operating.speed_ripple": {"share": share, **ripple}, "operating.duration_s": duration})
+    one = run(
+        {"operating.speed_ripple": {"share": share, **ripple}, "operating.duration_s": duration}
+    )
     still = run({"operating.duration_s": duration})
     found, plain = simulated(one, still)
     moved = found.shaft_angle - plain.shaft_angle
@@ -85,7 +92,10 @@ def test_of_a_speed_ripple_comes_what_the_drive_lets_through(run, ripple, freque
 
 def test_a_torque_ripple_is_in_the_force_on_the_teeth(run):
     share, duration = 0.1, 0.2
-    changes = {"operating.torque_ripple": {"share": share, "order": 2}, "operating.duration_s": duration}
+    changes = {
+        "operating.torque_ripple": {"share": share, "order": 2},
+        "operating.duration_s": duration,
+    }
     one = run(changes, tell_mesh=True)
     (found,) = simulated(one)
     force = found.mesh.force / pair_dynamics(one).mesh_force
@@ -102,14 +112,18 @@ def test_a_lead_in_changes_neither_walk_nor_ripple(run):
     assert n_lead > 4000
     (found,) = simulate_with_lead_in([led])
     (expected,) = simulated(run(courses))
-    still, other = simulated(run({"operating.duration_s": 0.2}), run({**courses, "operating.course_seed": 1}))
+    still, other = simulated(
+        run({"operating.duration_s": 0.2}), run({**courses, "operating.course_seed": 1})
+    )
     speeds = [np.gradient(one.shaft_angle, 1 / RATE) for one in (found, expected, still, other)]
     assert_allclose(speeds[0], speeds[1], rtol=0, atol=0.02 * speeds[1].std())
     assert_allclose(found.mean_speed, expected.mean_speed, rtol=2e-6, atol=0)
     for another in (still, other):
         assert abs(another.mean_speed / expected.mean_speed - 1) > 1e-4
     level = expected.acceleration.std(axis=1, keepdims=True)
-    assert np.all((found.acceleration[:, n_lead:] - expected.acceleration).std(axis=1) <= 0.02 * level[:, 0])
+    assert np.all(
+        (found.acceleration[:, n_lead:] - expected.acceleration).std(axis=1) <= 0.02 * level[:, 0]
+    )
 
 
 @pytest.fixture(scope="module")
@@ -132,10 +146,15 @@ class TestStored:
     def test_the_speed_is_that_of_the_shaft(self, stored):
         """Its integral is what the angle grows by, and its mean the record's."""
         for record in stored[1]:
-            speed, angle = record.signals["shaft_speed"].astype(float), record.signals["shaft_angle"]
+            speed, angle = (
+                record.signals["shaft_speed"].astype(float),
+                record.signals["shaft_angle"],
+            )
             grown = np.concatenate([[0.0], np.cumsum(0.5 * (speed[1:] + speed[:-1]))]) / RATE
             assert_allclose(grown, angle - angle[0], rtol=0, atol=2e-4)
-            assert_allclose(speed.mean() * 30 / math.pi, record.values["speed_rpm"], rtol=2e-5, atol=0)
+            assert_allclose(
+                speed.mean() * 30 / math.pi, record.values["speed_rpm"], rtol=2e-5, atol=0
+            )
             assert abs(record.values["speed_rpm"] / record.values["speed_set_rpm"] - 1) > 1e-5
 
     def test_all_classes_of_a_condition_have_its_course(self, stored):

@@ -51,7 +51,9 @@ def law(machine, options, crack):
 @pytest.fixture(scope="module")
 def pits(machine, options):
     fault = read_request(["fault=distributed_pitting"]).config["fault"]
-    return pit_growth(machine.pair, machine.material, read_faults(fault)[0], options.laws["distributed_pitting"])
+    return pit_growth(
+        machine.pair, machine.material, read_faults(fault)[0], options.laws["distributed_pitting"]
+    )
 
 
 def steady(torque, hours, speed=SPEED):
@@ -78,7 +80,9 @@ def test_the_stress_intensity_range_is_irwins(law, machine, crack):
     pair, strain = machine.pair, machine.material.in_plane("plane_strain")
     place = np.array([pair.pinion_curvature(pair.base_pitch)])
     low, high = (
-        crack_compliance(replace(crack, crack_depth=depth).apply(healthy_tooth(pair.pinion), 0), place, strain)[0]
+        crack_compliance(
+            replace(crack, crack_depth=depth).apply(healthy_tooth(pair.pinion), 0), place, strain
+        )[0]
         for depth in (0.999e-3, 1.001e-3)
     )
     release = (100.0 / pair.pinion.base_radius) ** 2 / (2.0 * pair.face_width) * (high - low) / 2e-6
@@ -106,7 +110,9 @@ def test_the_life_falls_with_the_load_to_the_paris_exponent(law, exponent):
 def test_the_rate_goes_with_the_stress_intensity_to_the_paris_exponent(law):
     depths = np.geomspace(0.5e-3, 2.5e-3, 9)
     rates = np.log(law.rate(depths, 150.0))
-    ranges = np.log([law.measures(depth, 150.0)["stress_intensity_range_mpa_sqrt_m"] for depth in depths])
+    ranges = np.log(
+        [law.measures(depth, 150.0)["stress_intensity_range_mpa_sqrt_m"] for depth in depths]
+    )
     assert_allclose(np.polyfit(ranges, rates, 1)[0], law.options.exponent, rtol=1e-9)
 
 
@@ -120,9 +126,13 @@ def test_the_course_converges_with_the_cells(law):
     assert_allclose(coarse.turns[-1], fine, rtol=1e-3)
 
 
-def test_a_crack_over_part_of_the_face_grows_both_ways_and_becomes_a_through_one(machine, crack, options):
+def test_a_crack_over_part_of_the_face_grows_both_ways_and_becomes_a_through_one(
+    machine, crack, options
+):
     whole = crack_growth(machine.pair, machine.material, crack, options.laws["crack"])
-    part = crack_growth(machine.pair, machine.material, crack, replace(options.laws["crack"], width_share=0.25))
+    part = crack_growth(
+        machine.pair, machine.material, crack, replace(options.laws["crack"], width_share=0.25)
+    )
     assert (np.diff(part.width) >= 0.0).all()
     assert part.width[0] == pytest.approx(5e-3)
     assert part.width[-1] > 6e-3
@@ -134,7 +144,9 @@ def test_a_crack_over_part_of_the_face_grows_both_ways_and_becomes_a_through_one
 
 def test_a_nearly_through_crack_grows_as_a_through_one(machine, crack, options):
     whole, nearly = (
-        crack_growth(machine.pair, machine.material, crack, replace(options.laws["crack"], width_share=share))
+        crack_growth(
+            machine.pair, machine.material, crack, replace(options.laws["crack"], width_share=share)
+        )
         for share in (1.0, 0.999999)
     )
     assert_allclose(nearly.intensity[0, 20:-8], whole.intensity[0, 20:-8], rtol=0.02)
@@ -164,14 +176,22 @@ def test_damage_adds_up_by_miner_whatever_the_order(pits):
         history = given_history(tuple(blocks), math.inf)
         courses.append(grow(pits.sizes, pits.turns(history.torque), history, 0.0))
     assert_allclose(courses[0].size[-1], courses[1].size[-1], rtol=1e-12)
-    expected = sum((end - begin) * 108_000.0 * pits.rate(np.array([0.0]), torque)[0] for begin, end, torque in rows)
+    expected = sum(
+        (end - begin) * 108_000.0 * pits.rate(np.array([0.0]), torque)[0]
+        for begin, end, torque in rows
+    )
     assert_allclose(courses[0].size[-1], expected, rtol=1e-12)
 
 
 def test_a_standstill_costs_clock_time_and_nothing_else(law):
     first = (0.0, HOUR, SPEED, 90.0)
-    histories = [given_history((first, (a * HOUR, (a + 1.0) * HOUR, SPEED, 90.0)), math.inf) for a in (1.0, 9.0)]
-    near, far = (grow(law.sizes, law.turns(np.array([90.0])), history, 5e-4) for history in histories)
+    histories = [
+        given_history((first, (a * HOUR, (a + 1.0) * HOUR, SPEED, 90.0)), math.inf)
+        for a in (1.0, 9.0)
+    ]
+    near, far = (
+        grow(law.sizes, law.turns(np.array([90.0])), history, 5e-4) for history in histories
+    )
     assert_array_equal(near.size[-1], far.size[-1])
     assert_array_equal(near.turns[-1], far.turns[-1])
     assert far.clock[-1] - near.clock[-1] == pytest.approx(8 * HOUR)
@@ -193,7 +213,9 @@ def test_what_has_not_failed_at_the_horizon_is_censored(law):
 
 @pytest.mark.parametrize("spacing", ["linear", "logarithmic", "adaptive"])
 def test_looks_are_in_order_and_reach_from_new_to_the_end(law, spacing):
-    drawn = DrawnBlocks(shortest=600.0, longest=HOUR, gap_chance=0.3, gap_shortest=HOUR, gap_longest=2 * HOUR)
+    drawn = DrawnBlocks(
+        shortest=600.0, longest=HOUR, gap_chance=0.3, gap_shortest=HOUR, gap_longest=2 * HOUR
+    )
     torque = np.array([60.0, 110.0, 90.0])
     history = draw_history(drawn, np.full(3, SPEED), torque, 500 * HOUR, np.random.default_rng(3))
     course = grow(law.sizes, law.turns(torque), history, 6e-4)
@@ -252,8 +274,12 @@ def test_a_history_that_cannot_be_is_refused(config, blocks, said):
 
 
 def test_a_drawn_history_keeps_to_its_limits():
-    drawn = DrawnBlocks(shortest=HOUR, longest=4 * HOUR, gap_chance=0.5, gap_shortest=HOUR, gap_longest=3 * HOUR)
-    history = draw_history(drawn, np.full(2, SPEED), np.full(2, 50.0), 1000 * HOUR, np.random.default_rng(0))
+    drawn = DrawnBlocks(
+        shortest=HOUR, longest=4 * HOUR, gap_chance=0.5, gap_shortest=HOUR, gap_longest=3 * HOUR
+    )
+    history = draw_history(
+        drawn, np.full(2, SPEED), np.full(2, 50.0), 1000 * HOUR, np.random.default_rng(0)
+    )
     assert isinstance(history, History)
     length, gap = (history.end - history.begin)[:-1], history.begin[1:] - history.end[:-1]
     assert (length >= HOUR - 1e-6).all()

@@ -20,7 +20,8 @@ def compared(case):
         rows = [row for row in csv.DictReader(file) if row["case"] == case]
     gear = reference_gear(rows[0])
     place, exact = (
-        np.array([float(row[key]) for row in rows]) for key in ("tip_distance_over_base_pitch", "stress_factor")
+        np.array([float(row[key]) for row in rows])
+        for key in ("tip_distance_over_base_pitch", "stress_factor")
     )
     ours = root_loading(gear, place * gear.base_pitch).stress_factor * math.cos(gear.pressure_angle)
     return place, ours, exact, rows

@@ -55,7 +55,12 @@ def test_without_a_helix_a_crack_lives_as_on_the_spur_pair(spur, gear):
     cut = sliced(machine, crack, options)
     assert_allclose(cut.intensity[0], whole.intensity[0], rtol=1e-3)
     lives = [
-        grow(law.sizes, law.turns(np.array([100.0])), given_history(((0.0, 1e9, 200.0, 100.0),), math.inf), 5e-4)
+        grow(
+            law.sizes,
+            law.turns(np.array([100.0])),
+            given_history(((0.0, 1e9, 200.0, 100.0),), math.inf),
+            5e-4,
+        )
         for law in (whole, cut)
     ]
     assert lives[0].has_failed
@@ -77,16 +82,22 @@ def test_the_release_rate_is_the_change_of_the_energy_at_constant_load(helical):
     machine, laws, crack = helical
     flanks = _for_lives(machine.flanks)
     flanks = replace(flanks, mesh=replace(flanks.mesh, contact="linear"))
-    law = sliced_crack_growth(flanks.pair, flanks.material, flanks.sliced_mesh, crack, laws["crack"], np.array([90.0]))
+    law = sliced_crack_growth(
+        flanks.pair, flanks.material, flanks.sliced_mesh, crack, laws["crack"], np.array([90.0])
+    )
     depth, force = 1e-3, 90.0 / flanks.pair.pinion.base_radius
     roll = flanks.pair.base_pitch * np.linspace(0.01, 4.0, 400)
     low, high = (
-        loaded_contact(flanks.sliced_mesh((replace(crack, tooth=0, crack_depth=one),)), roll, force).approach
+        loaded_contact(
+            flanks.sliced_mesh((replace(crack, tooth=0, crack_depth=one),)), roll, force
+        ).approach
         for one in (0.995 * depth, 1.005 * depth)
     )
     release = 0.5 * force * (high - low).max() / (0.01 * depth * flanks.pair.pinion.face_width)
     expected = math.sqrt(release * flanks.material.in_plane("plane_strain").youngs_modulus) / 1e6
-    assert_allclose(law.measures(depth, 90.0)["stress_intensity_range_mpa_sqrt_m"], expected, rtol=2e-3)
+    assert_allclose(
+        law.measures(depth, 90.0)["stress_intensity_range_mpa_sqrt_m"], expected, rtol=2e-3
+    )
 
 
 def test_below_the_threshold_a_crack_of_a_helical_pair_does_not_grow(helical):
@@ -110,20 +121,28 @@ def test_the_energy_of_slices_is_half_the_work_of_their_loads(length):
     rng = np.random.default_rng(0)
     width = rng.uniform(1e-3, 2e-3, 7)
     structure, load = rng.uniform(1e-11, 3e-11, (3, 7)), rng.uniform(0.0, 1e5, (3, 7))
-    for soft, pressed, energy in zip(structure, load, structure_energy(structure, load, width, length**2), strict=True):
+    for soft, pressed, energy in zip(
+        structure, load, structure_energy(structure, load, width, length**2), strict=True
+    ):
         matrix = np.diag(width / soft)
         for j in range(6):
             tie = length**2 * 4.0 / ((soft[j] + soft[j + 1]) * (width[j] + width[j + 1]))
             matrix[j : j + 2, j : j + 2] += tie * np.array([[1.0, -1.0], [-1.0, 1.0]])
-        assert_allclose(energy, 0.5 * (width * pressed) @ np.linalg.solve(matrix, width * pressed), rtol=1e-9)
+        assert_allclose(
+            energy, 0.5 * (width * pressed) @ np.linalg.solve(matrix, width * pressed), rtol=1e-9
+        )
 
 
 def test_the_contact_stress_of_slices_is_the_nominal_one_without_a_helix(spur):
     machine, laws, _ = spur
     torques = np.array([20.0, 100.0, 300.0])
     mesh = _for_lives(machine.flanks).sliced_mesh()
-    found = sliced_contact_stress(mesh, machine.material, torques, laws["distributed_pitting"].exponent)
-    assert_allclose(found, [contact_stress(machine.pair, machine.material, one) for one in torques], rtol=1e-9)
+    found = sliced_contact_stress(
+        mesh, machine.material, torques, laws["distributed_pitting"].exponent
+    )
+    assert_allclose(
+        found, [contact_stress(machine.pair, machine.material, one) for one in torques], rtol=1e-9
+    )
 
 
 def test_pits_of_a_helical_pair_come_by_their_slices(helical):
@@ -157,10 +176,15 @@ def test_the_loads_of_a_mesh_are_the_greatest_of_each_pair_of_teeth(spur):
     assert_allclose(greatest_loads(pair, angle, np.full(24001, 70.0)), 70.0 * radius, rtol=1e-12)
     assert_array_equal(greatest_loads(pair, angle, np.full(24001, -70.0)), LEAST_TORQUE)
     # an impact while two pairs carry is shared; alone, one has all of it
-    for place, shares in ((0.1 * pair.base_pitch, (SHARED, SHARED)), (pair.base_pitch * 0.9, (1.0,))):
+    for place, shares in (
+        (0.1 * pair.base_pitch, (SHARED, SHARED)),
+        (pair.base_pitch * 0.9, (1.0,)),
+    ):
         force = np.where(np.abs(angle * radius - 5.0 * pair.base_pitch - place) < 1e-5, 500.0, 0.0)
         loads = greatest_loads(pair, angle, force)
-        assert_allclose(np.sort(loads[loads > LEAST_TORQUE]), np.array(shares) * 500.0 * radius, rtol=1e-12)
+        assert_allclose(
+            np.sort(loads[loads > LEAST_TORQUE]), np.array(shares) * 500.0 * radius, rtol=1e-12
+        )
 
 
 def test_what_slices_cannot_do_is_refused(spur):

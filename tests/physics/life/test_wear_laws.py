@@ -71,13 +71,19 @@ def test_archard_is_linear_in_coefficient_and_hardness_of_each_gear():
         pinion=FlankMaterial(coefficient=3.0 * case.options.coefficient, hardness=None),
         wheel=FlankMaterial(coefficient=None, hardness=2.0 * case.options.hardness),
     )
-    assert_allclose(other.wear_per_mesh(case.new_flanks()), depth * np.array([3.0, 0.5])[:, None, None], rtol=1e-12)
+    assert_allclose(
+        other.wear_per_mesh(case.new_flanks()),
+        depth * np.array([3.0, 0.5])[:, None, None],
+        rtol=1e-12,
+    )
 
 
 def test_life_goes_with_threshold_and_the_wheel_meshes_less_often():
     case = case_of(*PAPER)
     life = wear_life(case)
-    assert wear_life(changed(case, threshold=0.5 * case.options.threshold)).life == pytest.approx(0.5 * life.life)
+    assert wear_life(changed(case, threshold=0.5 * case.options.threshold)).life == pytest.approx(
+        0.5 * life.life
+    )
     ratio = life.depth[-1] / (case.wear_per_mesh(case.new_flanks()) * life.life + 1e-30)
     assert_allclose(ratio[0, 0, :10], 1.0, rtol=1e-9)
     assert_allclose(ratio[1, 0, :10], 38.0 / 55.0, rtol=1e-9)
@@ -103,7 +109,11 @@ def test_fixed_intervals_does_not_converge_and_the_band_does_not_ask():
 def test_the_mesh_shares_the_load():
     """Without corner contact both pairs of the double zone carry all of it, and one pair where there is one."""
     case = case_of(*FULL, "mesh.law=paper")
-    load, place, pitch = case.line_load(case.new_flanks())[0], case.path.position, case.pair.base_pitch
+    load, place, pitch = (
+        case.line_load(case.new_flanks())[0],
+        case.path.position,
+        case.pair.base_pitch,
+    )
     whole = case.force / case.pair.face_width
     double = (place > 0.02 * pitch) & (place < case.pair.path_of_contact - 1.02 * pitch)
     both = load[double] + np.interp(place[double] + pitch, place, load)
@@ -130,7 +140,11 @@ def test_slices_of_a_spur_pair_wear_alike_and_as_the_whole():
     one = wear_life(case_of(*words))
     system = read_sliced_pair(compose("generate", words))
     sliced = replace(system, slices=replace(system.slices, n_slices=6)).sliced_mesh()
-    six = wear_life(wear_case(sliced, system.material, read_wear_options(compose("generate", words)["wear"]), 200.0))
+    six = wear_life(
+        wear_case(
+            sliced, system.material, read_wear_options(compose("generate", words)["wear"]), 200.0
+        )
+    )
     assert np.ptp(six.depth[-1], axis=1).max() < 1e-9 * six.depth.max()
     # six slices are looked at 24 phases of a pitch, one slice at every node
     assert six.life == pytest.approx(one.life, rel=0.01)
@@ -141,13 +155,17 @@ def test_slices_of_a_helical_pair_converge():
     assert lives[0] == pytest.approx(lives[1], rel=0.04)
 
 
-@pytest.mark.parametrize("words", [FULL, ("wear.threshold_um=100",), HELICAL], ids=["full", "default", "helical"])
+@pytest.mark.parametrize(
+    "words", [FULL, ("wear.threshold_um=100",), HELICAL], ids=["full", "default", "helical"]
+)
 def test_half_the_step_and_twice_the_nodes_are_the_same_life(words):
     case = case_of(*words)
     life = wear_life(case)
     step = min(case.options.step, 0.1 * case.options.threshold)
     assert wear_life(changed(case, step=0.5 * step)).life == pytest.approx(life.life, rel=5e-3)
-    finer = wear_case(case.mesh, case.material, case.options, case.torque, n_nodes=2 * len(case.path.position) - 1)
+    finer = wear_case(
+        case.mesh, case.material, case.options, case.torque, n_nodes=2 * len(case.path.position) - 1
+    )
     assert wear_life(finer).life == pytest.approx(life.life, rel=0.01)
 
 
@@ -194,4 +212,6 @@ def test_without_load_nothing_wears():
     case = case_of(*PAPER)
     nothing = np.zeros(case.shape[1:])
     for rule in ("band", "fixed_intervals"):
-        assert not depth_per_mesh(case.path, nothing, nothing, replace(case.options, rule=rule)).any()
+        assert not depth_per_mesh(
+            case.path, nothing, nothing, replace(case.options, rule=rule)
+        ).any()

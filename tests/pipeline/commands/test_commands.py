@@ -16,13 +16,24 @@ PAPER = ("mesh.law=paper", "mesh.pair_coupling=sum", "mesh.contact=linear")
 
 def test_stiffness_json_has_the_promised_keys(tmp_path: Path) -> None:
     file, figure = tmp_path / "k.json", tmp_path / "k.png"
-    words = ["stiffness", "fault=crack", "fault.tooth=3", *PAPER, "--json", str(file), "--plot", str(figure)]
+    words = [
+        "stiffness",
+        "fault=crack",
+        "fault.tooth=3",
+        *PAPER,
+        "--json",
+        str(file),
+        "--plot",
+        str(figure),
+    ]
     assert main(words) == 0
     content = json.loads(file.read_text())
     assert content["transverse_contact_ratio"] == pytest.approx(1.71178, abs=1e-5)
     assert content["base_pitch_mm"] == pytest.approx(5.90426, abs=1e-5)
     position = np.array(content["contact_position"])
-    sound, faulty = (np.array(content[f"{kind}_pair_stiffness_n_per_m"]) for kind in ("single", "faulty"))
+    sound, faulty = (
+        np.array(content[f"{kind}_pair_stiffness_n_per_m"]) for kind in ("single", "faulty")
+    )
     assert position[-1] == pytest.approx(content["transverse_contact_ratio"], rel=1e-12)
     assert np.all(faulty < sound)
     terms = [values for gear in content["compliance_m_per_n"].values() for values in gear.values()]
@@ -37,7 +48,17 @@ def test_stiffness_json_has_the_promised_keys(tmp_path: Path) -> None:
 def test_stiffness_of_a_wheel_fault_turns_the_wheel(tmp_path: Path) -> None:
     file = tmp_path / "k.json"
     assert (
-        main(["stiffness", "fault=missing_tooth", "fault.gear=wheel", "fault.tooth=80", *PAPER, "--json", str(file)])
+        main(
+            [
+                "stiffness",
+                "fault=missing_tooth",
+                "fault.gear=wheel",
+                "fault.tooth=80",
+                *PAPER,
+                "--json",
+                str(file),
+            ]
+        )
         == 0
     )
     content = json.loads(file.read_text())
@@ -58,9 +79,16 @@ def test_contact_ratio_below_one_warns_here_and_is_refused_where_it_must_drive(
 
 
 @pytest.mark.parametrize("suffix", [".h5", ".csv"])
-def test_simulate_writes_one_record(tmp_path: Path, suffix: str, capsys: pytest.CaptureFixture[str]) -> None:
+def test_simulate_writes_one_record(
+    tmp_path: Path, suffix: str, capsys: pytest.CaptureFixture[str]
+) -> None:
     file = tmp_path / f"record{suffix}"
-    words = ["simulate", "fault=missing_tooth", "operating.duration_s=0.1", "sensing.channels=[pinion_y,wheel_y]"]
+    words = [
+        "simulate",
+        "fault=missing_tooth",
+        "operating.duration_s=0.1",
+        "sensing.channels=[pinion_y,wheel_y]",
+    ]
     assert main([*words, "--output", str(file), "--plot", str(tmp_path / "r.png")]) == 0
     if suffix == ".h5":
         with h5py.File(file) as shard:
@@ -97,7 +125,10 @@ def test_typed_fault_narrows_the_classes(capsys: pytest.CaptureFixture[str]) -> 
     assert main(["plan", "experiment=quickstart", "fault=crack", "operating.duration_s=0.02"]) == 0
     said, notes = capsys.readouterr()
     assert "crack 400" in said
-    assert "gensig: note: fault=crack replaces plan.classes [healthy, crack, pitting, missing_tooth]\n" in notes
+    assert (
+        "gensig: note: fault=crack replaces plan.classes [healthy, crack, pitting, missing_tooth]\n"
+        in notes
+    )
 
 
 def test_own_config_dir_adds_options(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
@@ -122,20 +153,47 @@ BAD = {
     "no out": (["generate"], "out=DIR"),
     "no records": (["generate", "plan.n_records=0", "out=@/x"], "plan.n_records"),
     "not a number": (["generate", "operating.torque_nm=much", "out=@/x"], "operating.torque_nm"),
-    "negative depth": (["generate", "fault=crack", "fault.crack_depth_mm=-1", "out=@/x"], "crack_depth_mm"),
-    "crack through the tooth": (["stiffness", "fault=crack", "fault.crack_depth_mm=4.2"], "root chord"),
-    "pit off the flank": (["stiffness", "fault=pitting", "fault.pit_position_mm=9"], "pit_position_mm"),
+    "negative depth": (
+        ["generate", "fault=crack", "fault.crack_depth_mm=-1", "out=@/x"],
+        "crack_depth_mm",
+    ),
+    "crack through the tooth": (
+        ["stiffness", "fault=crack", "fault.crack_depth_mm=4.2"],
+        "root chord",
+    ),
+    "pit off the flank": (
+        ["stiffness", "fault=pitting", "fault.pit_position_mm=9"],
+        "pit_position_mm",
+    ),
     "pit over the face": (["stiffness", "fault=pitting", "fault.pit_width_mm=21"], "20 mm wide"),
-    "pit through the tooth": (["stiffness", "fault=pitting", "fault.pit_depth_mm=3"], "pit_depth_mm"),
+    "pit through the tooth": (
+        ["stiffness", "fault=pitting", "fault.pit_depth_mm=3"],
+        "pit_depth_mm",
+    ),
     "tooth not on the gear": (["stiffness", "fault=crack", "fault.tooth=23"], "0..22"),
-    "fault key of another fault": (["stiffness", "fault=crack", "fault.pit_width_mm=3"], "pit_width_mm"),
+    "fault key of another fault": (
+        ["stiffness", "fault=crack", "fault.pit_width_mm=3"],
+        "pit_width_mm",
+    ),
     "undercut": (["stiffness", "gear.pinion.n_teeth=12"], "undercut"),
-    "bore outside the fit": (["stiffness", "mesh.body=sainsot", "gear.pinion.bore_radius_mm=2"], "allow_extrapolation"),
+    "bore outside the fit": (
+        ["stiffness", "mesh.body=sainsot", "gear.pinion.bore_radius_mm=2"],
+        "allow_extrapolation",
+    ),
     "rim too thin": (["stiffness", "gear.pinion.bore_radius_mm=18"], "modules thick"),
     "sweep without -m": (["generate", "fault=crack,pitting", "out=@/x"], "-m"),
-    "bad distribution": (["plan", "plan.vary={sensing.snr_db:{distribution:uniform,low:3}}"], "low, high"),
-    "varied text": (["plan", "plan.vary={mesh.law:{distribution:uniform,low:0,high:1}}"], "mesh.law"),
-    "varied geometry": (["plan", "plan.vary={gear.backlash_um:{distribution:uniform,low:0,high:1}}"], "-m"),
+    "bad distribution": (
+        ["plan", "plan.vary={sensing.snr_db:{distribution:uniform,low:3}}"],
+        "low, high",
+    ),
+    "varied text": (
+        ["plan", "plan.vary={mesh.law:{distribution:uniform,low:0,high:1}}"],
+        "mesh.law",
+    ),
+    "varied geometry": (
+        ["plan", "plan.vary={gear.backlash_um:{distribution:uniform,low:0,high:1}}"],
+        "-m",
+    ),
     "no data set": (["verify", "@"], "no gensig data set"),
     "no such path": (["inspect", "@/nothing"], "does not exist"),
     "no channel": (["simulate", "sensing.channels=[pinion_z]"], "pinion_y"),
@@ -168,7 +226,9 @@ def test_a_mistake_is_one_line_and_touches_nothing(
     assert list(tmp_path.iterdir()) == []
 
 
-def test_existing_folder_is_refused_and_untouched(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
+def test_existing_folder_is_refused_and_untouched(
+    tmp_path: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
     precious = tmp_path / "precious.txt"
     precious.write_text("mine")
     assert main(["generate", f"out={tmp_path}"]) == 2

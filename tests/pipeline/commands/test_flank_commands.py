@@ -11,7 +11,12 @@ import gensig.commands.gears.modify
 from gensig.cli import main
 from gensig.systems.flank_optimum import optimise
 
-HELICAL = ["system=helical_pair", "mesh.n_slices=12", "mesh.slice_coupling=independent", "mesh.contact=linear"]
+HELICAL = [
+    "system=helical_pair",
+    "mesh.n_slices=12",
+    "mesh.slice_coupling=independent",
+    "mesh.contact=linear",
+]
 
 
 def test_transmission_error_writes_what_it_promises(tmp_path, capsys):
@@ -58,9 +63,14 @@ def test_a_fault_is_told_over_the_periods_that_see_it(tmp_path, capsys):
     assert figure.read_bytes().startswith(b"\x89PNG")
     assert main(["stiffness", *words, "--json", str(out), "--plot", str(figure)]) == 0
     content = json.loads(out.read_text())
-    single, faulty = content["single_pair_stiffness_n_per_m"], content["faulty_pair_stiffness_n_per_m"]
+    single, faulty = (
+        content["single_pair_stiffness_n_per_m"],
+        content["faulty_pair_stiffness_n_per_m"],
+    )
     assert max(faulty) < 0.95 * max(single)
-    assert min(content["mesh_stiffness_n_per_m"]) < 0.97 * min(content["sound_mesh_stiffness_n_per_m"])
+    assert min(content["mesh_stiffness_n_per_m"]) < 0.97 * min(
+        content["sound_mesh_stiffness_n_per_m"]
+    )
     assert "the mesh loses" in capsys.readouterr().out
 
 
@@ -73,8 +83,14 @@ def test_a_modification_too_deep_to_close_is_said(capsys):
 
 
 def test_what_modify_flank_writes_other_commands_take(tmp_path, capsys, monkeypatch):
-    monkeypatch.setattr(gensig.commands.gears.modify, "optimise", functools.partial(optimise, generations=1))
-    target, front, figure = tmp_path / "mine" / "modification" / "best.yaml", tmp_path / "f.json", tmp_path / "f.png"
+    monkeypatch.setattr(
+        gensig.commands.gears.modify, "optimise", functools.partial(optimise, generations=1)
+    )
+    target, front, figure = (
+        tmp_path / "mine" / "modification" / "best.yaml",
+        tmp_path / "f.json",
+        tmp_path / "f.png",
+    )
     target.parent.mkdir(parents=True)
     words = ["modify-flank", *HELICAL, "--points", "1", "--misalignments", "0", "4", "--seed", "3"]
     assert main([*words, "--out", str(target), "--json", str(front), "--plot", str(figure)]) == 0
@@ -82,7 +98,12 @@ def test_what_modify_flank_writes_other_commands_take(tmp_path, capsys, monkeypa
     chosen = json.loads(front.read_text())["chosen"]
     assert yaml.safe_load(target.read_text())["pinion"] == chosen["modification"]["pinion"]
     out = tmp_path / "te.json"
-    both = ["modification=best", "modification.misalignment_um=4", "--config-dir", str(tmp_path / "mine")]
+    both = [
+        "modification=best",
+        "modification.misalignment_um=4",
+        "--config-dir",
+        str(tmp_path / "mine"),
+    ]
     assert main(["transmission-error", *HELICAL, *both, "--json", str(out)]) == 0
     content = json.loads(out.read_text())
     # the option is rounded to 1 nm; the front holds the worst of both misalignments
@@ -94,19 +115,37 @@ def test_what_modify_flank_writes_other_commands_take(tmp_path, capsys, monkeypa
 @pytest.mark.parametrize(
     ("words", "message"),
     [
-        (["modify-flank", *HELICAL, "fault=crack", "--out", "best.yaml"], "a modification is for sound flanks"),
         (
-            ["transmission-error", *HELICAL, "fault=crack", "fault.crack_depth_mm=1", "fault.crack_width_mm=5"],
+            ["modify-flank", *HELICAL, "fault=crack", "--out", "best.yaml"],
+            "a modification is for sound flanks",
+        ),
+        (
+            [
+                "transmission-error",
+                *HELICAL,
+                "fault=crack",
+                "fault.crack_depth_mm=1",
+                "fault.crack_width_mm=5",
+            ],
             "mesh.slice_coupling = 'independent' with a fault over part of the face",
         ),
         (["transmission-error", *HELICAL, "--plot", "te.txt"], "the name must end in .png"),
         (["transmission-error", *HELICAL, "operating.torque_nm=0"], "torque"),
-        (["transmission-error", *HELICAL, "mesh.n_slices=0"], "mesh.n_slices = 0 must lie in 1..1000"),
-        (["transmission-error", *HELICAL, "gear.helix_angle_deg=60"], "must lie between -45 and 45"),
+        (
+            ["transmission-error", *HELICAL, "mesh.n_slices=0"],
+            "mesh.n_slices = 0 must lie in 1..1000",
+        ),
+        (
+            ["transmission-error", *HELICAL, "gear.helix_angle_deg=60"],
+            "must lie between -45 and 45",
+        ),
         (["modify-flank", *HELICAL, "--out", "best.txt"], "give a file NAME.yaml"),
         (["modify-flank", *HELICAL, "--out", "best.yaml", "--points", "0"], "--points 0"),
         (["modify-flank", *HELICAL, "--out", "best.yaml", "--torques", "-1"], "must be positive"),
-        (["generate", *HELICAL, "mesh.slices_in_phase=true", "out=never"], "slices_in_phase = true is for comparing"),
+        (
+            ["generate", *HELICAL, "mesh.slices_in_phase=true", "out=never"],
+            "slices_in_phase = true is for comparing",
+        ),
     ],
 )
 def test_mistakes_are_one_line(words, message, capsys, tmp_path, monkeypatch):

@@ -29,7 +29,9 @@ def test_it_writes_the_response_of_every_node(tmp_path, capsys):
     assert content["orders"][:3] == [0.5, 1.0, 1.5]
     seen = content["toothed_wheel_fluctuation_rpm"]
     assert own[13] < seen["flywheel"] < 1.3 * own[13]  # teeth out of place add to it
-    assert 0.5 * own[44] < seen["pump_end"] < 1.1 * own[44]  # a mean over one spacing loses what 120 teeth cannot hold
+    assert (
+        0.5 * own[44] < seen["pump_end"] < 1.1 * own[44]
+    )  # a mean over one spacing loses what 120 teeth cannot hold
     drive = content["meshes"].index("21/45")
     assert content["least_tooth_force_n"][drive] < 0.0 < content["mean_tooth_force_n"][drive]
     printed = capsys.readouterr().out
@@ -42,7 +44,20 @@ def test_a_run_of_speeds_and_a_disturbance_are_written_and_drawn(tmp_path):
     content = found_by(
         tmp_path,
         "excitation.dynamometer.disturbance_share=0.05",
-        *("--nodes", "14", "--run", "700", "1000", "100", "--plot", str(figure), "--speed", "1000", "--torque", "4000"),
+        *(
+            "--nodes",
+            "14",
+            "--run",
+            "700",
+            "1000",
+            "100",
+            "--plot",
+            str(figure),
+            "--speed",
+            "1000",
+            "--torque",
+            "4000",
+        ),
     )
     assert content["run_speeds_rpm"] == pytest.approx([700, 800, 900, 1000])
     assert np.shape(content["run_speed_fluctuation_rpm"]) == (1, 4)
@@ -58,7 +73,9 @@ def test_lateral_motion_of_the_gears_is_taken_along(tmp_path):
     flywheel = flat["node_numbers"].index(14)
     assert len(lateral["speed_fluctuation_rpm"]) == len(flat["speed_fluctuation_rpm"]) == 67
     assert_allclose(
-        lateral["speed_fluctuation_rpm"][flywheel], flat["speed_fluctuation_rpm"][flywheel], rtol=0.02
+        lateral["speed_fluctuation_rpm"][flywheel],
+        flat["speed_fluctuation_rpm"][flywheel],
+        rtol=0.02,
     )  # gears on soft bearings are not what the flywheel feels
 
 
@@ -81,7 +98,10 @@ def test_lateral_motion_of_the_gears_is_taken_along(tmp_path):
             (*ENGINE, "excitation.throw_nodes=[99,12,11,10,9,8,7,6,5,4]"),
             "excitation.throw_nodes: the shaft line has no",
         ),
-        ((*ENGINE, "excitation.pressure.file=none.csv"), "excitation.pressure.file = none.csv cannot be read"),
+        (
+            (*ENGINE, "excitation.pressure.file=none.csv"),
+            "excitation.pressure.file = none.csv cannot be read",
+        ),
         (
             (*ENGINE, "excitation.pressure.file=none.csv", "--torque", "5"),
             "excitation.pressure.file decides the torque",

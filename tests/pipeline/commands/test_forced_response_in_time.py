@@ -17,7 +17,21 @@ DAMPERS = (
 
 def test_loads_spectra_root_stress_and_a_sweep_are_written_and_drawn(tmp_path, capsys):
     out, figure = tmp_path / "found.json", tmp_path / "found.png"
-    words = [*ENGINE, DAMPERS, "--nodes", "14", "--time", "0.6", "--mesh", "45", "21", "--sweep", "1500", "1750", "0.8"]
+    words = [
+        *ENGINE,
+        DAMPERS,
+        "--nodes",
+        "14",
+        "--time",
+        "0.6",
+        "--mesh",
+        "45",
+        "21",
+        "--sweep",
+        "1500",
+        "1750",
+        "0.8",
+    ]
     assert main(["forced-response", *words, "--json", str(out), "--plot", str(figure)]) == 0
     content, printed = json.loads(out.read_text()), capsys.readouterr().out
     drive = content["meshes"].index("21/45")
@@ -40,7 +54,10 @@ def test_loads_spectra_root_stress_and_a_sweep_are_written_and_drawn(tmp_path, c
         assert after["largest_root_stress_mpa"] < after["iso_root_stress_mpa"]
     assert roots["in_time"]["greatest_tooth_force_n"] == pytest.approx(greatest[drive])
     assert "by the dampers" in printed
-    assert "reliability: high from 2.00 on, higher from 1.60 on, general from 1.25 on, low from 1.00 on" in printed
+    assert (
+        "reliability: high from 2.00 on, higher from 1.60 on, general from 1.25 on, low from 1.00 on"
+        in printed
+    )
     n_speeds = len(content["sweep_speeds_rpm"])
     for way in ("sweep_up", "sweep_down"):
         assert np.shape(content[way]["angle_deg"]) == (1, n_speeds, len(content["sweep_orders"]))
@@ -54,9 +71,15 @@ def test_loads_spectra_root_stress_and_a_sweep_are_written_and_drawn(tmp_path, c
 @pytest.mark.parametrize(
     ("words", "message"),
     [
-        (["--sweep", "900", "700", "5"], "--sweep 900 700 5: give low and high speed in r/min and the seconds"),
+        (
+            ["--sweep", "900", "700", "5"],
+            "--sweep 900 700 5: give low and high speed in r/min and the seconds",
+        ),
         (["--sweep", "650", "1750", "0"], "--sweep 650 1750 0: give low and high speed"),
-        (["--sweep", "650", "1750", "0.3"], "passes too few cycles at its low end; give 0.81 s or more"),
+        (
+            ["--sweep", "650", "1750", "0.3"],
+            "passes too few cycles at its low end; give 0.81 s or more",
+        ),
         (["--time", "0.01"], "less than a cycle of two turns; simulate longer"),
         (["--mesh", "3", "45"], "nodes 3 and 45 do not mesh; these do: 3/18"),
     ],

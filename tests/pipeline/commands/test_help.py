@@ -36,7 +36,9 @@ def words_of(example: str) -> list[str]:
 
 
 @pytest.mark.parametrize("name", command_page.parsers())
-def test_help_has_an_example_and_the_exit_statuses(name: str, capsys: pytest.CaptureFixture[str]) -> None:
+def test_help_has_an_example_and_the_exit_statuses(
+    name: str, capsys: pytest.CaptureFixture[str]
+) -> None:
     command, verb = name.split()
     assert MAIN[command]([verb, "--help"]) == 0
     text = capsys.readouterr().out
@@ -51,14 +53,22 @@ def test_every_example_parses_and_composes(name: str, example: str) -> None:
     assert " ".join(words[:2]) in command_page.parsers()
     arguments = command_page.parsers()[" ".join(words[:2])].parse_intermixed_args(words[2:])
     overrides = getattr(arguments, "overrides", None)
-    if words[1] in ("evaluate", "resume", "twin") or not overrides or getattr(arguments, "config_dir", None):
+    if (
+        words[1] in ("evaluate", "resume", "twin")
+        or not overrides
+        or getattr(arguments, "config_dir", None)
+    ):
         return
-    if not any("," in word and "[" not in word for word in overrides):  # a sweep is several configurations
+    if not any(
+        "," in word and "[" not in word for word in overrides
+    ):  # a sweep is several configurations
         compose("train" if words[1] == "train" else "generate", overrides)
 
 
 @pytest.mark.parametrize("example", CHEAP)
-def test_a_cheap_example_runs_as_printed(example: str, tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+def test_a_cheap_example_runs_as_printed(
+    example: str, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
     assert example in [one for _, one in EXAMPLES]
     monkeypatch.chdir(tmp_path)
     words = example.split()
@@ -69,7 +79,9 @@ def test_a_cheap_example_runs_as_printed(example: str, tmp_path: Path, monkeypat
 
 
 def test_the_page_of_commands_is_that_of_the_verbs() -> None:
-    assert command_page.PAGE.read_text(encoding="utf-8") == command_page.page(), "run python tests/command_page.py"
+    assert command_page.PAGE.read_text(encoding="utf-8") == command_page.page(), (
+        "run python tests/command_page.py"
+    )
 
 
 def test_each_command_knows_the_verbs_of_the_other() -> None:
@@ -136,7 +148,13 @@ def test_a_typical_mistake_is_one_line_that_helps(
 
 
 def test_what_is_typed_and_not_read_is_said(capsys: pytest.CaptureFixture[str]) -> None:
-    words = ["modes", "system=two_stage_gearbox", "gear=harbin_38_55", "operating.speed_rpm=5", "out=x"]
+    words = [
+        "modes",
+        "system=two_stage_gearbox",
+        "gear=harbin_38_55",
+        "operating.speed_rpm=5",
+        "out=x",
+    ]
     assert MAIN["gensig"](words) == 0
     said = capsys.readouterr().err.splitlines()
     assert said == [
@@ -163,15 +181,31 @@ def test_every_group_and_option_has_a_line_and_the_keys_that_hydra_reads(group: 
             assert {name.split(".")[1] for name in listed} == set(composed)
 
 
-def test_options_of_a_users_folder_are_listed(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
+def test_options_of_a_users_folder_are_listed(
+    tmp_path: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
     (tmp_path / "gear").mkdir()
-    (tmp_path / "gear" / "mine.yaml").write_text("# Our pair. More.\nname: mine   # ours\nbacklash_um: 40\n")
+    (tmp_path / "gear" / "mine.yaml").write_text(
+        "# Our pair. More.\nname: mine   # ours\nbacklash_um: 40\n"
+    )
     assert MAIN["gensig"](["options", "gear", "--config-dir", str(tmp_path), "--json"]) == 0
     assert {"name": "mine", "about": "Our pair"} in json.loads(capsys.readouterr().out)["options"]
     assert MAIN["gensig"](["options", "gear=mine", "--config-dir", str(tmp_path), "--json"]) == 0
     name, backlash = json.loads(capsys.readouterr().out)["keys"]
-    assert name == {"name": "gear.name", "text": "mine", "value": "mine", "unit": "", "comment": "ours"}
-    assert backlash == {"name": "gear.backlash_um", "text": "40", "value": 40, "unit": "um", "comment": ""}
+    assert name == {
+        "name": "gear.name",
+        "text": "mine",
+        "value": "mine",
+        "unit": "",
+        "comment": "ours",
+    }
+    assert backlash == {
+        "name": "gear.backlash_um",
+        "text": "40",
+        "value": 40,
+        "unit": "um",
+        "comment": "",
+    }
 
 
 def completed(line: str, tmp_path: Path) -> set[str]:
@@ -193,7 +227,11 @@ def completed(line: str, tmp_path: Path) -> set[str]:
         ("gensig generate --qu", {"--quiet"}, {"--json"}),
         ("gensig generate fau", {"fault=", "fault.kind="}, {"gear="}),
         ("gensig generate fault=c", {"fault=crack", "fault=chipped"}, {"fault=wear"}),
-        ("gensig generate fault=crack fault.crack_d", {"fault.crack_depth_mm="}, {"fault.crack_angle_deg="}),
+        (
+            "gensig generate fault=crack fault.crack_d",
+            {"fault.crack_depth_mm="},
+            {"fault.crack_angle_deg="},
+        ),
         ("gensig options fault=cr", {"fault=crack"}, {"fault=wear"}),
         ("diagnose train mod", {"model=", "model.kind="}, {"gear="}),
         ("diagnose detectability fault=c", {"fault=crack"}, {"model="}),
@@ -213,16 +251,23 @@ def test_the_tab_key_completes_paths_of_keys(tmp_path: Path) -> None:
     (tmp_path / "her.csv").touch()
     for line in ("diagnose train data=", "gensig generate out=", "gensig modes system.gears_csv="):
         key = line.split()[-1]
-        assert completed(f"{line}{tmp_path}/he", tmp_path) == {f"{key}{tmp_path}/here/", f"{key}{tmp_path}/her.csv"}
+        assert completed(f"{line}{tmp_path}/he", tmp_path) == {
+            f"{key}{tmp_path}/here/",
+            f"{key}{tmp_path}/her.csv",
+        }
 
 
 @pytest.mark.parametrize("shell", ["bash", "zsh", "fish"])
-def test_what_a_shell_sources_names_both_commands(shell: str, capsys: pytest.CaptureFixture[str]) -> None:
+def test_what_a_shell_sources_names_both_commands(
+    shell: str, capsys: pytest.CaptureFixture[str]
+) -> None:
     assert MAIN["gensig"](["completion", shell]) == 0
     text = capsys.readouterr().out
     assert all(command in text for command in MAIN)
     if shell == "bash":
-        done = subprocess.run(["bash", "-c", f"{text}\ncomplete -p gensig diagnose"], capture_output=True, check=True)
+        done = subprocess.run(
+            ["bash", "-c", f"{text}\ncomplete -p gensig diagnose"], capture_output=True, check=True
+        )
         assert done.stdout.count(b"\n") == 2
 
 
@@ -231,4 +276,9 @@ def test_help_loads_nothing_that_is_slow() -> None:
     for command in MAIN:
         code = f"import sys; from {command}.cli import main; main(['--help']); "
         code += f"sys.exit(any(name in sys.modules for name in {slow}))"
-        assert subprocess.run([sys.executable, "-c", code], capture_output=True, check=False).returncode == 0
+        assert (
+            subprocess.run(
+                [sys.executable, "-c", code], capture_output=True, check=False
+            ).returncode
+            == 0
+        )

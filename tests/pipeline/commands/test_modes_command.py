@@ -12,7 +12,14 @@ from numpy.testing import assert_allclose
 
 from gensig.cli import main
 
-KEYS = {"natural_frequencies_hz", "damping_ratio", "shapes", "kinetic_energy_share", "nodes", "speed_ratio"}
+KEYS = {
+    "natural_frequencies_hz",
+    "damping_ratio",
+    "shapes",
+    "kinetic_energy_share",
+    "nodes",
+    "speed_ratio",
+}
 ENGINE = "system=engine_gear_train"
 HOWTO = Path(__file__).resolve().parents[3] / "docs" / "howto" / "your_drive_line.md"
 
@@ -62,12 +69,16 @@ def test_lateral_motion_adds_22_masses(tmp_path):
     assert len(content["shapes"][0]) == 89
     assert {len(row) for row in content["kinetic_energy_share"]} == {67}
     assert content["n_rigid_modes"] == 1
-    assert_allclose(content["natural_frequencies_hz"][1:4], [28.31, 68.71, 161.92], rtol=0, atol=0.01)
+    assert_allclose(
+        content["natural_frequencies_hz"][1:4], [28.31, 68.71, 161.92], rtol=0, atol=0.01
+    )
 
 
 def test_a_viscous_damper_is_an_option(tmp_path):
     content = modes_of(tmp_path, ENGINE, "system.viscous_damper_node=1")
-    assert_allclose(content["natural_frequencies_hz"][1:5], [28.56, 70.36, 166.49, 215.97], rtol=0, atol=0.005)
+    assert_allclose(
+        content["natural_frequencies_hz"][1:5], [28.56, 70.36, 166.49, 215.97], rtol=0, atol=0.005
+    )
 
 
 @pytest.mark.parametrize(("system", "n"), [("spur_pair", 6), ("two_stage_gearbox", 8)])
@@ -90,7 +101,9 @@ def test_your_own_tables_are_read_by_their_path(tmp_path):
     mine, gears = tmp_path / "mine.csv", tmp_path / "my gears.csv"
     text = tables.joinpath("engine_shafting.csv").read_text(encoding="utf-8")
     mine.write_text(text, encoding="utf-8")
-    gears.write_text(tables.joinpath("engine_gears.csv").read_text(encoding="utf-8"), encoding="utf-8")
+    gears.write_text(
+        tables.joinpath("engine_gears.csv").read_text(encoding="utf-8"), encoding="utf-8"
+    )
     words = ["system=shaft_line", f"system.shafting_csv={mine}", f"system.gears_csv='{gears}'"]
     one, other = modes_of(tmp_path, *words), modes_of(tmp_path, ENGINE)
     assert_allclose(one["natural_frequencies_hz"], other["natural_frequencies_hz"], rtol=0, atol=0)
@@ -101,13 +114,17 @@ def test_the_page_on_your_own_line_runs_as_it_stands(tmp_path, capsys, monkeypat
     page = HOWTO.read_text(encoding="utf-8")
     for name, table in zip(("line.csv", "gears.csv"), blocks(page, "csv")[:2], strict=True):
         (tmp_path / name).write_text(table, encoding="utf-8")
-    command, *_ = blocks(page, "sh")  # the others make records: tests/pipeline/records/test_motor_records.py
+    command, *_ = blocks(
+        page, "sh"
+    )  # the others make records: tests/pipeline/records/test_motor_records.py
     assert main(command.split()[1:]) == 0
     assert len(json.loads((tmp_path / "modes.json").read_text())["natural_frequencies_hz"]) == 4
     assert (tmp_path / "modes.png").stat().st_size > 1000
     option, *_ = blocks(page, "yaml")
     (tmp_path / "mine" / "system").mkdir(parents=True)
-    (tmp_path / "mine" / "system" / "my_fan.yaml").write_text(option.replace("/data", str(tmp_path)), encoding="utf-8")
+    (tmp_path / "mine" / "system" / "my_fan.yaml").write_text(
+        option.replace("/data", str(tmp_path)), encoding="utf-8"
+    )
     assert modes_of(tmp_path, "system=my_fan", "--config-dir", "mine")["system"] == "my_fan"
     (code,) = blocks(page, "python")
     capsys.readouterr()
@@ -128,7 +145,11 @@ def test_the_page_on_your_own_line_runs_as_it_stands(tmp_path, capsys, monkeypat
     ],
 )
 def test_a_spoilt_table_names_row_and_column(tmp_path, capsys, node, column, value):
-    text = resources.files("gensig.configs").joinpath("tables/engine_shafting.csv").read_text(encoding="utf-8")
+    text = (
+        resources.files("gensig.configs")
+        .joinpath("tables/engine_shafting.csv")
+        .read_text(encoding="utf-8")
+    )
     lines = text.splitlines()
     notes = [line for line in lines if line.startswith("#")]
     rows = list(csv.DictReader(lines[len(notes) :]))
@@ -148,8 +169,14 @@ def test_a_spoilt_table_names_row_and_column(tmp_path, capsys, node, column, val
 @pytest.mark.parametrize(
     ("words", "message"),
     [
-        (["modes", "system=shaft_line"], "system.shafting_csv is required: give a path, or one of engine_gears.csv"),
-        (["modes", ENGINE, "system.gears_csv=null"], "gear_mesh needs a table of gears; give system.gears_csv"),
+        (
+            ["modes", "system=shaft_line"],
+            "system.shafting_csv is required: give a path, or one of engine_gears.csv",
+        ),
+        (
+            ["modes", ENGINE, "system.gears_csv=null"],
+            "gear_mesh needs a table of gears; give system.gears_csv",
+        ),
         (["modes", ENGINE, "system.shafting_csv=engine_gears"], "column face_width_mm: unknown"),
         (["modes", ENGINE, "system.viscous_damper_node=99"], "has no such node"),
         (["modes", "fault=crack"], "modes are those of sound teeth"),

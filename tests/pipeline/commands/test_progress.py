@@ -36,11 +36,13 @@ def test_plain_lines_come_every_few_seconds_even_before_a_shard(
     after = capsys.readouterr().err.splitlines()
     assert len(before) >= 2
     assert all(
-        re.fullmatch(r"0 of 100 records, 0 s; 3 of 17 shards at work, counted when whole", line) for line in before
+        re.fullmatch(r"0 of 100 records, 0 s; 3 of 17 shards at work, counted when whole", line)
+        for line in before
     )
     assert len(after) >= 2
     assert all(
-        re.fullmatch(r"60 of 100 records, [0-9.]+ records/s, 8\.0 MB, 0 s left, 2 failed", line) for line in after
+        re.fullmatch(r"60 of 100 records, [0-9.]+ records/s, 8\.0 MB, 0 s left, 2 failed", line)
+        for line in after
     )
 
 
@@ -65,7 +67,9 @@ def test_rate_and_time_left_are_those_of_this_run() -> None:
     assert progress.facts() == "2.0 records/s, 8.0 MB, 15 s left, 2 failed"
 
 
-@pytest.mark.parametrize(("seconds", "text"), [(59.4, "59 s"), (190.0, "3 min 10 s"), (7500.0, "2 h 5 min")])
+@pytest.mark.parametrize(
+    ("seconds", "text"), [(59.4, "59 s"), (190.0, "3 min 10 s"), (7500.0, "2 h 5 min")]
+)
 def test_durations_are_read_by_people(seconds: float, text: str) -> None:
     assert console._duration(seconds) == text
 
@@ -78,7 +82,15 @@ def test_quiet_says_nothing(tmp_path: Path, capsys: pytest.CaptureFixture[str]) 
 
 def test_a_terminal_shows_a_bar_with_rate_bytes_and_time_left(tmp_path: Path) -> None:
     ours, theirs = pty.openpty()
-    command = [sys.executable, "-m", "gensig.cli", "generate", *TINY, "executor.n_workers=1", f"out={tmp_path / 'x'}"]
+    command = [
+        sys.executable,
+        "-m",
+        "gensig.cli",
+        "generate",
+        *TINY,
+        "executor.n_workers=1",
+        f"out={tmp_path / 'x'}",
+    ]
     environment = {**os.environ, "TERM": "xterm", "COLUMNS": "120", "NO_COLOR": "1"}
     process = subprocess.Popen(command, stderr=theirs, stdout=subprocess.DEVNULL, env=environment)
     os.close(theirs)
@@ -116,7 +128,9 @@ def test_the_log_tells_what_happened_and_is_closed_with_the_set(tmp_path: Path) 
     assert (out / "run.log").read_bytes() == before
 
 
-def test_the_log_tells_of_a_run_that_ended_early(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+def test_the_log_tells_of_a_run_that_ended_early(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
     def interrupt(_progress: ShardProgress, _state: Progress) -> None:
         raise KeyboardInterrupt
 
@@ -143,12 +157,17 @@ def test_figures_are_the_same_however_the_set_was_made(tmp_path: Path) -> None:
     one, other = make(tmp_path / "one"), make(tmp_path / "other", "executor.n_workers=2")
     names = sorted(path.name for path in (one / "figures").iterdir())
     assert names == ["0-healthy.png", "1-crack.png"]
-    assert all((one / "figures" / name).read_bytes() == (other / "figures" / name).read_bytes() for name in names)
+    assert all(
+        (one / "figures" / name).read_bytes() == (other / "figures" / name).read_bytes()
+        for name in names
+    )
     assert "](figures/1-crack.png)" in (one / "README.md").read_text()
     assert contents(one) == contents(other)
 
 
-def test_an_edited_card_is_named_and_accepted_when_asked(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
+def test_an_edited_card_is_named_and_accepted_when_asked(
+    tmp_path: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
     out = make(tmp_path / "data")
     with (out / "README.md").open("a") as card:
         card.write("\nThe third unit was run in.\n")

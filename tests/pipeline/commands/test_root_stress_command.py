@@ -11,7 +11,10 @@ PUMP = "gear=engine_pump_drive"
 
 def test_it_writes_what_it_promises(tmp_path, capsys):
     out, figure = tmp_path / "root.json", tmp_path / "root.png"
-    assert main(["root-stress", PUMP, "--stress", "349.39", "--json", str(out), "--plot", str(figure)]) == 0
+    assert (
+        main(["root-stress", PUMP, "--stress", "349.39", "--json", str(out), "--plot", str(figure)])
+        == 0
+    )
     content = json.loads(out.read_text())
     assert content["decisive_gear"] == "wheel"
     assert content["form_factor"] == pytest.approx(1.167, abs=6e-4)
@@ -19,10 +22,17 @@ def test_it_writes_what_it_promises(tmp_path, capsys):
     assert content["tangential_force_n"] == pytest.approx(8393, abs=1)
     assert content["torque_nm"] == pytest.approx(680, abs=1)
     assert content["iso_root_stress_mpa"] == pytest.approx(349.39)
-    assert (content["safety_factor_paper"], content["safety_factor_iso"]) == pytest.approx((1.353, 2.7), rel=0.02)
+    assert (content["safety_factor_paper"], content["safety_factor_iso"]) == pytest.approx(
+        (1.353, 2.7), rel=0.02
+    )
     assert content["reliability_paper"] == "general"
     assert content["tangential_force_over_mesh_n"] > content["tangential_force_n"]
-    assert len(content["root_stress_mpa"]) == len(content["roll_angle_deg"]) == len(content["load_share"]) > 300
+    assert (
+        len(content["root_stress_mpa"])
+        == len(content["roll_angle_deg"])
+        == len(content["load_share"])
+        > 300
+    )
     assert content["largest_root_stress_mpa"] == max(content["root_stress_mpa"]) < 349.39
     assert content["root_stress_mpa"] == content["gears"]["wheel"]["root_stress_mpa"]
     assert content["gears"]["pinion"]["safety_factor_paper"] > content["safety_factor_paper"]
@@ -45,7 +55,20 @@ def test_a_helical_pair_and_an_option_of_ones_own(tmp_path, capsys):
     lines = ["bending_limit_mpa: 430", "name: soft"]
     option = "defaults:\n  - 18cr2ni4w\n  - _self_\n" + "\n".join(lines) + "\n"
     (mine / "soft.yaml").write_text(option)
-    assert main(["root-stress", *words, "strength=soft", "--config-dir", str(mine.parent), "--json", str(out)]) == 0
+    assert (
+        main(
+            [
+                "root-stress",
+                *words,
+                "strength=soft",
+                "--config-dir",
+                str(mine.parent),
+                "--json",
+                str(out),
+            ]
+        )
+        == 0
+    )
     after = json.loads(out.read_text())
     assert after["safety_factor_iso"] == pytest.approx(before["safety_factor_iso"] * 430 / 525.25)
     assert "sigma_Flim 430 MPa" in capsys.readouterr().out

@@ -14,8 +14,23 @@ DAMPER = "{node: %s, ring_inertia_kg_m2: %s, damping_nms_per_rad: %s, stiffness_
 
 def test_it_writes_an_option_that_the_line_takes(tmp_path, capsys):
     (tmp_path / "system").mkdir()
-    out, figure, report = tmp_path / "system" / "damped.yaml", tmp_path / "dampers.png", tmp_path / "dampers.json"
-    words = (*PUMP, "--nodes", "45", "--viscous", "--run", "1650", "1750", "50", "--most-inertia", "0.02")
+    out, figure, report = (
+        tmp_path / "system" / "damped.yaml",
+        tmp_path / "dampers.png",
+        tmp_path / "dampers.json",
+    )
+    words = (
+        *PUMP,
+        "--nodes",
+        "45",
+        "--viscous",
+        "--run",
+        "1650",
+        "1750",
+        "50",
+        "--most-inertia",
+        "0.02",
+    )
     files = ("--out", str(out), "--json", str(report), "--plot", str(figure))
     assert main(["tune-damper", *words, *files]) == 0
     content = json.loads(report.read_text())
@@ -31,11 +46,20 @@ def test_it_writes_an_option_that_the_line_takes(tmp_path, capsys):
     assert "safety, paper" in capsys.readouterr().out
 
     taken = tmp_path / "response.json"
-    words = ("system=damped", "excitation=engine_v20", "--config-dir", str(tmp_path), "--json", str(taken))
+    words = (
+        "system=damped",
+        "excitation=engine_v20",
+        "--config-dir",
+        str(tmp_path),
+        "--json",
+        str(taken),
+    )
     assert main(["forced-response", *words]) == 0
     response = json.loads(taken.read_text())
     drive = response["meshes"].index("21/45")
-    assert_allclose(response["greatest_tooth_force_n"][drive], content["after"]["greatest_force_n"], rtol=1e-6)
+    assert_allclose(
+        response["greatest_tooth_force_n"][drive], content["after"]["greatest_force_n"], rtol=1e-6
+    )
     assert response["node_numbers"][-1] == 68
     assert main(["modes", "system=damped", "--config-dir", str(tmp_path)]) == 0
     assert "2 rigid mode(s)" in capsys.readouterr().out
@@ -48,10 +72,19 @@ def test_it_writes_an_option_that_the_line_takes(tmp_path, capsys):
         ((*PUMP, "--nodes", "99"), "the shaft line has no node 99; it has 1 to 67"),
         ((*PUMP, "--nodes", "45", "45"), "dampers on nodes 45, 45: name each node once"),
         ((*PUMP, "--run", "900", "700", "10"), "--run 900 700 10: give low, high and step"),
-        ((*PUMP, "--most-inertia", "0", "--run", "1700", "1750", "50"), "give a positive one for each damper"),
+        (
+            (*PUMP, "--most-inertia", "0", "--run", "1700", "1750", "50"),
+            "give a positive one for each damper",
+        ),
         ((*PUMP, "--plot", "a.txt"), "--plot a.txt: the name must end in .png"),
-        ((*PUMP, "excitation.pressure.file=none.csv"), "excitation.pressure.file is of one operating point"),
-        (("excitation=engine_v20", "--mesh", "1", "2"), "system.kind = 'spur_pair' is no drive line"),
+        (
+            (*PUMP, "excitation.pressure.file=none.csv"),
+            "excitation.pressure.file is of one operating point",
+        ),
+        (
+            ("excitation=engine_v20", "--mesh", "1", "2"),
+            "system.kind = 'spur_pair' is no drive line",
+        ),
     ],
 )
 def test_what_cannot_be_is_refused_in_one_line(words, message, tmp_path, capsys):
@@ -71,10 +104,22 @@ def test_a_name_that_is_no_option_is_refused(capsys):
     [
         ("5", "system.dampers = 5 must be a list of dampers, [] for none"),
         ("[7]", "system.dampers[0] = 7 must be a group of keys"),
-        (f"[{DAMPER % (99, 0.01, 1, 0)}]", "system.dampers: node 99 is not in the shaft line; it has 1 to 67"),
-        (f"[{DAMPER % (45, 0, 1, 0)}]", "system.dampers[0].ring_inertia_kg_m2 = 0 must be positive"),
-        (f"[{DAMPER % (45, 0.01, -1, 0)}]", "system.dampers[0].damping_nms_per_rad = -1 must not be negative"),
-        (f"[{DAMPER % (45, 0.01, 0, 0)}]", "system.dampers[0]: without damping and stiffness nothing holds the ring"),
+        (
+            f"[{DAMPER % (99, 0.01, 1, 0)}]",
+            "system.dampers: node 99 is not in the shaft line; it has 1 to 67",
+        ),
+        (
+            f"[{DAMPER % (45, 0, 1, 0)}]",
+            "system.dampers[0].ring_inertia_kg_m2 = 0 must be positive",
+        ),
+        (
+            f"[{DAMPER % (45, 0.01, -1, 0)}]",
+            "system.dampers[0].damping_nms_per_rad = -1 must not be negative",
+        ),
+        (
+            f"[{DAMPER % (45, 0.01, 0, 0)}]",
+            "system.dampers[0]: without damping and stiffness nothing holds the ring",
+        ),
         (f"[{DAMPER % ('crank', 0.01, 1, 0)}]", "system.dampers[0].node"),
         ("[{node: 45, ring_inertia_kg_m2: 0.01}]", "system.dampers[0]"),
         ("[{node: 45, mass_kg: 1}]", "system.dampers[0]"),

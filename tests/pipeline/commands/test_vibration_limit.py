@@ -34,7 +34,10 @@ def recorded_rms(depth, case):
     fault = wear_fault(case, depth)
     config = config.with_keys("plan", n_records=1, n_units=1, n_gearboxes=1, classes=["worn"])
     config = config.with_entries(classes={"worn": fault})
-    row = {**make_plan(config).record(0), **{key: value for key, value in ROW.items() if key.startswith("start")}}
+    row = {
+        **make_plan(config).record(0),
+        **{key: value for key, value in ROW.items() if key.startswith("start")},
+    }
     clean = simulate_record(config, row).signals["acceleration_clean"]
     return np.std(clean.astype(np.float64), axis=1)
 
@@ -62,7 +65,9 @@ def test_a_limit_in_m_per_s2_is_of_the_loudest_sensor_and_the_first_of_both_coun
     end = int(np.argmin(np.abs(by_level.depth - by_level.limit_depth)))
     assert by_level.rms[end].max() == pytest.approx(level, rel=0.02)
     _, both = limited(f"wear.vibration_limit_m_per_s2={level}", "wear.vibration_rise_db=4")
-    assert both.limit_depth == pytest.approx(min(by_level.limit_depth, by_rise.limit_depth), rel=0.02)
+    assert both.limit_depth == pytest.approx(
+        min(by_level.limit_depth, by_rise.limit_depth), rel=0.02
+    )
 
 
 def test_a_limit_that_is_not_reached_leaves_the_life_as_it_was():
@@ -93,7 +98,17 @@ def test_the_command_tells_what_ended_the_life(tmp_path, capsys):
     end = int(np.argmin(np.abs(np.array(told["depth_um"]) - content["threshold_um"])))
     assert told["hours"][end] == pytest.approx(content["life_hours"], rel=0.01)
     assert figure.stat().st_size > 1000
-    assert main(["wear-life", *words, "wear.vibration_rise_db=80", "wear.transmission_error_limit_um=1000"]) == 0
+    assert (
+        main(
+            [
+                "wear-life",
+                *words,
+                "wear.vibration_rise_db=80",
+                "wear.transmission_error_limit_um=1000",
+            ]
+        )
+        == 0
+    )
     text = capsys.readouterr().out
     assert "ended by                   depth, 40 um" in text
     assert "limit of 80 dB not reached" in text
@@ -107,7 +122,9 @@ def test_lives_of_a_data_set_end_at_the_depth_found():
         "operating.duration_s=0.1", "life.horizon_h=5000", "wear.vibration_rise_db=4",
     )  # fmt: skip
     config = read_request(words).config
-    _, vibration = limited_by_vibration(read_wear_case(config.with_entries(fault={"kind": "healthy"})), config)
+    _, vibration = limited_by_vibration(
+        read_wear_case(config.with_entries(fault={"kind": "healthy"})), config
+    )
     assert 0.0 < vibration.limit_depth < 99e-6
     plan = make_plan(config)
     assert plan.columns["life_failed"].tolist() == [1] * 6
@@ -122,11 +139,20 @@ def test_lives_of_a_data_set_end_at_the_depth_found():
     ("words", "message"),
     [
         (["wear.vibration_limit_m_per_s2=1"], "is reached by new flanks already"),
-        (["wear.vibration_limit_m_per_s2=-1"], "wear.vibration_limit_m_per_s2 = -1 must be positive"),
+        (
+            ["wear.vibration_limit_m_per_s2=-1"],
+            "wear.vibration_limit_m_per_s2 = -1 must be positive",
+        ),
         (["wear.vibration_rise_db=0"], "wear.vibration_rise_db = 0 must be positive"),
-        (["wear.vibration_rise_db=loud"], "wear.vibration_rise_db = 'loud' is not a number or null"),
+        (
+            ["wear.vibration_rise_db=loud"],
+            "wear.vibration_rise_db = 'loud' is not a number or null",
+        ),
         (["wear.vibration_rise=3"], "did you mean 'wear.vibration_rise_db'"),
-        (["wear.vibration_rise_db=3", "sensing.channels=[pinion_rotation]"], "name an acceleration"),
+        (
+            ["wear.vibration_rise_db=3", "sensing.channels=[pinion_rotation]"],
+            "name an acceleration",
+        ),
     ],
 )
 def test_mistakes_are_one_line(words, message, capsys):

@@ -40,7 +40,12 @@ def test_the_papers_pair_from_the_command_line(tmp_path, capsys):
 
 
 def test_keys_of_the_papers_rule(tmp_path):
-    words = [HARBIN, "wear.rule=fixed_intervals", "wear.load_radius=reference", "wear.geometry=unworn"]
+    words = [
+        HARBIN,
+        "wear.rule=fixed_intervals",
+        "wear.load_radius=reference",
+        "wear.geometry=unworn",
+    ]
     content = life(tmp_path, *words, "wear.n_intervals=50", "wear.criterion=sum")
     assert content["pair_wear_per_mesh_nm"][0] == pytest.approx(0.0560, rel=1e-3)
     assert content["pinion_wear_per_mesh_nm"][0] == pytest.approx(0.0280, rel=1e-3)
@@ -85,7 +90,9 @@ def test_a_map_and_its_laws(tmp_path, capsys):
     assert power["torque_nm"] == [50.0, 200.0]
     assert [law["form"] for law in content["laws"]] == ["power", "logarithm", "exponential"]
     logarithm = content["laws"][1]
-    assert f"no life from {logarithm['no_life_from_torque_nm']:.4g} N m on" in capsys.readouterr().out
+    assert (
+        f"no life from {logarithm['no_life_from_torque_nm']:.4g} N m on" in capsys.readouterr().out
+    )
     assert logarithm["no_life_from_torque_nm"] > 200.0
     assert figure.stat().st_size > 1000
 
@@ -128,7 +135,10 @@ def test_what_would_yield_before_it_wears_is_said(capsys):
         (["wear.hardness_hbs=0"], "wear.hardness_hbs = 0 must be positive"),
         (["wear.coefficient=-1"], "wear.coefficient = -1 must be positive"),
         (["wear.wheel.coefficient=3"], "wear.wheel.coefficient = 3 must be at most 1"),
-        (["wear.transmission_error_limit_um=1.3", "--map"], "at 30 N m of the map: wear.transmission_error_limit_um"),
+        (
+            ["wear.transmission_error_limit_um=1.3", "--map"],
+            "at 30 N m of the map: wear.transmission_error_limit_um",
+        ),
         (["wear=rust"], "no option 'rust' of wear; there is archard"),
         (["fault=wear"], "a life begins with sound flanks"),
         (["operating.speed_rpm=0"], "speed"),

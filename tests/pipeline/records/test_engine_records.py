@@ -36,13 +36,23 @@ def test_a_set_is_whole_and_its_records_come_again(folder, capsys):
 
 
 def test_simulate_shows_and_writes_a_record_of_the_engine(folder, tmp_path, capsys):
-    words = ["simulate", "--from", str(folder), "--record", "1", "--plot", str(tmp_path / "one.png")]
+    words = [
+        "simulate",
+        "--from",
+        str(folder),
+        "--record",
+        "1",
+        "--plot",
+        str(tmp_path / "one.png"),
+    ]
     assert main([*words, "--output", str(tmp_path / "one.csv")]) == 0
     told = capsys.readouterr().out
     assert "flywheel_speed" in told
     assert "rad/s " in told
     with open(tmp_path / "one.csv") as file:
-        header = "time_s,flywheel_speed_rad_per_s,pump_end_speed_rad_per_s,pinion_rotation_rad_per_s2"
+        header = (
+            "time_s,flywheel_speed_rad_per_s,pump_end_speed_rad_per_s,pinion_rotation_rad_per_s2"
+        )
         assert file.readline().startswith(header)
 
 
@@ -55,10 +65,16 @@ def test_labels_units_and_columns_tell_gear_tooth_and_shaft(folder):
         assert np.all(file["integration_error"][:] < 1e-3)
         names = [value.decode() for value in file["label_name"][:]]
         assert sorted(names) == ["broken", "crack", "healthy", "missing_tooth"]
-        for name, gear, tooth in zip(names, file["fault_gear"][:], file["fault_tooth"][:], strict=True):
-            assert (gear.decode(), 0 <= tooth < 54) == (("", False) if name == "healthy" else ("wheel", True))
+        for name, gear, tooth in zip(
+            names, file["fault_gear"][:], file["fault_tooth"][:], strict=True
+        ):
+            assert (gear.decode(), 0 <= tooth < 54) == (
+                ("", False) if name == "healthy" else ("wheel", True)
+            )
         # the driving shaft of the mesh is the camshaft, at half the crank's speed
-        np.testing.assert_allclose(file["speed_set_rpm"][:], 0.5 * file["params/operating.speed_rpm"][:])
+        np.testing.assert_allclose(
+            file["speed_set_rpm"][:], 0.5 * file["params/operating.speed_rpm"][:]
+        )
         np.testing.assert_allclose(file["mesh_frequency_hz"][:], 54 * file["speed_rpm"][:] / 60)
         signals = file["acceleration"][:]
         assert np.isfinite(signals).all()
@@ -84,7 +100,10 @@ def test_a_record_depends_on_its_row_alone_and_a_sham_has_no_fault(folder):
         (["system.helical_meshes=rigid"], "allowed: sliced, constant"),
         (["system.record_mesh=[3,18]", "mesh.slices_in_phase=true"], "take false"),
         (["sensing.channels=[pinion_x]"], "with system.lateral=true also pinion_x"),
-        (["sensing.channels=[crank_speed]"], "allowed: pinion_rotation, wheel_rotation, flywheel_speed"),
+        (
+            ["sensing.channels=[crank_speed]"],
+            "allowed: pinion_rotation, wheel_rotation, flywheel_speed",
+        ),
         (["sensing=housing"], "no channel pinion_x"),
         (["sensing.sensor.low_cutoff_hz=1"], "take sensing=shaft_line"),
         (["mesh.law=paper"], "the meshes of a drive line are one-sided"),
@@ -108,7 +127,9 @@ def test_a_backend_of_gear_pairs_is_refused(tmp_path, capsys, monkeypatch):
     monkeypatch.setitem(BACKENDS, "other", BACKENDS[DEFAULT_BACKEND])
     assert main(["generate", *SMALL, "solver.backend=other", f"out={tmp_path / 'set'}"]) != 0
     error = capsys.readouterr().err.strip()
-    assert error.endswith("solver.backend = other: a drive line has an integrator of its own; leave it out")
+    assert error.endswith(
+        "solver.backend = other: a drive line has an integrator of its own; leave it out"
+    )
     assert "\n" not in error
 
 
@@ -121,7 +142,14 @@ def test_a_time_that_cannot_be_is_refused(seconds, capsys):
 
 def test_forced_response_in_time_says_what_parts(tmp_path, capsys):
     out = tmp_path / "found.json"
-    words = ["forced-response", "system=engine_gear_train", "excitation=engine_v20", "--nodes", "14", "45"]
+    words = [
+        "forced-response",
+        "system=engine_gear_train",
+        "excitation=engine_v20",
+        "--nodes",
+        "14",
+        "45",
+    ]
     assert main([*words, "--time", "0.3", "--json", str(out)]) == 0
     content = json.loads(out.read_text())
     drive = content["meshes"].index("21/45")

@@ -24,7 +24,9 @@ def plain(tmp_path_factory) -> Path:
 @pytest.fixture(scope="module")
 def told(tmp_path_factory) -> Path:
     return make(
-        tmp_path_factory.mktemp("told") / "set", "dataset.store_mesh_state=true", "dataset.store_detectability=true"
+        tmp_path_factory.mktemp("told") / "set",
+        "dataset.store_mesh_state=true",
+        "dataset.store_detectability=true",
     )
 
 
@@ -40,9 +42,16 @@ def test_the_mesh_state_is_there(told: Path) -> None:
         for k in range(data.n_records):
             traces = {name: data.trace(k, name) for name in TRACES}
             for name, n_pairs in TRACES.items():
-                assert traces[name].shape == ((data.n_samples,) if n_pairs is None else (n_pairs, data.n_samples))
-            assert data.trace(k, "mesh_load_share", 10, 20).tobytes() == traces["mesh_load_share"][:, 10:20].tobytes()
-            np.testing.assert_allclose(traces["mesh_load_share"].sum(axis=0), 1.0, rtol=0, atol=1e-6)
+                assert traces[name].shape == (
+                    (data.n_samples,) if n_pairs is None else (n_pairs, data.n_samples)
+                )
+            assert (
+                data.trace(k, "mesh_load_share", 10, 20).tobytes()
+                == traces["mesh_load_share"][:, 10:20].tobytes()
+            )
+            np.testing.assert_allclose(
+                traces["mesh_load_share"].sum(axis=0), 1.0, rtol=0, atol=1e-6
+            )
             if data.column("label_name")[k] == "healthy":
                 assert not traces["fault_engaged"].any()
 
@@ -66,6 +75,8 @@ def test_exports_hold_it(told: Path, tmp_path: Path, kind: str) -> None:
     assert main(["export", str(told), "--to", kind, "--out", str(tmp_path / "out")]) == 0
 
 
-def test_a_switch_that_is_none_is_refused(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
+def test_a_switch_that_is_none_is_refused(
+    tmp_path: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
     assert main(["generate", "dataset.store_mesh_state=perhaps", f"out={tmp_path / 'set'}"]) != 0
     assert "dataset.store_mesh_state = 'perhaps' must be true or false" in capsys.readouterr().err

@@ -44,7 +44,9 @@ def test_it_has_the_same_bits_whatever_the_fault(reference: str) -> None:
     words = (*SMALL, f"sensing.snr_reference={reference}")
     for faulty, sound in zip(records(*words), records(*words, sham=True), strict=True):
         assert faulty.signals["healthy_twin"].tobytes() == sound.signals["healthy_twin"].tobytes()
-        changed = faulty.signals["acceleration"].tobytes() != sound.signals["acceleration"].tobytes()
+        changed = (
+            faulty.signals["acceleration"].tobytes() != sound.signals["acceleration"].tobytes()
+        )
         assert changed == (faulty.values["label_name"] != "healthy")
 
 
@@ -80,7 +82,9 @@ def test_a_healthy_record_has_one_that_differs_by_noise_alone(found: list) -> No
 def test_drift_and_lost_samples_are_its_own() -> None:
     for record in records(*REALISTIC, "sensing.snr_db=null"):
         if record.values["label_name"] == "healthy":
-            assert record.signals["acceleration"].tobytes() != record.signals["healthy_twin"].tobytes()
+            assert (
+                record.signals["acceleration"].tobytes() != record.signals["healthy_twin"].tobytes()
+            )
 
 
 def test_a_record_has_the_same_twin_alone_and_among_others(found: list) -> None:
@@ -113,10 +117,14 @@ def test_a_twin_that_does_not_stay_finite_fails_its_record(monkeypatch: pytest.M
 
 @pytest.fixture(scope="module", params=["float32", "int16"])
 def stored(request: pytest.FixtureRequest, tmp_path_factory: pytest.TempPathFactory) -> Path:
-    return make(tmp_path_factory.mktemp("stored") / "set", SWITCH, f"dataset.sample_type={request.param}")
+    return make(
+        tmp_path_factory.mktemp("stored") / "set", SWITCH, f"dataset.sample_type={request.param}"
+    )
 
 
-def test_a_set_with_twins_is_whole_and_is_made_again(stored: Path, capsys: pytest.CaptureFixture[str]) -> None:
+def test_a_set_with_twins_is_whole_and_is_made_again(
+    stored: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
     assert main(["verify", str(stored)]) == 0
     assert main(["reproduce", str(stored)]) == 0
     assert "6 of 6 records have the same bits" in capsys.readouterr().out
@@ -126,7 +134,11 @@ def test_a_set_with_twins_is_whole_and_is_made_again(stored: Path, capsys: pytes
 
 def test_the_other_bits_are_those_of_a_set_without(stored: Path, tmp_path: Path) -> None:
     with gensig.open_dataset(stored) as data:
-        plain = make(tmp_path / "plain", f"dataset.sample_type={data.sample_type}", "dataset.records_per_shard=1")
+        plain = make(
+            tmp_path / "plain",
+            f"dataset.sample_type={data.sample_type}",
+            "dataset.records_per_shard=1",
+        )
         with gensig.open_dataset(plain) as other:
             assert "healthy_twin" not in other.signal_names
             for index in range(data.n_records):
@@ -142,10 +154,14 @@ def test_exports_of_it(stored: Path, tmp_path: Path, kind: str) -> None:
     if kind == "npz":
         arrays = np.load(next(tmp_path.rglob("*.npz")) if out.is_dir() else out)
         with gensig.open_dataset(stored) as data:
-            np.testing.assert_array_equal(arrays["healthy_twin"][2], data.signals(2, name="healthy_twin"))
+            np.testing.assert_array_equal(
+                arrays["healthy_twin"][2], data.signals(2, name="healthy_twin")
+            )
 
 
-def test_a_switch_that_is_none_is_refused(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
+def test_a_switch_that_is_none_is_refused(
+    tmp_path: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
     assert main(["generate", "dataset.store_healthy_twin=perhaps", f"out={tmp_path / 'set'}"]) != 0
     assert "dataset.store_healthy_twin = 'perhaps' must be true or false" in capsys.readouterr().err
 

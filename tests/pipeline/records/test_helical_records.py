@@ -30,18 +30,30 @@ def helical(tmp_path_factory) -> Path:
     return make(tmp_path_factory.mktemp("helical") / "set", *SMALL)
 
 
-def test_a_set_is_whole_and_every_record_is_found_good(helical: Path, capsys: pytest.CaptureFixture[str]) -> None:
+def test_a_set_is_whole_and_every_record_is_found_good(
+    helical: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
     assert main(["verify", str(helical)]) == 0
     assert main(["reproduce", str(helical), "--records", "2"]) == 0
     capsys.readouterr()
     with gensig.open_dataset(helical) as data:
         assert tuple(data.channel_names) == ("pinion_y", "pinion_z", "wheel_y", "wheel_z")
-        assert set(data.column("label_name")) == {"healthy", "crack", "pitting", "chipped", "missing_tooth"}
+        assert set(data.column("label_name")) == {
+            "healthy",
+            "crack",
+            "pitting",
+            "chipped",
+            "missing_tooth",
+        }
         assert set(data.column("status")) == {"ok"}
         pair = read_system(read_request(list(SMALL)).config).pair
         ratio = pair.overlap_ratio
         assert data.attributes["overlap_ratio"] == ratio
-        told = {"helix_angle_deg": 18.0, "face_width_wheel_mm": 14.0, "overlap_ratio": round(ratio, 4)}
+        told = {
+            "helix_angle_deg": 18.0,
+            "face_width_wheel_mm": 14.0,
+            "overlap_ratio": round(ratio, 4),
+        }
         card = (helical / "README.md").read_text().replace("\\", "")
         assert [f"| {name} | {value} |" in card for name, value in told.items()] == [True] * 3
         assert set(data.column("integration_check")) == {"error"}
@@ -62,7 +74,9 @@ def test_loads_of_all_pairs_are_told(helical: Path) -> None:
 
 
 def test_bits_do_not_depend_on_the_neighbours() -> None:
-    config = read_request([*SMALL, "dataset.store_mesh_state=false", "operating.duration_s=0.02"]).config
+    config = read_request(
+        [*SMALL, "dataset.store_mesh_state=false", "operating.duration_s=0.02"]
+    ).config
     plan = make_plan(config)
     rows = [plan.record(place) for place in range(3)]
     for row, together in zip(rows, simulate_records(config, rows), strict=True):
@@ -71,20 +85,33 @@ def test_bits_do_not_depend_on_the_neighbours() -> None:
 
 
 def test_without_a_helix_it_moves_like_the_spur_pair() -> None:
-    words = ["operating.duration_s=0.1", "mesh.contact=linear", "quality.iso1328_grade=null", "solver.max_error=null"]
+    words = [
+        "operating.duration_s=0.1",
+        "mesh.contact=linear",
+        "quality.iso1328_grade=null",
+        "solver.max_error=null",
+    ]
     spur = read_system(read_request(words).config)
-    sliced = read_system(read_request([*words, "system=helical_pair", "gear=xiamen_23_84", "mesh.n_slices=8"]).config)
+    sliced = read_system(
+        read_request([*words, "system=helical_pair", "gear=xiamen_23_84", "mesh.n_slices=8"]).config
+    )
     one, other = simulate_together([Run(system=system, faults=()) for system in (spur, sliced)])
     scale = one.acceleration.std(axis=1)
     assert np.all(np.abs(one.acceleration - other.acceleration).std(axis=1) < 0.01 * scale)
 
 
 def test_an_axial_force_pushes_gears_apart_along_their_shafts() -> None:
-    words = ["system=helical_pair", "operating.duration_s=0.02", "sensing.channels=[pinion_z,wheel_z]"]
+    words = [
+        "system=helical_pair",
+        "operating.duration_s=0.02",
+        "sensing.channels=[pinion_z,wheel_z]",
+    ]
     dynamics = pair_dynamics(Run(system=read_system(read_request(words).config), faults=()))
     rest = dict(zip(dynamics.dofs, dynamics.rest(), strict=True))
     thrust = dynamics.mesh_force * np.tan(dynamics.table.pair.base_helix_angle)
-    assert rest["pinion_z"] == pytest.approx(-thrust / dynamics.pinion.support.stiffness_z, rel=1e-9)
+    assert rest["pinion_z"] == pytest.approx(
+        -thrust / dynamics.pinion.support.stiffness_z, rel=1e-9
+    )
     assert rest["wheel_z"] == pytest.approx(thrust / dynamics.wheel.support.stiffness_z, rel=1e-9)
 
 
@@ -93,8 +120,18 @@ def test_an_axial_force_pushes_gears_apart_along_their_shafts() -> None:
     [
         (["mesh.slices_in_phase=true"], "mesh.slices_in_phase = true is for comparing statics"),
         (["sensing.channels=[pinion_u]"], "no channel pinion_u"),
-        (["gear.pinion.support.stiffness_z_n_per_m=-1"], "stiffness_z_n_per_m = -1 must not be negative"),
-        (["gear.helix_angle_deg=2", "gear.pinion.face_width_mm=3", "gear.addendum_coefficient=0.4"], "below 1"),
+        (
+            ["gear.pinion.support.stiffness_z_n_per_m=-1"],
+            "stiffness_z_n_per_m = -1 must not be negative",
+        ),
+        (
+            [
+                "gear.helix_angle_deg=2",
+                "gear.pinion.face_width_mm=3",
+                "gear.addendum_coefficient=0.4",
+            ],
+            "below 1",
+        ),
     ],
 )
 def test_what_makes_no_records_is_refused(words, complaint) -> None:

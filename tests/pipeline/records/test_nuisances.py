@@ -66,8 +66,12 @@ def test_every_record_has_them_before_path_and_sensor(both):
         level, own = difference.std(axis=1), other.signals["acceleration_source"].std(axis=1)
         assert np.all(level > 1e-4 * own)
         assert np.all(level < own)
-        np.testing.assert_allclose(one.signals["shaft_angle"], other.signals["shaft_angle"], rtol=0, atol=0)
-        clean = one.signals["acceleration_clean"].astype(float) - other.signals["acceleration_clean"]
+        np.testing.assert_allclose(
+            one.signals["shaft_angle"], other.signals["shaft_angle"], rtol=0, atol=0
+        )
+        clean = (
+            one.signals["acceleration_clean"].astype(float) - other.signals["acceleration_clean"]
+        )
         np.testing.assert_allclose(clean, difference, rtol=0, atol=1e-4 * own.max())
 
 
@@ -90,7 +94,9 @@ def test_no_class_has_others(shaking):
     assert [faults for faults, _ in found] == [True, False]
     np.testing.assert_array_equal(found[0][1], found[1][1])
     assert np.all(found[0][1].std(axis=1) > 0.0)
-    other = replace(reader.inputs(faulty), numbers=replace(reader.inputs(faulty).numbers, gearbox=7))
+    other = replace(
+        reader.inputs(faulty), numbers=replace(reader.inputs(faulty).numbers, gearbox=7)
+    )
     assert not np.array_equal(with_nuisances_of(other, motion), found[0][1])
 
 
@@ -119,7 +125,9 @@ def test_what_a_fault_adds_is_told_from_what_the_machine_has_anyway(both):
     for one, other in zip(*both, strict=True):
         if one.values["label_name"] != "healthy":
             ratio = one.values["detectability"] / other.values["detectability"]
-            assert 0.7 < ratio < 1.01  # the floor has risen a little with the twin, the residual has not
+            assert (
+                0.7 < ratio < 1.01
+            )  # the floor has risen a little with the twin, the residual has not
         else:
             assert one.values["detectability"] == 0.0
 

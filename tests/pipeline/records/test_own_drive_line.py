@@ -9,7 +9,13 @@ from docs_pages import ROOT, blocks
 from gensig.cli import main
 
 PAGE = "your_drive_line.md"
-SHORT = ("operating.duration_s=0.1", "plan.n_records=8", "plan.n_units=2", "plan.n_gearboxes=1", "plan.n_repeats=1")
+SHORT = (
+    "operating.duration_s=0.1",
+    "plan.n_records=8",
+    "plan.n_units=2",
+    "plan.n_gearboxes=1",
+    "plan.n_repeats=1",
+)
 FOUND = list(blocks((ROOT / "docs" / "howto" / PAGE).read_text(encoding="utf-8")))
 COMMANDS = next(block.code for block in FOUND if "test_own_drive_line" in block.mark).splitlines()
 

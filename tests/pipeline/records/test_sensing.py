@@ -12,8 +12,16 @@ from gensig.production.streaming import open_stream
 from gensig.record.inputs import InputReader
 from gensig.record.simulate import forget_twins, simulate_records
 
-SET = ("sensing=housing", "sensing.channels=[pinion_x,pinion_y,wheel_x,wheel_y]", "operating.duration_s=0.05")
-STORED = ("dataset.store_source=true", "dataset.store_clean=true", "dataset.store_detectability=true")
+SET = (
+    "sensing=housing",
+    "sensing.channels=[pinion_x,pinion_y,wheel_x,wheel_y]",
+    "operating.duration_s=0.05",
+)
+STORED = (
+    "dataset.store_source=true",
+    "dataset.store_clean=true",
+    "dataset.store_detectability=true",
+)
 SENSORS = ["housing_input", "housing_output", "housing_top"]
 
 
@@ -61,7 +69,9 @@ def test_reading_for_diagnosis(folder):
     from diagnose.data.torch_sets import VibrationDataset
 
     options = {"channels": ["housing_top"], "window_samples": 256, "stride_samples": 256}
-    window, label = VibrationDataset(open_dataset(folder), "random_window_leaky", "train", **options)[0]
+    window, label = VibrationDataset(
+        open_dataset(folder), "random_window_leaky", "train", **options
+    )[0]
     assert tuple(torch.as_tensor(window).shape) == (1, 256)
     assert int(label) in (0, 1)
 
@@ -71,17 +81,25 @@ def test_the_floor_is_the_same_for_all_classes_and_at_the_ratio_asked_for():
              "sensing.sensor.dc_offset_m_per_s2=0", "dataset.store_clean=true")  # fmt: skip
     config, rows, found = records(*sharp)
     for condition in {row["condition_id"] for row in rows}:
-        own = [(row, record) for row, record in zip(rows, found, strict=True) if row["condition_id"] == condition]
+        own = [
+            (row, record)
+            for row, record in zip(rows, found, strict=True)
+            if row["condition_id"] == condition
+        ]
         assert {row["label_name"] for row, _ in own} == {"healthy", "missing_tooth"}
         floors, healthy = [], None
         for row, record in own:
             instrument = InputReader(config).inputs(row).instrument
-            noise = record.signals["acceleration"].astype(float) - record.signals["acceleration_clean"]
+            noise = (
+                record.signals["acceleration"].astype(float) - record.signals["acceleration_clean"]
+            )
             floors.append(instrument.power(noise))
             if row["label_name"] == "healthy":
                 healthy = record.signals["signal_power"]
         np.testing.assert_allclose(floors[0], floors[1], rtol=1e-4, atol=0)
-        np.testing.assert_allclose(10 * np.log10(healthy / floors[0]), config["sensing"]["snr_db"], rtol=0, atol=0.1)
+        np.testing.assert_allclose(
+            10 * np.log10(healthy / floors[0]), config["sensing"]["snr_db"], rtol=0, atol=0.1
+        )
 
 
 def test_the_source_is_that_of_a_sensor_on_the_bearing():
@@ -101,12 +119,16 @@ def test_the_source_is_that_of_a_sensor_on_the_bearing():
         # a crack that is in mesh where the machine starts moves its static equilibrium, to which the drive is anchored
         assert np.all((ours - theirs).std(axis=1) < (2e-3 if sound else 0.05) * theirs.std(axis=1))
         for name in ("mesh_pinion_tooth", "mesh_wheel_tooth", "fault_engaged"):
-            shown, expected = (np.sort(np.atleast_2d(record.signals[name]), axis=0) for record in (one, other))
+            shown, expected = (
+                np.sort(np.atleast_2d(record.signals[name]), axis=0) for record in (one, other)
+            )
             assert np.mean(shown != expected) < 2e-3
         assert one.signals["fault_engaged"].any() != sound
         angles = [record.signals["shaft_angle"] for record in (one, other)]
         np.testing.assert_allclose(*angles, rtol=0, atol=2e-4)
-        np.testing.assert_allclose(one.values["speed_rpm"], other.values["speed_rpm"], rtol=1e-6, atol=0)
+        np.testing.assert_allclose(
+            one.values["speed_rpm"], other.values["speed_rpm"], rtol=1e-6, atol=0
+        )
 
 
 def test_a_converter_that_clips_marks_its_records():

@@ -20,10 +20,18 @@ from gensig.signals.averaging import time_synchronous_average
 from gensig.signals.tacho import pulse_times, resample_by_pulses, speed_of_pulses
 
 RATE = 51_200.0
-STORED = ("dataset.store_tacho=true", "dataset.store_encoder=true", "dataset.store_shaft_angle=true")
+STORED = (
+    "dataset.store_tacho=true",
+    "dataset.store_encoder=true",
+    "dataset.store_shaft_angle=true",
+)
 EXACT = ("sensing.tacho.jitter_deg=0",)
 RAMP = "operating.speed_profile=[[0,0.7],[0.2,1.3]]"
-DRIFTING = ("sensing.sensor.drift_scatter=0.1", "dataset.store_clean=true", "sensing.sensor.drift_time_s=0.1")
+DRIFTING = (
+    "sensing.sensor.drift_scatter=0.1",
+    "dataset.store_clean=true",
+    "sensing.sensor.drift_time_s=0.1",
+)
 LOSING = ("sensing.sensor.dropped_fraction=0.2", "sensing.sensor.dropped_fill=zero")
 
 
@@ -66,7 +74,9 @@ def test_pulses_are_turns_of_the_shaft_at_one_place_of_the_gear(shaft, sensing):
 
 def test_the_mark_meets_the_same_tooth_in_every_record_of_a_gearbox():
     """By the mesh state, which knows nothing of tachometers."""
-    _, _, found = records(*STORED, *EXACT, "dataset.store_mesh_state=true", "plan.classes=[healthy]")
+    _, _, found = records(
+        *STORED, *EXACT, "dataset.store_mesh_state=true", "plan.classes=[healthy]"
+    )
     newest = []
     for record in found:
         samples = np.rint(pulse_times(record.signals["tacho"], RATE) * RATE).astype(int)
@@ -120,7 +130,9 @@ def test_the_encoder_reads_the_angle_within_its_errors(steady):
         read = record.signals["encoder_angle"]
         assert read.dtype == np.float64
         assert -most - line < read[0] < 2.0 * np.pi + most
-        off = gear_angle(config, row, record, "pinion") - read  # the index's place, a line's width and the errors
+        off = (
+            gear_angle(config, row, record, "pinion") - read
+        )  # the index's place, a line's width and the errors
         assert np.ptp(off) <= line + 2.0 * most
         indices.append(np.mean(off) % (2.0 * np.pi))
     assert np.ptp(indices) < 0.2 * line
@@ -141,7 +153,9 @@ def test_drift_changes_the_signal_by_its_gain_and_not_the_floor():
     config, _, found = records(*DRIFTING)
     gains = []
     for one, other in zip(found, plain, strict=True):
-        clean, still = (record.signals["acceleration_clean"].astype(float) for record in (one, other))
+        clean, still = (
+            record.signals["acceleration_clean"].astype(float) for record in (one, other)
+        )
         clear = np.abs(still) > 0.1 * still.std(axis=1, keepdims=True)
         gain = np.where(clear, clean / np.where(clear, still, 1.0), np.nan)
         assert np.nanmin(gain) > np.exp(-0.6)
@@ -159,7 +173,9 @@ def test_drift_changes_the_signal_by_its_gain_and_not_the_floor():
 
 
 def test_drift_is_no_part_of_what_a_fault_does():
-    with_drift = records(*DRIFTING, "dataset.store_detectability=true", "sensing.sensor.drift_scatter=0.3")
+    with_drift = records(
+        *DRIFTING, "dataset.store_detectability=true", "sensing.sensor.drift_scatter=0.3"
+    )
     without = records("dataset.store_detectability=true")
     for one, other in zip(with_drift[2], without[2], strict=True):
         found, expected = one.values["detectability"], other.values["detectability"]
@@ -192,8 +208,19 @@ def test_a_record_does_not_depend_on_its_neighbours():
 
 
 def test_a_file_has_them_and_says_what_they_are(tmp_path, capsys):
-    sensors = ("sensing.tacho.pulses_per_turn=60", "sensing.tacho.pulse_width_share=0.5", "sensing.encoder.shaft=wheel")
-    words = (*STORED, *DRIFTING, *LOSING, *sensors, "sensing.snr_reference=record", "operating.duration_s=0.05")
+    sensors = (
+        "sensing.tacho.pulses_per_turn=60",
+        "sensing.tacho.pulse_width_share=0.5",
+        "sensing.encoder.shaft=wheel",
+    )
+    words = (
+        *STORED,
+        *DRIFTING,
+        *LOSING,
+        *sensors,
+        "sensing.snr_reference=record",
+        "operating.duration_s=0.05",
+    )
     folder = make(tmp_path / "set", *words)
     assert main(["verify", str(folder)]) == 0
     assert main(["reproduce", str(folder), "--records", "3"]) == 0
@@ -205,13 +232,31 @@ def test_a_file_has_them_and_says_what_they_are(tmp_path, capsys):
     assert np.all((data.column("dropped_fraction") > 0.0) & (data.column("dropped_fraction") < 1.0))
     sound, cracked = tmp_path / "sound.h5", tmp_path / "cracked.h5"
     faulty = str(np.flatnonzero(data.column("label_name") == "crack")[0])
-    assert main(["simulate", "--from", str(folder), "--record", faulty, "--output", str(cracked)]) == 0
-    assert main(["simulate", "--from", str(folder), "--record", faulty, "--twin", "--output", str(sound)]) == 0
+    assert (
+        main(["simulate", "--from", str(folder), "--record", faulty, "--output", str(cracked)]) == 0
+    )
+    assert (
+        main(
+            [
+                "simulate",
+                "--from",
+                str(folder),
+                "--record",
+                faulty,
+                "--twin",
+                "--output",
+                str(sound),
+            ]
+        )
+        == 0
+    )
     with h5py.File(sound) as one, h5py.File(cracked) as other:
         lost = [np.all(file["acceleration"][0] == 0.0, axis=0) for file in (one, other)]
         assert np.array_equal(*lost)
         noise = [file["acceleration"][0] - file["acceleration_clean"][0] for file in (one, other)]
-        assert_allclose(noise[0][:, ~lost[0]], noise[1][:, ~lost[0]], rtol=0, atol=1e-4 * noise[1].std())
+        assert_allclose(
+            noise[0][:, ~lost[0]], noise[1][:, ~lost[0]], rtol=0, atol=1e-4 * noise[1].std()
+        )
 
 
 @pytest.mark.parametrize(
@@ -228,7 +273,9 @@ def test_mistakes(word, text):
 
 @pytest.mark.parametrize("key", ["sensing.tacho.pulses_per_turn", "sensing.encoder.lines_per_turn"])
 def test_what_a_reader_has_to_know_is_one_for_the_set(key):
-    config = read_request([f"plan.vary={{{key}: {{distribution: integers, low: 8, high: 9}}}}"]).config
+    config = read_request(
+        [f"plan.vary={{{key}: {{distribution: integers, low: 8, high: 9}}}}"]
+    ).config
     with pytest.raises(ConfigError, match=f"'{key}' is one value for a whole data set"):
         make_plan(config)
 
@@ -247,13 +294,22 @@ class TestTorsionalChannels:
     ROTORS = ("system.motor.inertia_kg_m2=0.01", "system.load.inertia_kg_m2=0.05")
 
     def test_they_are_the_second_derivative_of_the_angle(self):
-        stored = ("dataset.store_shaft_angle=true", "dataset.store_clean=true", "plan.classes=[healthy]")
-        _, _, found = records("sensing.channels=[pinion_rotation]", "sensing.gain_scatter=0", *stored)
+        stored = (
+            "dataset.store_shaft_angle=true",
+            "dataset.store_clean=true",
+            "plan.classes=[healthy]",
+        )
+        _, _, found = records(
+            "sensing.channels=[pinion_rotation]", "sensing.gain_scatter=0", *stored
+        )
         for record in found:
             angle = record.signals["shaft_angle"]
             by_angle = (angle[2:] - 2.0 * angle[1:-1] + angle[:-2]) * RATE**2
             told = record.signals["acceleration_clean"][0, 1:-1].astype(float)
-            spectra = [np.fft.rfft(one * np.hanning(len(one)))[: len(one) // 20] for one in (by_angle, told)]
+            spectra = [
+                np.fft.rfft(one * np.hanning(len(one)))[: len(one) // 20]
+                for one in (by_angle, told)
+            ]
             assert np.linalg.norm(spectra[0] - spectra[1]) < 0.05 * np.linalg.norm(spectra[1])
 
     def test_a_set_of_them_says_their_unit(self, tmp_path):
@@ -281,17 +337,28 @@ class TestTorsionalChannels:
         words = ["sensing.channels=[pinion_y,wheel_rotation]", "operating.duration_s=0.05"]
         path, figure = tmp_path / "record.csv", tmp_path / "record.png"
         assert main(["simulate", *words, "--output", str(path), "--plot", str(figure)]) == 0
-        units = {line.split()[0]: line.split()[2] for line in capsys.readouterr().out.splitlines() if "_" in line}
+        units = {
+            line.split()[0]: line.split()[2]
+            for line in capsys.readouterr().out.splitlines()
+            if "_" in line
+        }
         assert units == {"pinion_y": "m/s2", "wheel_rotation": "rad/s2"}
         with path.open() as stream:
-            assert next(csv.reader(stream)) == ["time_s", "pinion_y_m_per_s2", "wheel_rotation_rad_per_s2"]
+            assert next(csv.reader(stream)) == [
+                "time_s",
+                "pinion_y_m_per_s2",
+                "wheel_rotation_rad_per_s2",
+            ]
         assert figure.stat().st_size > 10_000
 
     @pytest.mark.parametrize(
         ("words", "text"),
         [
             (["sensing.channels=[motor_rotation]"], "no channel motor_rotation"),
-            (["sensing=housing", "sensing.channels=[pinion_rotation]"], "pinion_rotation is no bearing"),
+            (
+                ["sensing=housing", "sensing.channels=[pinion_rotation]"],
+                "pinion_rotation is no bearing",
+            ),
         ],
     )
     def test_where_there_is_none(self, words, text, capsys):

@@ -30,7 +30,8 @@ def heard_mesh_frequency(signal: np.ndarray, rate: float, expected: float) -> fl
     frequencies = expected * np.linspace(0.96, 1.04, 161)
     harmonics = [n for n in range(1, 6) if n * frequencies[-1] < 0.45 * rate]
     comb = [
-        sum(abs(np.exp(-2j * np.pi * n * f * time) @ (window * signal)) ** 2 for n in harmonics) for f in frequencies
+        sum(abs(np.exp(-2j * np.pi * n * f * time) @ (window * signal)) ** 2 for n in harmonics)
+        for f in frequencies
     ]
     return float(frequencies[np.argmax(comb)])
 
@@ -40,9 +41,27 @@ def test_shipped_gears_make_a_data_set_that_sounds_like_them(name, tmp_path, cap
     words = words_for(name)
     gear = read_request(words).config["gear"]
     out = tmp_path / "set"
-    plan = ("plan.n_records=4", "plan.n_units=2", "plan.classes=[healthy,missing_tooth]", "operating.duration_s=0.25")
+    plan = (
+        "plan.n_records=4",
+        "plan.n_units=2",
+        "plan.classes=[healthy,missing_tooth]",
+        "operating.duration_s=0.25",
+    )
     assert main(["simulate", *words, "operating.duration_s=0.05"]) == 0
-    assert main(["generate", "--quiet", *words, *plan, "sensing.snr_db=30", "executor.n_workers=1", f"out={out}"]) == 0
+    assert (
+        main(
+            [
+                "generate",
+                "--quiet",
+                *words,
+                *plan,
+                "sensing.snr_db=30",
+                "executor.n_workers=1",
+                f"out={out}",
+            ]
+        )
+        == 0
+    )
     assert main(["verify", str(out)]) == 0
     expected = gear["pinion"]["n_teeth"] * gear["rated_speed_rpm"] / 60.0
     turns = {"pinion": gear["rated_speed_rpm"] / 60.0}
@@ -53,7 +72,9 @@ def test_shipped_gears_make_a_data_set_that_sounds_like_them(name, tmp_path, cap
         with h5py.File(shard) as file:
             for record, label in zip(file["acceleration"], file["label_name"].asstr(), strict=True):
                 assert np.all(np.isfinite(indicators(record, 51200.0, turns, n_teeth)))
-                if label == "healthy":  # around a missing tooth the sidebands may be louder than the mesh
+                if (
+                    label == "healthy"
+                ):  # around a missing tooth the sidebands may be louder than the mesh
                     heard.append(heard_mesh_frequency(record[1], 51200.0, expected))
     assert heard == pytest.approx([expected] * 2, rel=2e-3)
 

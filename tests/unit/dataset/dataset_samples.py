@@ -22,11 +22,24 @@ ATTRIBUTES = {
     "usable_band_hz": [10.0, 400.0],
     "config_json": '{"a": 1}',
 }
-SIGNALS = {"acceleration": (2, 200), "fault_multihot": (3,), "signal_power": (2,), "noise_power": (2,)}
-CONFIG = {"seed": 7, "gear": {"n_teeth": 23}, "out": "x", "executor": {"n_workers": 2}, "verbosity": 1}
+SIGNALS = {
+    "acceleration": (2, 200),
+    "fault_multihot": (3,),
+    "signal_power": (2,),
+    "noise_power": (2,),
+}
+CONFIG = {
+    "seed": 7,
+    "gear": {"n_teeth": 23},
+    "out": "x",
+    "executor": {"n_workers": 2},
+    "verbosity": 1,
+}
 
 
-def make_plan(n_records: int = 36, records_per_shard: int = 10, n_units: int = 6, n_classes: int = 3) -> Plan:
+def make_plan(
+    n_records: int = 36, records_per_shard: int = 10, n_units: int = 6, n_classes: int = 3
+) -> Plan:
     shard, row = shard_places(n_records, records_per_shard)
     index = np.arange(n_records)
     label = index % n_classes
@@ -77,7 +90,13 @@ def row_of(plan: Plan, index: int, *, status: str = "ok") -> tuple[dict[str, np.
 
 
 def write_shard(
-    path: Path, plan: Plan, shard: int = 0, *, failed: int | None = None, clean: bool = False, **changes
+    path: Path,
+    plan: Plan,
+    shard: int = 0,
+    *,
+    failed: int | None = None,
+    clean: bool = False,
+    **changes,
 ) -> ShardWriter:
     """With ``clean``, every record's signal is stored a second time as the one without noise, at half its size."""
     rows = plan.rows(shard)
@@ -114,10 +133,18 @@ def build(
     """A data-set folder; fewer shards or close=False make an interrupted one."""
     identity = identity_hash(CONFIG, "0.1.0")
     create_folder(
-        out, config=CONFIG, overrides=["seed=7"], plan=plan, identity=identity, seed=7, generator_version="0.1.0"
+        out,
+        config=CONFIG,
+        overrides=["seed=7"],
+        plan=plan,
+        identity=identity,
+        seed=7,
+        generator_version="0.1.0",
     )
     for shard in shards if shards is not None else range(plan.n_shards):
-        writer = write_shard(shard_path(out, shard), plan, shard, failed=failed, clean=clean, **storage)
+        writer = write_shard(
+            shard_path(out, shard), plan, shard, failed=failed, clean=clean, **storage
+        )
         record_shard(out, shard, writer.sha256, writer.n_bytes, writer.n_failed)
     if close:
         finalize(out, figures=figures)

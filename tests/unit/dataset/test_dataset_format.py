@@ -36,7 +36,10 @@ def test_columns_are_in_step() -> None:
 
 def test_attributes_keys_and_protocols_are_named(folder: Path) -> None:
     with open_dataset(folder) as data:
-        assert all(f"`{name}`" in TEXT for name in (*REQUIRED_ATTRIBUTES, *data.attributes, *data.protocols))
+        assert all(
+            f"`{name}`" in TEXT
+            for name in (*REQUIRED_ATTRIBUTES, *data.attributes, *data.protocols)
+        )
     assert all(f"`{name}`" in TEXT for name in read_manifest(folder).__slots__)
 
 
@@ -60,10 +63,17 @@ def test_python_examples_run(tmp_path: Path, plan: Plan, library: str, sample_ty
     names = {"open_dataset": open_dataset}
     exec(code, names)
     expected = row_of(plan, 0)[0]["acceleration"][: 2 if library == "h5py" else 1]
-    np.testing.assert_allclose(names["signal"], expected, rtol=0, atol=1e-4 if sample_type == "int16" else 0)
+    np.testing.assert_allclose(
+        names["signal"], expected, rtol=0, atol=1e-4 if sample_type == "int16" else 0
+    )
 
 
 def test_role_must_be_known() -> None:
-    assert {column.role for column in (*COLUMNS.values(), *SIGNALS.values())} >= {"id", "label", "fault", "unit"}
+    assert {column.role for column in (*COLUMNS.values(), *SIGNALS.values())} >= {
+        "id",
+        "label",
+        "fault",
+        "unit",
+    }
     with pytest.raises(DatasetError, match="allowed are"):
         Column(name="x", dtype="int8", unit="", role="secret", description="")

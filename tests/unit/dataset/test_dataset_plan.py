@@ -10,7 +10,15 @@ from dataset_samples import make_plan
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from gensig.dataset.plan import Plan, PlanRows, plan_text, read_plan, record_ids, shard_places, write_plan
+from gensig.dataset.plan import (
+    Plan,
+    PlanRows,
+    plan_text,
+    read_plan,
+    record_ids,
+    shard_places,
+    write_plan,
+)
 from gensig.errors import DatasetError
 
 
@@ -45,14 +53,22 @@ def test_round_trip_is_exact(floats: list[float], integer: int, text: str) -> No
 
 @settings(max_examples=40, deadline=None)
 @given(
-    texts=st.lists(st.text(st.characters(blacklist_categories=("Cc", "Cs")), max_size=8), min_size=1, max_size=7),
+    texts=st.lists(
+        st.text(st.characters(blacklist_categories=("Cc", "Cs")), max_size=8),
+        min_size=1,
+        max_size=7,
+    ),
     depth=st.floats(),
     data=st.data(),
 )
-def test_some_rows_are_those_of_the_whole(texts: list[str], depth: float, data: st.DataObject) -> None:
+def test_some_rows_are_those_of_the_whole(
+    texts: list[str], depth: float, data: st.DataObject
+) -> None:
     """Line separators that are no control characters (U+2028, U+0085 is one) belong to the text."""
     n = len(texts)
-    plan = _plan(unit_id=np.array(texts), **{"params/depth_mm": np.full(n, depth)}, label=np.arange(n))
+    plan = _plan(
+        unit_id=np.array(texts), **{"params/depth_mm": np.full(n, depth)}, label=np.arange(n)
+    )
     first = data.draw(st.integers(0, n - 1))
     n_records = data.draw(st.integers(1, n - first))
     with tempfile.TemporaryDirectory() as folder:
@@ -73,7 +89,9 @@ def test_rows_that_are_not_there_are_refused(tmp_path: Path, first: int, n_recor
 def test_a_damaged_row_is_refused(tmp_path: Path) -> None:
     write_plan(tmp_path / "plan.csv", _plan(label=np.arange(4)))
     lines = (tmp_path / "plan.csv").read_text().splitlines()
-    (tmp_path / "plan.csv").write_text("\n".join([*lines[:3], lines[3].rpartition(",")[0], *lines[4:]]) + "\n")
+    (tmp_path / "plan.csv").write_text(
+        "\n".join([*lines[:3], lines[3].rpartition(",")[0], *lines[4:]]) + "\n"
+    )
     rows = PlanRows(tmp_path / "plan.csv")
     assert len(rows.records(0, 2)) == 2
     with pytest.raises(DatasetError, match="cut or damaged near record 2"):
@@ -88,8 +106,13 @@ def test_round_trip_check_can_fail() -> None:
 
 
 def test_values_look_as_promised() -> None:
-    text = plan_text(_plan(a=np.array([0.1, 1.0]), b=np.array([3, -4]), c=np.array(["x", 'say "y", z'])))
-    assert text == 'record_id,shard,row,a,b,c\nr000000,0,0,0.1,3,x\nr000001,0,1,1.0,-4,"say ""y"", z"\n'
+    text = plan_text(
+        _plan(a=np.array([0.1, 1.0]), b=np.array([3, -4]), c=np.array(["x", 'say "y", z']))
+    )
+    assert (
+        text
+        == 'record_id,shard,row,a,b,c\nr000000,0,0,0.1,3,x\nr000001,0,1,1.0,-4,"say ""y"", z"\n'
+    )
 
 
 def test_text_that_would_come_back_as_numbers_is_refused() -> None:
@@ -129,10 +152,24 @@ def test_rows_of_shards() -> None:
         {"record_id": np.array(["a", "b"]), "shard": np.array([0, 0]), "row": np.array([1, 0])},
         {"record_id": np.array(["a", "../b"]), "shard": np.array([0, 0]), "row": np.array([0, 1])},
         {"record_id": np.array(["a"]), "shard": np.array([0, 0]), "row": np.array([0, 1])},
-        {"record_id": np.array([], dtype=str), "shard": np.array([], dtype=int), "row": np.array([], dtype=int)},
+        {
+            "record_id": np.array([], dtype=str),
+            "shard": np.array([], dtype=int),
+            "row": np.array([], dtype=int),
+        },
         {"record_id": np.array(["a"]), "shard": np.array([0])},
-        {"record_id": np.array(["a"]), "shard": np.array([0]), "row": np.array([0]), "x": np.array([1j])},
-        {"record_id": np.array(["a"]), "shard": np.array([0]), "row": np.array([0]), "x": np.array(["a\nb"])},
+        {
+            "record_id": np.array(["a"]),
+            "shard": np.array([0]),
+            "row": np.array([0]),
+            "x": np.array([1j]),
+        },
+        {
+            "record_id": np.array(["a"]),
+            "shard": np.array([0]),
+            "row": np.array([0]),
+            "x": np.array(["a\nb"]),
+        },
     ],
 )
 def test_impossible_plan_is_refused(columns: dict) -> None:

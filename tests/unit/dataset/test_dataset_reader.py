@@ -22,7 +22,12 @@ def test_facts(folder: Path) -> None:
         assert data.channel_names == ["pinion_y", "wheel_ü"]
         assert data.class_names == CLASSES
         assert data.attributes["n_teeth_wheel"] == 84
-        assert data.protocols == ["by_unit", "cross_gearbox", "cross_specimen", "random_window_leaky"]
+        assert data.protocols == [
+            "by_unit",
+            "cross_gearbox",
+            "cross_specimen",
+            "random_window_leaky",
+        ]
         assert {"label", "params/crack_depth_mm", "noise_power"} <= set(data.column_names)
         assert "acceleration" not in data.column_names
         assert data.usable.all()
@@ -36,7 +41,9 @@ def test_columns_and_signals_come_in_plan_order(folder: Path, plan: Plan) -> Non
         for index in (0, 9, 10, 35):
             expected = row_of(plan, index)[0]["acceleration"]
             np.testing.assert_array_equal(data.signals(index), expected)
-            np.testing.assert_array_equal(data.signals(index, 20, 70, ["wheel_ü"]), expected[1:, 20:70])
+            np.testing.assert_array_equal(
+                data.signals(index, 20, 70, ["wheel_ü"]), expected[1:, 20:70]
+            )
             np.testing.assert_array_equal(data.signals(index, channels=[1, 0]), expected[::-1])
         assert data.signals(3).dtype == np.float32
 
@@ -92,7 +99,9 @@ def test_incomplete_set_is_refused_unless_asked_for(tmp_path: Path, plan: Plan) 
         with pytest.raises(DatasetError, match=r"shard-00000\.h5, which is not made yet"):
             data.signals(0)
     with pytest.raises(DatasetError, match="no finished shard"):
-        open_dataset(build(tmp_path / "b", plan, shards=range(0), close=False), allow_incomplete=True)
+        open_dataset(
+            build(tmp_path / "b", plan, shards=range(0), close=False), allow_incomplete=True
+        )
 
 
 def _first_sample(data: Dataset, index: int) -> float:
@@ -141,7 +150,9 @@ def test_a_protocol_that_is_left_out_is_explained(folder: Path) -> None:
     with open_dataset(folder) as data:
         assert "cross_specimen" not in data.left_out
         assert data.left_out["cross_speed"] == "the plan has no column speed_set_rpm"
-        with pytest.raises(DatasetError, match=r"split .cross_speed. does not exist in .*no column speed_set_rpm"):
+        with pytest.raises(
+            DatasetError, match=r"split .cross_speed. does not exist in .*no column speed_set_rpm"
+        ):
             data.split("cross_speed")
         del data.manifest.files["splits/by_unit.csv"]
         assert data.left_out["by_unit"] == "gensig 0.1.0, which made the set, did not know it"

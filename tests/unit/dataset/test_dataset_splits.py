@@ -21,8 +21,12 @@ OLD_DIGESTS = {
 
 def _sides(table: SplitTable, plan: Plan, column: str) -> list[set]:
     """Values of a plan column in train, validation and test."""
-    value = dict(zip(plan.columns["record_id"].tolist(), plan.columns[column].tolist(), strict=True))
-    return [{value[r] for r in table.record_id[table.subset == subset].tolist()} for subset in SUBSETS]
+    value = dict(
+        zip(plan.columns["record_id"].tolist(), plan.columns[column].tolist(), strict=True)
+    )
+    return [
+        {value[r] for r in table.record_id[table.subset == subset].tolist()} for subset in SUBSETS
+    ]
 
 
 def _disjoint(sides: list[set]) -> bool:
@@ -53,23 +57,34 @@ def test_leaky_protocol_has_every_record_on_several_sides() -> None:
     np.testing.assert_array_equal(table.stop_fraction[first], np.arange(1, 9) / 8)
     shares = [float(np.mean(table.subset == subset)) for subset in SUBSETS]
     np.testing.assert_allclose(shares, [0.6, 0.2, 0.2], rtol=0, atol=0.06)
-    assert len({tuple(table.subset[table.record_id == r]) for r in plan.columns["record_id"]}) > 10  # scattered
+    assert (
+        len({tuple(table.subset[table.record_id == r]) for r in plan.columns["record_id"]}) > 10
+    )  # scattered
 
 
 def test_protocol_that_lacks_a_class_or_groups_is_left_out() -> None:
-    assert set(make_splits(make_plan(n_units=3), 1)) == {"random_window_leaky", "by_unit", "cross_gearbox"}
+    assert set(make_splits(make_plan(n_units=3), 1)) == {
+        "random_window_leaky",
+        "by_unit",
+        "cross_gearbox",
+    }
     assert set(make_splits(make_plan(n_units=2), 1)) == {"random_window_leaky"}
     plan = make_plan(n_units=6)
     one_unit_only = np.where(plan.columns["unit_id"] == "u0", 2, 0)
     poor = Plan(columns={**plan.columns, "label": one_unit_only})
     assert set(make_splits(poor, 1)) == {"random_window_leaky"}
-    bare = Plan(columns={name: plan.columns[name] for name in ("record_id", "shard", "row", "label")})
+    bare = Plan(
+        columns={name: plan.columns[name] for name in ("record_id", "shard", "row", "label")}
+    )
     assert set(make_splits(bare, 1)) == {"random_window_leaky"}
 
 
 def test_same_seed_same_split_other_seed_another() -> None:
     plan = make_plan(n_records=300, n_units=10)
-    texts = [{name: table.to_csv() for name, table in make_splits(plan, seed).items()} for seed in (1, 1, 2)]
+    texts = [
+        {name: table.to_csv() for name, table in make_splits(plan, seed).items()}
+        for seed in (1, 1, 2)
+    ]
     assert texts[0] == texts[1]
     assert all(texts[0][name] != texts[2][name] for name in texts[0])
 

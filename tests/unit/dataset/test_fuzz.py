@@ -66,7 +66,12 @@ def _crash(_folder: Path) -> None:
 
 @pytest.mark.parametrize(
     ("reader", "message"),
-    [(_die, "died"), (_hang, "hung for 2 s"), (_crash, "read: KeyError"), (None, "must be refused")],
+    [
+        (_die, "died"),
+        (_hang, "hung for 2 s"),
+        (_crash, "read: KeyError"),
+        (None, "must be refused"),
+    ],
 )
 def test_the_judge_sees_harm(
     tiny: Path, tmp_path: Path, reader: object, message: str, monkeypatch: pytest.MonkeyPatch
@@ -91,7 +96,9 @@ def test_inspect_reads_no_other_file(tmp_path: Path) -> None:
         layout = h5py.VirtualLayout((1,), "i8")
         layout[...] = h5py.VirtualSource(str(tmp_path / "other.h5"), "x", (1,))
         file.create_virtual_dataset("seen", layout)
-        file.create_dataset("wide", (1,), "i8", maxshape=(None,), chunks=(10**8,), compression="gzip")
+        file.create_dataset(
+            "wide", (1,), "i8", maxshape=(None,), chunks=(10**8,), compression="gzip"
+        )
     text = inspect(path)
     assert str(int.from_bytes(SECRET[:8], "little")) not in text
     assert "value" not in text

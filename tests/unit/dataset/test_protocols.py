@@ -15,7 +15,10 @@ SEVERITIES = ("unseen_severity_inner", "unseen_severity_outer")
 def random_plan(seed: int, **fixed: int) -> Plan:
     """Conditions of units, each with one record a class, cut anywhere; values drawn, in levels, or all equal."""
     rng = np.random.default_rng(seed)
-    n_units, n_classes = fixed.get("n_units", int(rng.integers(1, 25))), fixed.get("n_classes", int(rng.integers(1, 6)))
+    n_units, n_classes = (
+        fixed.get("n_units", int(rng.integers(1, 25))),
+        fixed.get("n_classes", int(rng.integers(1, 6))),
+    )
     n = fixed.get("n_records", int(rng.integers(n_classes, 400)))
     n_gearboxes = int(rng.integers(1, n_units + 1))
     condition = np.arange(n) // n_classes
@@ -46,8 +49,13 @@ def random_plan(seed: int, **fixed: int) -> Plan:
 
 def sides(table: SplitTable, plan: Plan, column: str) -> list[np.ndarray]:
     """Values of a plan column in train, validation and test."""
-    value = dict(zip(plan.columns["record_id"].tolist(), plan.columns[column].tolist(), strict=True))
-    return [np.array([value[name] for name in table.record_id[table.subset == subset].tolist()]) for subset in SUBSETS]
+    value = dict(
+        zip(plan.columns["record_id"].tolist(), plan.columns[column].tolist(), strict=True)
+    )
+    return [
+        np.array([value[name] for name in table.record_id[table.subset == subset].tolist()])
+        for subset in SUBSETS
+    ]
 
 
 PLANS = [random_plan(seed) for seed in range(60)]
@@ -61,7 +69,9 @@ def made(request: pytest.FixtureRequest) -> tuple[Plan, dict[str, SplitTable]]:
 def test_random_plans_have_every_protocol_somewhere_and_lack_it_elsewhere() -> None:
     found = [set(make_splits(plan, seed)) for seed, plan in enumerate(PLANS)]
     counts = {name: sum(name in names for names in found) for name in PROTOCOLS}
-    assert all(5 < count < 60 for name, count in counts.items() if name != "random_window_leaky"), counts
+    assert all(5 < count < 60 for name, count in counts.items() if name != "random_window_leaky"), (
+        counts
+    )
 
 
 def test_a_protocol_is_made_or_its_lack_explained(made: tuple[Plan, dict[str, SplitTable]]) -> None:
@@ -82,7 +92,9 @@ def test_nothing_is_on_two_sides(made: tuple[Plan, dict[str, SplitTable]]) -> No
             assert sum(map(len, parts)) == len(set.union(*parts))
 
 
-def test_every_class_is_on_every_side_of_a_closed_set(made: tuple[Plan, dict[str, SplitTable]]) -> None:
+def test_every_class_is_on_every_side_of_a_closed_set(
+    made: tuple[Plan, dict[str, SplitTable]],
+) -> None:
     plan, tables = made
     classes = set(plan.columns["label"].tolist())
     for name, table in tables.items():
@@ -99,7 +111,9 @@ def test_every_class_is_on_every_side_of_a_closed_set(made: tuple[Plan, dict[str
             assert train == validation == classes
 
 
-def test_held_out_conditions_lie_beyond_those_of_training(made: tuple[Plan, dict[str, SplitTable]]) -> None:
+def test_held_out_conditions_lie_beyond_those_of_training(
+    made: tuple[Plan, dict[str, SplitTable]],
+) -> None:
     plan, tables = made
     for name in set(RANGES) & set(tables):
         train, validation, test = sides(tables[name], plan, RANGES[name])
@@ -114,13 +128,17 @@ def test_held_out_severities_are_in_no_training(made: tuple[Plan, dict[str, Spli
         n_held = 0
         for label in np.unique(plan.columns["label"]).tolist():
             distinct = np.unique(plan.columns["severity"][plan.columns["label"] == label])
-            train, validation, test = (v[part == label] for v, part in zip(values, labels, strict=True))
+            train, validation, test = (
+                v[part == label] for v, part in zip(values, labels, strict=True)
+            )
             learnt = np.concatenate([train, validation])
             if len(distinct) < (3 if name.endswith("inner") else 2):
                 continue
             n_held += 1
             assert not ((learnt >= test.min()) & (learnt <= test.max())).any()
-            assert test.max() < distinct[-1] if name.endswith("inner") else learnt.max() < test.min()
+            assert (
+                test.max() < distinct[-1] if name.endswith("inner") else learnt.max() < test.min()
+            )
         assert n_held
 
 
@@ -134,11 +152,15 @@ def test_one_condition_a_unit_loses_no_record() -> None:
 def test_levels_are_held_out_whole() -> None:
     plan = random_plan(3, n_units=20, n_classes=2, n_records=400)
     levels = np.array([0.2, 0.3, 0.4, 0.5])
-    severity = np.where(plan.columns["label"] == 0, 0.0, np.repeat(levels[np.arange(200) // 20 % 4], 2))
+    severity = np.where(
+        plan.columns["label"] == 0, 0.0, np.repeat(levels[np.arange(200) // 20 % 4], 2)
+    )
     poorer = Plan(columns={**plan.columns, "severity": severity})
     tables = make_splits(poorer, 0)
     for name, held in (("unseen_severity_inner", 0.3), ("unseen_severity_outer", 0.5)):
-        train, validation, test = (set(part[part > 0].tolist()) for part in sides(tables[name], poorer, "severity"))
+        train, validation, test = (
+            set(part[part > 0].tolist()) for part in sides(tables[name], poorer, "severity")
+        )
         assert test == {held}
         assert train == validation == set(levels.tolist()) - {held}
 
@@ -146,7 +168,11 @@ def test_levels_are_held_out_whole() -> None:
 def test_why_is_precise() -> None:
     plan = random_plan(5, n_units=12, n_classes=2, n_records=100)
     n = plan.n_records
-    flat = {"speed_set_rpm": np.full(n, 1800.0), "snr_db": np.full(n, np.nan), "severity": np.zeros(n)}
+    flat = {
+        "speed_set_rpm": np.full(n, 1800.0),
+        "snr_db": np.full(n, np.nan),
+        "severity": np.zeros(n),
+    }
     poor = {name: value for name, value in plan.columns.items() if name != "torque_nm"} | flat
     poor["gearbox_id"] = np.full(n, "gearbox-0")
     reasons = why_left_out(Plan(columns=poor), 0)
@@ -171,7 +197,10 @@ def test_each_protocol_draws_from_its_own_stream() -> None:
 
 def moved(table: SplitTable, row: int, **change: object) -> SplitTable:
     """The table with one row more: a copy of another one, changed."""
-    columns = {name: getattr(table, name) for name in ("record_id", "start_fraction", "stop_fraction", "subset")}
+    columns = {
+        name: getattr(table, name)
+        for name in ("record_id", "start_fraction", "stop_fraction", "subset")
+    }
     return SplitTable(**{k: np.append(v, [change.get(k, v[row])]) for k, v in columns.items()})
 
 
@@ -192,6 +221,12 @@ def test_the_check_finds_what_is_on_two_sides() -> None:
                       stop_fraction=table.stop_fraction, subset=subset)  # fmt: skip
     assert len(split_problems("by_unit", torn, plan)) == 1
     assert split_problems("a_later_protocol", torn, plan) == []
-    assert "'r999999' is not in the plan" in split_problems("by_unit", moved(table, 0, record_id="r999999"), plan)[0]
+    assert (
+        "'r999999' is not in the plan"
+        in split_problems("by_unit", moved(table, 0, record_id="r999999"), plan)[0]
+    )
     leaky = tables["random_window_leaky"]
-    assert "given twice" in split_problems("random_window_leaky", moved(leaky, 0, start_fraction=0.1), plan)[0]
+    assert (
+        "given twice"
+        in split_problems("random_window_leaky", moved(leaky, 0, start_fraction=0.1), plan)[0]
+    )

@@ -42,7 +42,9 @@ def test_conditions(folder: Path, conditions: dict, expected: np.ndarray) -> Non
         chosen = data.where(**conditions)
         np.testing.assert_array_equal(chosen.index, expected)
         assert len(chosen) == len(expected)
-        np.testing.assert_array_equal(chosen.column("record_id"), data.column("record_id")[chosen.index])
+        np.testing.assert_array_equal(
+            chosen.column("record_id"), data.column("record_id")[chosen.index]
+        )
 
 
 def test_choosing_reads_no_signal(folder: Path, monkeypatch: pytest.MonkeyPatch) -> None:
@@ -58,14 +60,22 @@ def test_records_tables_and_arrays(folder: Path, plan: Plan) -> None:
     with open_dataset(folder) as data:
         chosen = data.where(fault="pitting")
         third = chosen[2]
-        assert (third.index, third.values["record_id"], third.values["speed_rpm"]) == (8, "r000008", 1808.0)
+        assert (third.index, third.values["record_id"], third.values["speed_rpm"]) == (
+            8,
+            "r000008",
+            1808.0,
+        )
         assert third.values["signal_power"].tolist() == [1.0, 2.0]
-        np.testing.assert_array_equal(third.signals(5, 9), row_of(plan, 8)[0]["acceleration"][:, 5:9])
+        np.testing.assert_array_equal(
+            third.signals(5, 9), row_of(plan, 8)[0]["acceleration"][:, 5:9]
+        )
         np.testing.assert_array_equal(chosen.signals(-1), row_of(plan, 35)[0]["acceleration"])
         block = chosen.array(0, 50, ["wheel_ü"])
         assert (block.shape, block.dtype) == ((12, 1, 50), np.float32)
         for place, index in enumerate(chosen.index.tolist()):
-            np.testing.assert_array_equal(block[place], row_of(plan, index)[0]["acceleration"][1:, :50])
+            np.testing.assert_array_equal(
+                block[place], row_of(plan, index)[0]["acceleration"][1:, :50]
+            )
         table = chosen.table(["label", "unit_id"])
         assert (table.dtype.names, len(table)) == (("label", "unit_id"), 12)
         assert set(table["label"].tolist()) == {2}
@@ -81,7 +91,9 @@ def test_plan_is_a_structured_table(folder: Path, plan: Plan) -> None:
         table = data.plan_table
     assert table.dtype.names == tuple(plan.columns)
     assert table[7]["record_id"] == "r000007"
-    np.testing.assert_array_equal(table["params/crack_depth_mm"], plan.columns["params/crack_depth_mm"])
+    np.testing.assert_array_equal(
+        table["params/crack_depth_mm"], plan.columns["params/crack_depth_mm"]
+    )
 
 
 @pytest.mark.parametrize(
@@ -116,7 +128,9 @@ def test_a_shard_is_checked_again_only_when_it_changed(
         checks: list[Path] = []
         whole = reader_module.open_shard
         monkeypatch.setattr(
-            reader_module, "open_shard", lambda path, **more: checks.append(path) or whole(path, **more)
+            reader_module,
+            "open_shard",
+            lambda path, **more: checks.append(path) or whole(path, **more),
         )
         data.close()
         data.signals(10)
@@ -147,7 +161,8 @@ def test_random_access_is_quick(folder: Path) -> None:
 
 def test_missing_shards_meet_no_condition(tmp_path: Path, plan: Plan) -> None:
     with open_dataset(
-        build(tmp_path / "a", plan, shards=range(1, 3), close=False, failed=12), allow_incomplete=True
+        build(tmp_path / "a", plan, shards=range(1, 3), close=False, failed=12),
+        allow_incomplete=True,
     ) as data:
         assert data.where(status="ok").index.tolist() == [i for i in range(10, 30) if i != 12]
         assert data.where(torque_nm=(None, None)).index.tolist() == list(range(10, 30))

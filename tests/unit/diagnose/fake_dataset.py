@@ -8,7 +8,13 @@ import numpy as np
 N_TEETH = {"n_teeth_pinion": 23, "n_teeth_wheel": 84}
 CLASSES = ("healthy", "crack", "pitting", "missing_tooth")
 IMPULSE = {"healthy": 0.0, "crack": 1.0, "pitting": 1.8, "missing_tooth": 5.0, "wear": 3.0}
-CARRIER_HZ = {"healthy": 4000.0, "crack": 3000.0, "pitting": 6000.0, "missing_tooth": 4500.0, "wear": 1500.0}
+CARRIER_HZ = {
+    "healthy": 4000.0,
+    "crack": 3000.0,
+    "pitting": 6000.0,
+    "missing_tooth": 4500.0,
+    "wear": 1500.0,
+}
 
 
 class FakeDataset:
@@ -53,7 +59,8 @@ class FakeDataset:
             "label_name": np.array(self.class_names)[label],
             "severity": severity,
             "unit_id": np.array([f"u{index:02d}" for index in unit]),
-            "speed_rpm": rng.choice([1200.0, 1800.0], self.n_records) * rng.uniform(0.99, 1.01, self.n_records),
+            "speed_rpm": rng.choice([1200.0, 1800.0], self.n_records)
+            * rng.uniform(0.99, 1.01, self.n_records),
             "unit_gain": rng.uniform(0.7, 1.4, n_units)[unit],
         }
 
@@ -71,14 +78,19 @@ class FakeDataset:
         turn = self.columns["speed_rpm"][record_index] / 60
         fault = self.class_names[self.columns["label"][record_index]]
         phase = rng.uniform()
-        mesh = np.sin(2 * np.pi * 23 * (turn * time + phase)) + 0.5 * np.sin(4 * np.pi * 23 * (turn * time + phase))
+        mesh = np.sin(2 * np.pi * 23 * (turn * time + phase)) + 0.5 * np.sin(
+            4 * np.pi * 23 * (turn * time + phase)
+        )
         since = np.mod(turn * time + phase, 1.0) / turn
         ringing = np.exp(-since / 8e-4) * np.sin(2 * np.pi * CARRIER_HZ[fault] * since)
         height = self.strength * IMPULSE[fault] * (0.5 + self.columns["severity"][record_index])
         height = 0.0 if self.sham or is_twin else height
         rng = np.random.default_rng([self.seed, record_index, 1]) if is_twin else rng
         noise = self.noise * rng.standard_normal((len(self.channel_names), self.n_samples))
-        gain = self.columns["unit_gain"][record_index] * np.linspace(1.0, 0.6, len(self.channel_names))[:, None]
+        gain = (
+            self.columns["unit_gain"][record_index]
+            * np.linspace(1.0, 0.6, len(self.channel_names))[:, None]
+        )
         signal = (gain * (mesh + height * ringing) + noise).astype(np.float32)
         signal = signal if channels is None else signal[channels]
         return signal[:, start:stop]
@@ -91,7 +103,9 @@ class FakeDataset:
             bounds = {"train": (0, n_units // 2), "validation": (n_units // 2, 3 * n_units // 4)}
             bounds["test"] = (3 * n_units // 4, n_units)
             for name, (low, high) in bounds.items():
-                subsets[name] = [(int(i), 0.0, 1.0) for i in np.flatnonzero((unit >= low) & (unit < high))]
+                subsets[name] = [
+                    (int(i), 0.0, 1.0) for i in np.flatnonzero((unit >= low) & (unit < high))
+                ]
         else:
             for i in range(self.n_records):
                 subsets["train"].append((i, 0.0, 0.5))

@@ -10,7 +10,9 @@ class FakeLives(FakeDataset):
     """One class; the impulses tell the remaining life below `SHOWS_H`, and the length of a life tells nothing of it."""
 
     def __init__(self, *, n_lives=20, n_snapshots=8, n_censored=0, **changes):
-        super().__init__(n_units=n_lives, records_per_unit=n_snapshots, classes=("missing_tooth",), **changes)
+        super().__init__(
+            n_units=n_lives, records_per_unit=n_snapshots, classes=("missing_tooth",), **changes
+        )
         rng = np.random.default_rng([self.seed, 7])
         length = rng.uniform(80.0, 400.0, n_lives)
         censored = np.zeros(n_lives, dtype=bool)

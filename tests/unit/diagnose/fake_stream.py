@@ -24,7 +24,9 @@ class FakeStream:
 
     @property
     def dataset(self):
-        return FakeDataset(n_units=4, records_per_unit=4, n_channels=2, noise=self.noise, seed=self.epoch)
+        return FakeDataset(
+            n_units=4, records_per_unit=4, n_channels=2, noise=self.noise, seed=self.epoch
+        )
 
     def __getattr__(self, name):
         if name in ("class_names", "channel_names", "n_samples", "protocols"):
@@ -50,7 +52,9 @@ class FakeStream:
         return replace(self, numbers=tuple(self.numbers[place] for place in places))
 
     def shard(self, index, count):
-        return replace(self, numbers=tuple(number for number in self.numbers if number // 4 % count == index))
+        return replace(
+            self, numbers=tuple(number for number in self.numbers if number // 4 % count == index)
+        )
 
     def at_epoch(self, epoch):
         return replace(self, epoch=epoch)

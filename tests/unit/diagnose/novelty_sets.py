@@ -10,7 +10,9 @@ class OpenDataset(FakeDataset):
     withheld = "missing_tooth"
 
     def __init__(self, **changes):
-        super().__init__(**{"n_units": 12, "records_per_unit": 8, "duration": 0.3, "noise": 0.3, **changes})
+        super().__init__(
+            **{"n_units": 12, "records_per_unit": 8, "duration": 0.3, "noise": 0.3, **changes}
+        )
         self.protocols = ("by_unit", "healthy_only", "open_set")
 
     def split(self, protocol):
@@ -23,7 +25,8 @@ class OpenDataset(FakeDataset):
         else:
             return subsets
         return {
-            subset: [row for row in rows if subset == "test" or not hidden[row[0]]] for subset, rows in subsets.items()
+            subset: [row for row in rows if subset == "test" or not hidden[row[0]]]
+            for subset, rows in subsets.items()
         }
 
 
@@ -32,7 +35,11 @@ class CopiedChannels(FakeDataset):
 
     def __init__(self):
         super().__init__(
-            n_units=8, records_per_unit=8, duration=0.3, n_channels=2, classes=("healthy", "missing_tooth")
+            n_units=8,
+            records_per_unit=8,
+            duration=0.3,
+            n_channels=2,
+            classes=("healthy", "missing_tooth"),
         )
         self.channel_names = ("near_x", "near_y", "far_x", "far_y")
 

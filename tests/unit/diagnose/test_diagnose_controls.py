@@ -39,7 +39,9 @@ HOWTO = Path(__file__).parents[3] / "docs" / "howto" / "controls.md"
 
 
 def make_task(dataset, **changes):
-    return task_of(dataset, **{"window_samples": 1200, "stride_samples": 1000, "normalise": "rms", **changes})
+    return task_of(
+        dataset, **{"window_samples": 1200, "stride_samples": 1000, "normalise": "rms", **changes}
+    )
 
 
 def make_settings(*overrides):
@@ -57,9 +59,14 @@ def test_record_and_difference_have_one_divisor_which_is_the_twins(normalise):
     plain = load_windows(task, subset_segments(task, "by_unit", "test"))
     cut = windows.cut(np.array([0]))[0]
     record, start = int(windows.record[0]), int(windows.start[0])
-    signal, twin = (dataset.signals(record, name=name).astype(float) for name in ("acceleration", "healthy_twin"))
+    signal, twin = (
+        dataset.signals(record, name=name).astype(float)
+        for name in ("acceleration", "healthy_twin")
+    )
     level = np.std(twin, axis=1, keepdims=True) if normalise == "rms" else np.ones((2, 1))
-    wanted = (np.concatenate([signal, signal - twin]) / np.tile(level, (2, 1)))[:, start : start + 1200]
+    wanted = (np.concatenate([signal, signal - twin]) / np.tile(level, (2, 1)))[
+        :, start : start + 1200
+    ]
     np.testing.assert_allclose(cut, wanted - wanted.mean(axis=1, keepdims=True), rtol=0, atol=1e-4)
     np.testing.assert_array_equal(windows.label, plain.label)
     np.testing.assert_array_equal(windows.start, plain.start)
@@ -83,9 +90,14 @@ def test_the_table_has_finite_named_columns_and_shares_its_cache():
     assert len(cache) == 16
     again = oracle_table(task, subset_segments(task, "by_unit", "test"), cache)
     np.testing.assert_array_equal(table.values, again.values)
-    difference = [index for index, name in enumerate(table.names) if name.endswith("difference/log_rms")]
+    difference = [
+        index for index, name in enumerate(table.names) if name.endswith("difference/log_rms")
+    ]
     assert len(difference) == 2
-    assert table.values[table.label == 3][:, difference].mean() > table.values[table.label == 0][:, difference].mean()
+    assert (
+        table.values[table.label == 3][:, difference].mean()
+        > table.values[table.label == 0][:, difference].mean()
+    )
 
 
 def test_the_better_one_on_validation_units_is_the_oracle():
@@ -101,7 +113,10 @@ def test_the_better_one_on_validation_units_is_the_oracle():
         )  # fmt: skip
 
     assert chosen_oracle(task, [run("cnn", 8)]) is None
-    assert chosen_oracle(task, [run("oracle_network", 5), run("oracle_indicators", 6)]) == "oracle_indicators"
+    assert (
+        chosen_oracle(task, [run("oracle_network", 5), run("oracle_indicators", 6)])
+        == "oracle_indicators"
+    )
     two = [run("oracle_network", 8), run("oracle_network", 5, 1), run("oracle_indicators", 6)]
     assert chosen_oracle(task, two) == "oracle_network"
 
@@ -114,7 +129,9 @@ def test_a_method_over_itself_is_one_and_the_interval_grows_with_the_units_sprea
     counts[:, :, 1, 1], counts[:, :, 1, 0] = hits[..., 1], 10 - hits[..., 1]
 
     def ratio(one, other):
-        return ratio_with_interval("balanced_accuracy", one, other, n_bootstrap=500, rng=np.random.default_rng(1))
+        return ratio_with_interval(
+            "balanced_accuracy", one, other, n_bootstrap=500, rng=np.random.default_rng(1)
+        )
 
     same = ratio(counts[:1], counts[:1])
     assert same == {"mean": 1.0, "low": 1.0, "high": 1.0}
@@ -123,7 +140,9 @@ def test_a_method_over_itself_is_one_and_the_interval_grows_with_the_units_sprea
     found = ratio(counts, perfect)
     assert found["low"] < found["mean"] < found["high"] < 1
     assert found["mean"] == pytest.approx(hits.mean() / 10)
-    assert oracle_verdict({"over_oracle": {"balanced_accuracy": ratio(perfect, counts)}}).endswith("no bound here")
+    assert oracle_verdict({"over_oracle": {"balanced_accuracy": ratio(perfect, counts)}}).endswith(
+        "no bound here"
+    )
 
 
 # --- the probe ----------------------------------------------------------------------------------------------------
@@ -131,12 +150,20 @@ def test_a_method_over_itself_is_one_and_the_interval_grows_with_the_units_sprea
 
 def test_nothing_that_is_a_label_is_probed():
     dataset = FakeDataset(**SMALL)
-    dataset.columns |= {name: np.zeros(dataset.n_records) for name in (*COLUMNS, *EXCLUDED, "params/fault.depth_mm")}
+    dataset.columns |= {
+        name: np.zeros(dataset.n_records) for name in (*COLUMNS, *EXCLUDED, "params/fault.depth_mm")
+    }
     for results in (False, True):
         probed = probed_columns(dataset, results=results)
-        assert not {"label", "label_name", "faults_json", "severity", "fault_gear", "fault_tooth", "detectability"} & {
-            *probed
-        }
+        assert not {
+            "label",
+            "label_name",
+            "faults_json",
+            "severity",
+            "fault_gear",
+            "fault_tooth",
+            "detectability",
+        } & {*probed}
         assert not set(EXCLUDED) & set(probed)
         assert "params/fault.depth_mm" not in probed
         assert {"speed_rpm", "snr_db", "unit_id", "start_phase", "torque_nm"} <= set(probed)
@@ -155,7 +182,9 @@ def test_the_howto_names_what_is_left_out_and_why():
 
 def test_the_place_in_the_file_is_probed():
     dataset = FakeDataset(**SMALL)
-    dataset.columns["condition_id"] = np.array([f"c{index // 4}" for index in range(dataset.n_records)])
+    dataset.columns["condition_id"] = np.array(
+        [f"c{index // 4}" for index in range(dataset.n_records)]
+    )
     values, names = probe_values(dataset, 4, results=False)
     np.testing.assert_array_equal(values[:, names.index("place")], np.arange(64))
     np.testing.assert_array_equal(values[:, names.index("place_in_condition")], np.arange(64) % 4)
@@ -208,7 +237,10 @@ def test_every_control_has_its_jobs_and_only_on_clean_protocols():
 @pytest.fixture
 def opened(monkeypatch):
     """Data sets by name, opened in place of folders."""
-    offered = {"good": FakeDataset(**SMALL, twins=True), "sham": FakeDataset(**SMALL, sham=True, seed=5)}
+    offered = {
+        "good": FakeDataset(**SMALL, twins=True),
+        "sham": FakeDataset(**SMALL, sham=True, seed=5),
+    }
     for name, dataset in offered.items():
         dataset.folder = Path(name)
     monkeypatch.setattr(gensig.dataset.reader, "open_dataset", lambda path: offered[str(path)])
@@ -225,15 +257,28 @@ def test_a_study_with_all_of_them(opened, tmp_path):
         "oracle_indicators", "oracle", "level_kept", "sham", "sham_rms_threshold", "chance",
     }  # fmt: skip
     assert methods["oracle"]["chosen"] in ("oracle_network", "oracle_indicators")
-    assert methods["oracle"]["balanced_accuracy"] == methods[methods["oracle"]["chosen"]]["balanced_accuracy"]
+    assert (
+        methods["oracle"]["balanced_accuracy"]
+        == methods[methods["oracle"]["chosen"]]["balanced_accuracy"]
+    )
     share = result["over_oracle"]["balanced_accuracy"]
-    mean = methods["cnn"]["balanced_accuracy"]["mean"] / methods["oracle"]["balanced_accuracy"]["mean"]
+    mean = (
+        methods["cnn"]["balanced_accuracy"]["mean"] / methods["oracle"]["balanced_accuracy"]["mean"]
+    )
     assert share["mean"] == pytest.approx(mean)
     assert share["low"] <= share["mean"] <= share["high"]
     assert [path.name for path in (out / "models").iterdir()] == ["by_unit-seed0"]
-    assert "sham" not in {line.split(",")[1] for line in (out / "predictions.csv").read_text().splitlines()}
+    assert "sham" not in {
+        line.split(",")[1] for line in (out / "predictions.csv").read_text().splitlines()
+    }
     page = (out / "report.html").read_text()
-    for words in ("metadata probe", "sham, network", "sham, RMS threshold", "cnn over oracle", "of the oracle"):
+    for words in (
+        "metadata probe",
+        "sham, network",
+        "sham, RMS threshold",
+        "cnn over oracle",
+        "of the oracle",
+    ):
         assert words in page
 
 
@@ -242,18 +287,43 @@ def test_the_controls_change_no_bit_of_the_rest(opened, tmp_path):
     results = []
     for name, words in (("with", ["sham=sham", "normalise=both"]), ("without", plain)):
         assert main(["train", "data=good", f"out={tmp_path / name}", *FAST, *words]) == 0
-        results.append(json.loads((tmp_path / name / "metrics.json").read_text())["protocols"]["by_unit"])
+        results.append(
+            json.loads((tmp_path / name / "metrics.json").read_text())["protocols"]["by_unit"]
+        )
     for method in ("cnn", "rms_threshold", "label_shuffle"):
         assert results[0]["methods"][method] == results[1]["methods"][method]
-    weights = [(tmp_path / name / "models" / "by_unit-seed0" / "model.safetensors") for name in ("with", "without")]
+    weights = [
+        (tmp_path / name / "models" / "by_unit-seed0" / "model.safetensors")
+        for name in ("with", "without")
+    ]
     assert weights[0].read_bytes() == weights[1].read_bytes()
     assert results[1]["over_oracle"] == {}
 
 
 def test_a_sham_set_scores_chance_where_the_faults_score_above(opened, tmp_path):
-    few = ["baselines=[indicators_without_level]", "epochs=4", "metadata_probe=false", "oracle=false"]
-    assert main(["train", "data=good", f"out={tmp_path / 'out'}", *FAST[:3], *FAST[4:10], *few, "sham=sham"]) == 0
-    methods = json.loads((tmp_path / "out" / "metrics.json").read_text())["protocols"]["by_unit"]["methods"]
+    few = [
+        "baselines=[indicators_without_level]",
+        "epochs=4",
+        "metadata_probe=false",
+        "oracle=false",
+    ]
+    assert (
+        main(
+            [
+                "train",
+                "data=good",
+                f"out={tmp_path / 'out'}",
+                *FAST[:3],
+                *FAST[4:10],
+                *few,
+                "sham=sham",
+            ]
+        )
+        == 0
+    )
+    methods = json.loads((tmp_path / "out" / "metrics.json").read_text())["protocols"]["by_unit"][
+        "methods"
+    ]
     for name in ("sham", "sham_indicators_without_level"):
         assert verdict(methods[name], 1 / len(CLASSES)) != "ABOVE chance: look for a leak"
     assert methods["indicators_without_level"]["balanced_accuracy"]["low"] > 0.4
@@ -266,7 +336,8 @@ def test_the_section_is_empty_without_controls():
 
 
 @pytest.mark.parametrize(
-    ("low", "high", "says"), [(0.2, 0.3, "at chance"), (0.3, 0.4, "ABOVE chance"), (0.1, 0.2, "below chance")]
+    ("low", "high", "says"),
+    [(0.2, 0.3, "at chance"), (0.3, 0.4, "ABOVE chance"), (0.1, 0.2, "below chance")],
 )
 def test_verdicts(low, high, says):
     assert verdict({"balanced_accuracy": {"low": low, "high": high}}, 0.25).startswith(says)
@@ -278,9 +349,18 @@ def test_verdicts(low, high, says):
 @pytest.mark.parametrize(
     ("other", "message"),
     [
-        ({"sham": False}, "sham=other has faults; make one of the same command with plan.sham=true"),
-        ({"classes": CLASSES[:3]}, "sham=other: its classes are healthy, crack, pitting, those of data= healthy"),
-        ({"n_channels": 2}, "sham=other: its channels are channel_0, channel_1, those of data= channel_0"),
+        (
+            {"sham": False},
+            "sham=other has faults; make one of the same command with plan.sham=true",
+        ),
+        (
+            {"classes": CLASSES[:3]},
+            "sham=other: its classes are healthy, crack, pitting, those of data= healthy",
+        ),
+        (
+            {"n_channels": 2},
+            "sham=other: its channels are channel_0, channel_1, those of data= channel_0",
+        ),
         ({"sampling_rate": 25600.0}, "sham=other is sampled at 25600 Hz, data= at 12800 Hz"),
     ],
 )

@@ -50,10 +50,30 @@ def test_an_exported_model_answers_where_the_page_says(monkeypatch, tmp_path, ca
     data = FakeDataset(n_units=12, records_per_unit=8, duration=0.5)
     monkeypatch.setattr(gensig.dataset.reader, "open_dataset", lambda path: data)
     monkeypatch.chdir(tmp_path)
-    words = ["window_samples=1200", "stride_samples=1000", "epochs=1", "seeds=[0]", "n_bootstrap=20", "n_threads=1"]
+    words = [
+        "window_samples=1200",
+        "stride_samples=1000",
+        "epochs=1",
+        "seeds=[0]",
+        "n_bootstrap=20",
+        "n_threads=1",
+    ]
     words += ["protocols=[by_unit]", "shuffle_control=false", "baselines=false"]
     assert main(["train", "data=good", "out=report", *words]) == 0
-    assert main(["export", "--to", "onnx", "--model", "report/models/by_unit-seed0", "--out", "gearbox.onnx"]) == 0
+    assert (
+        main(
+            [
+                "export",
+                "--to",
+                "onnx",
+                "--model",
+                "report/models/by_unit-seed0",
+                "--out",
+                "gearbox.onnx",
+            ]
+        )
+        == 0
+    )
     capsys.readouterr()
     names = {}
     exec(compile(python_of("export.md"), "export.md", "exec"), names)

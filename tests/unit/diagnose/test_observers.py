@@ -31,14 +31,20 @@ def residual() -> np.ndarray:
 @pytest.mark.parametrize("n_samples", [1000, 1001])
 def test_all_bands_together_are_the_energy_over_the_noise(residual, n_samples: int) -> None:
     x, power = residual[..., :n_samples], np.array([0.5, 4.0])[:, None]
-    assert_allclose(d_prime(x, power)[..., -1] ** 2, np.sum(x**2, axis=-1) / power[:, 0], rtol=1e-12, atol=0)
+    assert_allclose(
+        d_prime(x, power)[..., -1] ** 2, np.sum(x**2, axis=-1) / power[:, 0], rtol=1e-12, atol=0
+    )
 
 
 def test_a_tone_is_in_its_band_alone() -> None:
     tone = np.sin(2.0 * math.pi * 1000.0 * np.arange(1000) / RATE)
-    assert_allclose(residual_energy(tone, np.ones(1), RATE, BANDS), [0.0, 500.0, 0.0], rtol=0, atol=1e-9)
+    assert_allclose(
+        residual_energy(tone, np.ones(1), RATE, BANDS), [0.0, 500.0, 0.0], rtol=0, atol=1e-9
+    )
     # at the edge it belongs to the lower band
-    assert_allclose(residual_energy(tone, np.ones(1), RATE, (1000.0, 2000.0)), [500.0, 0.0], rtol=0, atol=1e-9)
+    assert_allclose(
+        residual_energy(tone, np.ones(1), RATE, (1000.0, 2000.0)), [500.0, 0.0], rtol=0, atol=1e-9
+    )
 
 
 def test_more_bandwidth_never_tells_less(residual) -> None:
@@ -47,7 +53,9 @@ def test_more_bandwidth_never_tells_less(residual) -> None:
 
 
 def test_six_decibels_less_noise_double_it(residual) -> None:
-    assert_allclose(d_prime(residual, np.full(1, 0.25)), 2.0 * d_prime(residual, np.ones(1)), rtol=1e-12, atol=0)
+    assert_allclose(
+        d_prime(residual, np.full(1, 0.25)), 2.0 * d_prime(residual, np.ones(1)), rtol=1e-12, atol=0
+    )
 
 
 def test_four_times_the_record_doubles_it(residual) -> None:
@@ -69,7 +77,10 @@ def test_noise_elsewhere_does_not_hide_a_tone() -> None:
     """White noise of the same power does: the observer knows the spectrum."""
     tone = np.sin(2.0 * math.pi * 1000.0 * np.arange(1000) / RATE)
     low = np.where(np.fft.rfftfreq(1000, 1.0 / RATE) < 500.0, 10.0 - 9e-3, 1e-3)
-    assert residual_energy(tone, low, RATE, BANDS).sum() > 100.0 * residual_energy(tone, np.ones(1), RATE, BANDS).sum()
+    assert (
+        residual_energy(tone, low, RATE, BANDS).sum()
+        > 100.0 * residual_energy(tone, np.ones(1), RATE, BANDS).sum()
+    )
 
 
 def modulated(depth: float, n_turns: float = 40.0) -> tuple[np.ndarray, np.ndarray]:
@@ -90,11 +101,15 @@ def table(depth: float, n_turns: float = 40.0, **changes) -> dict[str, np.ndarra
 def test_indicators_of_a_known_mesh() -> None:
     found = table(0.0)
     assert_allclose(found["rms"][:, 1:], 0.5 * math.log(0.5 + 0.5 * 0.3**2), rtol=0, atol=2e-3)
-    assert np.isnan(found["fm4_pinion"][:, 0]).all()  # below 500 Hz there is no room for the mesh and its sidebands
+    assert np.isnan(
+        found["fm4_pinion"][:, 0]
+    ).all()  # below 500 Hz there is no room for the mesh and its sidebands
     assert np.isfinite(found["fm4_pinion"][:, 1:]).all()
 
 
-@pytest.mark.parametrize("name", ["envelope_pinion", "sideband_ratio_pinion", "residual_rms_pinion"])
+@pytest.mark.parametrize(
+    "name", ["envelope_pinion", "sideband_ratio_pinion", "residual_rms_pinion"]
+)
 def test_a_bump_once_a_turn_raises_what_should_see_it(name: str) -> None:
     assert (table(0.3)[name][:, 1] > table(0.0)[name][:, 1] + 1.0).all()
 
@@ -116,7 +131,9 @@ def test_a_record_without_a_whole_turn_has_no_indicator_of_the_gear() -> None:
         assert np.isnan(found[name]).all()
 
 
-def groups(shift: float, n_units: int = 10, n_indicators: int = 200, seed: int = 0) -> tuple[np.ndarray, np.ndarray]:
+def groups(
+    shift: float, n_units: int = 10, n_indicators: int = 200, seed: int = 0
+) -> tuple[np.ndarray, np.ndarray]:
     """Machines that differ by 1, and a fault that adds ``shift`` to the indicator 7 of each."""
     sound = np.random.default_rng(seed).standard_normal((n_units, n_indicators))
     faulty = sound.copy()
@@ -146,7 +163,12 @@ def test_the_standard_error_is_the_scatter_of_d_prime(own_scatter: float) -> Non
         rng = np.random.default_rng(seed)
         sound = rng.standard_normal((12, 1))
         found.append(
-            confirmed(sound, sound + 1.0 + own_scatter * rng.standard_normal((12, 1)), indicator=0, raises=True)
+            confirmed(
+                sound,
+                sound + 1.0 + own_scatter * rng.standard_normal((12, 1)),
+                indicator=0,
+                raises=True,
+            )
         )
     told = np.sqrt(np.mean([one.standard_error**2 for one in found]))
     assert told == pytest.approx(np.std([one.d_prime for one in found]), rel=0.2)
@@ -159,7 +181,11 @@ def test_the_best_of_many_indicators_by_chance_is_not_seen() -> None:
         rng = np.random.default_rng(seed)
         sound, other = rng.standard_normal((2, 8, 50))
         difference = np.abs(sound.mean(axis=0) - other.mean(axis=0))
-        best.append(np.max(difference / np.sqrt(0.5 * (sound.var(axis=0, ddof=1) + other.var(axis=0, ddof=1)))))
+        best.append(
+            np.max(
+                difference / np.sqrt(0.5 * (sound.var(axis=0, ddof=1) + other.var(axis=0, ddof=1)))
+            )
+        )
         seen.append(seen_by_indicators(sound, other).d_prime)
     assert np.mean(best) > 1.2
     assert abs(np.mean(seen)) < 0.3

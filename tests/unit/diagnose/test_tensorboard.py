@@ -11,7 +11,9 @@ from fake_dataset import FakeDataset
 import gensig.dataset.reader
 from diagnose.cli import main
 
-accumulator = pytest.importorskip("tensorboard.backend.event_processing.event_accumulator", reason="extra tensorboard")
+accumulator = pytest.importorskip(
+    "tensorboard.backend.event_processing.event_accumulator", reason="extra tensorboard"
+)
 
 FAST = [
     "window_samples=1200", "stride_samples=1000", "epochs=2", "seeds=[0,1]", "n_bootstrap=20",
@@ -27,7 +29,10 @@ def studies(tmp_path_factory):
     data = FakeDataset(n_units=16, records_per_unit=4, duration=0.3)
     with pytest.MonkeyPatch.context() as patch:
         patch.setattr(gensig.dataset.reader, "open_dataset", lambda path: data)
-        for name, options in (("with", ["n_threads=2", "tensorboard=true"]), ("without", ["n_threads=1"])):
+        for name, options in (
+            ("with", ["n_threads=2", "tensorboard=true"]),
+            ("without", ["n_threads=1"]),
+        ):
             assert main(["train", "data=good", f"out={folder / name}", *FAST, *options]) == 0
     return folder
 
@@ -46,7 +51,9 @@ def test_losses_are_those_of_the_study(studies):
     log = studies / "with" / "tensorboard"
     names = sorted(path.name for path in log.iterdir())
     assert names == ["by_unit-label_shuffle-seed0", "by_unit-seed0", "by_unit-seed1", "scores"]
-    for seed, expected in enumerate(metrics(studies / "with")["protocols"]["by_unit"]["validation_loss"]):
+    for seed, expected in enumerate(
+        metrics(studies / "with")["protocols"]["by_unit"]["validation_loss"]
+    ):
         found = scalars(log / f"by_unit-seed{seed}")
         np.testing.assert_allclose(found["loss/validation_records"], expected, rtol=1e-6, atol=0)
         assert len(found["loss/training_windows"]) == len(expected)
@@ -85,6 +92,11 @@ def test_without_the_package_one_line_says_what_to_install():
         "try: need_tensorboard()\n"
         "except ConfigError as error: print(error)\n"
     )
-    shown = subprocess.run([sys.executable, "-c", code], capture_output=True, text=True, check=False)
-    assert "tensorboard=true needs the package tensorboard: pip install 'gensig[tensorboard]'" in shown.stdout
+    shown = subprocess.run(
+        [sys.executable, "-c", code], capture_output=True, text=True, check=False
+    )
+    assert (
+        "tensorboard=true needs the package tensorboard: pip install 'gensig[tensorboard]'"
+        in shown.stdout
+    )
     assert shown.returncode == 0

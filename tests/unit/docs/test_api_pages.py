@@ -13,4 +13,8 @@ def test_all_that_gensig_offers_is_listed():
     import gensig
 
     text = (api_pages.FOLDER / "gensig.md").read_text(encoding="utf-8")
-    assert [name for name in gensig.__all__ if name != "__version__" and f"\n::: gensig.{name}\n" not in text] == []
+    assert [
+        name
+        for name in gensig.__all__
+        if name != "__version__" and f"\n::: gensig.{name}\n" not in text
+    ] == []

@@ -27,7 +27,11 @@ def stopped_after_parsing(monkeypatch: pytest.MonkeyPatch) -> None:
     def stopping(name: str) -> Any:
         known = getattr(argparse.ArgumentParser, name.replace("parse_", "parse_known_"))
 
-        def parse(parser: argparse.ArgumentParser, words: Sequence[str] | None = None, namespace: Any = None) -> Any:
+        def parse(
+            parser: argparse.ArgumentParser,
+            words: Sequence[str] | None = None,
+            namespace: Any = None,
+        ) -> Any:
             found, left = known(parser, words, namespace)
             if left:
                 parser.error(f"unrecognized arguments: {' '.join(left)}")
@@ -63,7 +67,9 @@ def _check(words: list[str]) -> None:
     overrides = [word for word in getattr(arguments, "overrides", ()) if "=" in word]
     for job in sweep(overrides):
         if getattr(arguments, "config_dir", None) or words[1] == "evaluate":
-            override_keys(job)  # options of the user's own, which are not here; keys that are no configuration
+            override_keys(
+                job
+            )  # options of the user's own, which are not here; keys that are no configuration
         else:
             _compose(words[1], tuple(job))
 

@@ -13,7 +13,16 @@ from gensig.options.compose import compose
 
 DOCS = ROOT / "docs"
 LINK = re.compile(r"(!?)\[([^\]]*)\]\(([^)\s]+)\)")
-FILES = (".csv", ".html", ".json", ".md", ".png", ".py", ".safetensors", ".yaml")  # no keys, though they look like some
+FILES = (
+    ".csv",
+    ".html",
+    ".json",
+    ".md",
+    ".png",
+    ".py",
+    ".safetensors",
+    ".yaml",
+)  # no keys, though they look like some
 TAG = re.compile(r"\\tag\{([A-Z]+)\.(\d+)\}")
 
 
@@ -47,7 +56,11 @@ def test_the_site_has_every_page_once() -> None:
     def leaves(node: Any) -> list[str]:
         if isinstance(node, str):
             return [node]
-        return [leaf for item in (node.values() if isinstance(node, dict) else node) for leaf in leaves(item)]
+        return [
+            leaf
+            for item in (node.values() if isinstance(node, dict) else node)
+            for leaf in leaves(item)
+        ]
 
     nav = leaves(yaml.safe_load((ROOT / "mkdocs.yml").read_text(encoding="utf-8"))["nav"])
     pages = [str(page.relative_to(DOCS)) for page in DOCS.rglob("*.md")]
@@ -56,7 +69,9 @@ def test_the_site_has_every_page_once() -> None:
 
 @pytest.mark.parametrize("page", sorted(DOCS.glob("theory/*.md")), ids=lambda page: page.name)
 def test_equations_are_numbered_in_order(page: Path) -> None:
-    equations = [block.code for block in blocks(page.read_text(encoding="utf-8")) if block.language == "math"]
+    equations = [
+        block.code for block in blocks(page.read_text(encoding="utf-8")) if block.language == "math"
+    ]
     tags = [TAG.findall(code) for code in equations]
     assert all(len(tag) == 1 for tag in tags)
     assert len({letter for ((letter, _),) in tags}) <= 1
@@ -77,7 +92,11 @@ def test_a_list_or_block_is_not_taken_for_the_paragraph_before() -> None:
     for page, name in zip(PAGES, NAMES, strict=True):
         lines = page.read_text(encoding="utf-8").split("\n")
         for number, (before, line) in enumerate(pairwise(lines), start=2):
-            begins = re.match(r"(- |\* |1\. |\|)", line) and before.strip() and not before.startswith(("#", "<!--"))
+            begins = (
+                re.match(r"(- |\* |1\. |\|)", line)
+                and before.strip()
+                and not before.startswith(("#", "<!--"))
+            )
             if begins and not re.match(r"( *- | *\* | *\d+\. |\||  )", before):
                 wrong.append(f"{name}:{number}: {line[:40]}")
     assert not wrong
@@ -96,11 +115,17 @@ def test_configuration_keys_that_the_pages_name_exist() -> None:
     for file in (ROOT / "configs").rglob("*.yaml"):
         text = file.read_text(encoding="utf-8")
         group = file.relative_to(ROOT / "configs").parts[0] if file.parent.name != "configs" else ""
-        known |= _keys(yaml.safe_load(text), "" if not group or "@package _global_" in text else f"{group}.")
+        known |= _keys(
+            yaml.safe_load(text), "" if not group or "@package _global_" in text else f"{group}."
+        )
     for life in ("crack_growth", "pit_growth", "wear", "mixed"):  # put together from several files
-        known |= _keys(compose("generate", ["experiment=run_to_failure", f"life={life}"]).plain(), "")
+        known |= _keys(
+            compose("generate", ["experiment=run_to_failure", f"life={life}"]).plain(), ""
+        )
     sections = {key.partition(".")[0] for key in known if "." in key}
-    named = re.compile(rf"(?<![\w./{{$])((?:{'|'.join(sorted(sections))})(?:\.[a-z][a-z0-9_]*)+)(?![\w/(*.|])")
+    named = re.compile(
+        rf"(?<![\w./{{$])((?:{'|'.join(sorted(sections))})(?:\.[a-z][a-z0-9_]*)+)(?![\w/(*.|])"
+    )
     unknown = set()
     n_named = 0
     for page, name in zip(PAGES, NAMES, strict=True):
@@ -124,7 +149,12 @@ def test_a_page_is_cut_where_it_should_be() -> None:
         "## Twice\n\n## Twice\n"
     )
     indented, fenced = blocks(page)
-    assert (indented.language, indented.line, fenced.language, fenced.mark) == ("", 5, "python", "not run: why")
+    assert (indented.language, indented.line, fenced.language, fenced.mark) == (
+        "",
+        5,
+        "python",
+        "not run: why",
+    )
     assert [target for _, _, target in LINK.findall(without_blocks(page))] == ["other.md#x"]
     assert anchors(page) == {"a-b-c", "twice", "twice-1"}
     assert list(command_lines(page)) == [(5, ["gensig", "plan", "fault=crack"])]
@@ -133,8 +163,12 @@ def test_a_page_is_cut_where_it_should_be() -> None:
 def test_examples_on_the_page_are_the_files_that_run() -> None:
     examples = ROOT / "tests" / "examples"
     page = (ROOT / "docs" / "architecture.md").read_text(encoding="utf-8")
-    shown = {block.mark: block.code for block in blocks(page) if block.mark.startswith("tests/examples/")}
-    files = {path for path in examples.iterdir() if path.is_file() and not path.name.startswith("test_")}
+    shown = {
+        block.mark: block.code for block in blocks(page) if block.mark.startswith("tests/examples/")
+    }
+    files = {
+        path for path in examples.iterdir() if path.is_file() and not path.name.startswith("test_")
+    }
     assert set(shown) == {str(path.relative_to(ROOT)) for path in files}
     for name, code in shown.items():
         assert code == (ROOT / name).read_text(encoding="utf-8").rstrip(), name

@@ -23,13 +23,17 @@ def test_changelog_begins_with_this_version() -> None:
     numbers = [tuple(int(part) for part in version.split(".")) for version, _ in versions]
     assert versions[0][0] == __version__
     assert numbers == sorted(numbers, reverse=True)
-    sections = re.split(r"^## ", text("CHANGELOG.md"), flags=re.M)[1:-1]  # the first version changed no bits
+    sections = re.split(r"^## ", text("CHANGELOG.md"), flags=re.M)[
+        1:-1
+    ]  # the first version changed no bits
     assert all("**Bits: " in section for section in sections)
 
 
 def test_citation_is_of_this_version() -> None:
     citation = yaml.safe_load(text("CITATION.cff"))
-    assert {"cff-version", "message", "title", "authors"} <= set(citation)  # what the format requires
+    assert {"cff-version", "message", "title", "authors"} <= set(
+        citation
+    )  # what the format requires
     assert citation["version"] == __version__
     assert citation["license"] == PROJECT["license"]
     assert citation["title"].startswith(PROJECT["name"])
@@ -46,7 +50,9 @@ def test_every_package_that_is_needed_has_its_licence_told() -> None:
 
 def test_card_of_the_first_data_set_is_that_of_this_version() -> None:
     """Its identity names all that decides bits: a new key changes it, and the card has to follow."""
-    identity = identity_hash(read_request(["experiment=quickstart"]).config.with_entries(out=None).plain(), __version__)
+    identity = identity_hash(
+        read_request(["experiment=quickstart"]).config.with_entries(out=None).plain(), __version__
+    )
     card = text("data_cards/quickstart.md")
     assert f"| identity | {identity} |" in card
     assert f"by gensig {__version__}." in card

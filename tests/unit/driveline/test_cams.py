@@ -54,10 +54,19 @@ def test_lift_slope_and_curvature_belong_together():
     lift, slope, curvature = VALVE.motion(ANGLE)
     step = ANGLE[1]
     assert_allclose(lift.max(), 0.012, rtol=1e-6)
-    assert_allclose(np.gradient(lift, step)[1:-1], slope[1:-1], rtol=0, atol=1e-4 * np.abs(slope).max())
+    assert_allclose(
+        np.gradient(lift, step)[1:-1], slope[1:-1], rtol=0, atol=1e-4 * np.abs(slope).max()
+    )
     inside = (ANGLE > 0.05) & (VALVE.span - 0.05 > ANGLE)
-    assert_allclose(np.gradient(slope, step)[inside], curvature[inside], rtol=0, atol=1e-3 * np.abs(curvature).max())
-    assert np.max(np.abs(np.diff(curvature))) < 0.02 * np.ptp(curvature)  # no jump: no jerk without end
+    assert_allclose(
+        np.gradient(slope, step)[inside],
+        curvature[inside],
+        rtol=0,
+        atol=1e-3 * np.abs(curvature).max(),
+    )
+    assert np.max(np.abs(np.diff(curvature))) < 0.02 * np.ptp(
+        curvature
+    )  # no jump: no jerk without end
     assert not np.any(lift[VALVE.span < ANGLE])
 
 
@@ -80,13 +89,19 @@ def test_equation_21_is_force_times_slope():
     force = follower_force(PUMP_CAM, ANGLE, SPEED)
     center = 0.025 + 0.015 + lift  # r0 + r1 + h
     pressure_angle = np.arctan2(slope, center)
-    assert_allclose(-cam_torque(PUMP_CAM, ANGLE, SPEED), force * center * np.tan(pressure_angle), rtol=1e-12, atol=1e-9)
+    assert_allclose(
+        -cam_torque(PUMP_CAM, ANGLE, SPEED),
+        force * center * np.tan(pressure_angle),
+        rtol=1e-12,
+        atol=1e-9,
+    )
 
 
 def test_a_follower_that_leaves_its_cam_is_refused():
     fast = 3.0 * SPEED
     with pytest.raises(
-        ConfigError, match=r"the follower leaves its cam at 2532 r/min of the camshaft: the spring lacks"
+        ConfigError,
+        match=r"the follower leaves its cam at 2532 r/min of the camshaft: the spring lacks",
     ):
         cam_torque(VALVE, ANGLE, fast)
     assert cam_torque(replace(VALVE, spring_preload=12e3), ANGLE, fast).min() < 0.0
@@ -112,14 +127,18 @@ def test_delivery_begins_at_the_stated_lift_and_ends_with_the_fuel():
 
 
 def test_peak_is_pressure_times_area_times_slope():
-    torque = plunger_torque(PLUNGER, ANGLE, SPEED, VOLUME, 1.0) - plunger_torque(PLUNGER, ANGLE, SPEED, 0.0, 1.0)
+    torque = plunger_torque(PLUNGER, ANGLE, SPEED, VOLUME, 1.0) - plunger_torque(
+        PLUNGER, ANGLE, SPEED, 0.0, 1.0
+    )
     steepest = PUMP_CAM.motion(ANGLE)[1].max()
     assert -torque.min() <= 80e6 * PLUNGER.area * steepest * (1.0 + 1e-9)
     assert -torque.min() > 0.95 * 80e6 * PLUNGER.area * steepest
 
 
 def test_fuel_that_the_plunger_cannot_deliver_is_refused():
-    with pytest.raises(ConfigError, match=r"3000 mm3 of fuel need 16.98 mm of the plunger .* the cam lifts 14 mm"):
+    with pytest.raises(
+        ConfigError, match=r"3000 mm3 of fuel need 16.98 mm of the plunger .* the cam lifts 14 mm"
+    ):
         plunger_torque(PLUNGER, ANGLE, SPEED, 3e-6, 1.0)
 
 
@@ -146,8 +165,14 @@ def test_cams_that_cannot_be_are_refused(change, message):
         ({"diameter": 0.0}, "injection_pump.diameter_mm = 0 must be positive"),
         ({"opening_pressure": -1e6}, "injection_pump.opening_pressure_mpa = -1 must be positive"),
         ({"ramp_share": 0.6}, "injection_pump.ramp_share = 0.6 must be above 0 and at most 0.5"),
-        ({"indicated_efficiency": 1.0}, "injection_pump.indicated_efficiency = 1 must lie between 0 and 1"),
-        ({"lift_at_delivery": 0.014}, "injection_pump.lift_at_delivery_mm = 14 must be at least 0 and below"),
+        (
+            {"indicated_efficiency": 1.0},
+            "injection_pump.indicated_efficiency = 1 must lie between 0 and 1",
+        ),
+        (
+            {"lift_at_delivery": 0.014},
+            "injection_pump.lift_at_delivery_mm = 14 must be at least 0 and below",
+        ),
     ],
 )
 def test_plungers_that_cannot_be_are_refused(change, message):

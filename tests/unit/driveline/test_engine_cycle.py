@@ -23,7 +23,13 @@ from gensig.driveline.excitation.pressure import (
 )
 from gensig.errors import ConfigError
 
-CYLINDER = Cylinder(bore=0.17, stroke=0.195, crank_to_rod_ratio=0.257, compression_ratio=13.5, reciprocating_mass=11.0)
+CYLINDER = Cylinder(
+    bore=0.17,
+    stroke=0.195,
+    crank_to_rod_ratio=0.257,
+    compression_ratio=13.5,
+    reciprocating_mass=11.0,
+)
 CYCLE_OPTION = WiebeCycle(
     boost_pressure=3.2e5,
     exhaust_share=0.8,
@@ -144,9 +150,15 @@ def test_cylinders_that_cannot_be_are_refused(change, message):
 @pytest.mark.parametrize(
     ("change", "message"),
     [
-        ({"boost_pressure": 5e4}, "0 < ambient_pressure_mpa <= boost_pressure_mpa is needed, not 0.1, 0.05"),
+        (
+            {"boost_pressure": 5e4},
+            "0 < ambient_pressure_mpa <= boost_pressure_mpa is needed, not 0.1, 0.05",
+        ),
         ({"exponent": 1.0}, "exponent = 1 must lie in 1.1..1.67"),
-        ({"combustion_duration": np.radians(150)}, "combustion ends 138 degrees after top dead center"),
+        (
+            {"combustion_duration": np.radians(150)},
+            "combustion ends 138 degrees after top dead center",
+        ),
         ({"intake_closing": np.radians(-80)}, "intake_closing_deg = -80 must lie in -180..-90"),
         ({"shape": float("nan")}, "shape = nan must lie in"),
     ],
@@ -170,28 +182,66 @@ def test_a_measured_pressure_is_read_whatever_its_units_and_start(tmp_path):
     one = read_pressure(write(tmp_path, "crank_angle_deg,pressure_mpa", DEGREES, MEGAPASCAL), N)
     assert_allclose(one, 1e6 * (2.0 + np.cos(ANGLE / 2.0)), rtol=1e-4)
     (tmp_path / "b").mkdir()
-    other = write(tmp_path / "b", "pressure_gpa,crank_angle_rad", MEGAPASCAL * 1e-3, np.radians(DEGREES))
+    other = write(
+        tmp_path / "b", "pressure_gpa,crank_angle_rad", MEGAPASCAL * 1e-3, np.radians(DEGREES)
+    )
     assert_allclose(read_pressure(other, N), one, rtol=1e-9)
     (tmp_path / "c").mkdir()
     both_ends = np.append(DEGREES, 360.0), np.append(MEGAPASCAL, 1.0)
-    assert_allclose(read_pressure(write(tmp_path / "c", "crank_angle_deg,pressure_mpa", *both_ends), N), one, rtol=1e-9)
+    assert_allclose(
+        read_pressure(write(tmp_path / "c", "crank_angle_deg,pressure_mpa", *both_ends), N),
+        one,
+        rtol=1e-9,
+    )
 
 
 @pytest.mark.parametrize(
     ("header", "angle", "pressure", "message"),
     [
-        ("crank_angle_deg,pressure", DEGREES, MEGAPASCAL, "column pressure has no unit that fits; write pressure_mpa"),
-        ("crank_angle,pressure_mpa", DEGREES, MEGAPASCAL, "column crank_angle has no unit that fits"),
-        ("crank_angle_mm,pressure_mpa", DEGREES, MEGAPASCAL, "column crank_angle_mm has no unit that fits"),
+        (
+            "crank_angle_deg,pressure",
+            DEGREES,
+            MEGAPASCAL,
+            "column pressure has no unit that fits; write pressure_mpa",
+        ),
+        (
+            "crank_angle,pressure_mpa",
+            DEGREES,
+            MEGAPASCAL,
+            "column crank_angle has no unit that fits",
+        ),
+        (
+            "crank_angle_mm,pressure_mpa",
+            DEGREES,
+            MEGAPASCAL,
+            "column crank_angle_mm has no unit that fits",
+        ),
         ("angle_deg,pressure_mpa", DEGREES, MEGAPASCAL, "no column crank_angle"),
         ("crank_angle_deg,pressure_mpa", DEGREES[::-1], MEGAPASCAL, "row 3, crank_angle must rise"),
-        ("crank_angle_deg,pressure_mpa", DEGREES[:600], MEGAPASCAL[:600], "121 degrees without a point after row 601"),
-        ("crank_angle_deg,pressure_mpa", 2 * DEGREES, MEGAPASCAL, "runs over 1438 degrees, at most 720"),
-        ("crank_angle_deg,pressure_mpa", DEGREES, MEGAPASCAL - 2.0, "pressure is absolute and positive"),
+        (
+            "crank_angle_deg,pressure_mpa",
+            DEGREES[:600],
+            MEGAPASCAL[:600],
+            "121 degrees without a point after row 601",
+        ),
+        (
+            "crank_angle_deg,pressure_mpa",
+            2 * DEGREES,
+            MEGAPASCAL,
+            "runs over 1438 degrees, at most 720",
+        ),
+        (
+            "crank_angle_deg,pressure_mpa",
+            DEGREES,
+            MEGAPASCAL - 2.0,
+            "pressure is absolute and positive",
+        ),
         ("crank_angle_deg,pressure_mpa", DEGREES[:50], MEGAPASCAL[:50], "too short: 50 rows"),
     ],
 )
-def test_measured_pressures_that_make_no_cycle_are_refused(tmp_path, header, angle, pressure, message):
+def test_measured_pressures_that_make_no_cycle_are_refused(
+    tmp_path, header, angle, pressure, message
+):
     with pytest.raises(ConfigError, match=re.escape(message)) as caught:
         read_pressure(write(tmp_path, header, angle, pressure), N)
     assert str(caught.value).startswith("excitation.pressure.file = ")

@@ -60,7 +60,9 @@ def test_a_bank_angle_of_90_fires_18_and_54_degrees_apart():
 
 
 def test_a_parallel_twin_and_a_single_fire_a_turn_and_two_apart():
-    twin = Layout(banks=("A",), bank_angles=(0.0,), throw_angles=(0.0, 0.0), firing_order=("A1", "A2"))
+    twin = Layout(
+        banks=("A",), bank_angles=(0.0,), throw_angles=(0.0, 0.0), firing_order=("A1", "A2")
+    )
     assert_allclose(gaps(twin), 360.0)
     single = Layout(banks=("A",), bank_angles=(0.0,), throw_angles=(0.5,), firing_order=("A1",))
     assert_allclose(single.firing_angles()["A1"], 0.5)
@@ -72,7 +74,10 @@ def test_five_pairs_of_throws_72_degrees_apart_fire_two_at_a_time():
     for turn in range(2):
         for place in range(5):
             order += [f"A{place + 1 + 5 * turn}", f"B{(place - 1) % 5 + 1 + 5 * turn}"]
-    with pytest.raises(ConfigError, match=r"A1 and B5 fire together with these bank_angles_deg and throw_angles_deg"):
+    with pytest.raises(
+        ConfigError,
+        match=r"A1 and B5 fire together with these bank_angles_deg and throw_angles_deg",
+    ):
         replace(V20, throw_angles=throws, firing_order=tuple(order))
 
 
@@ -83,14 +88,22 @@ def test_five_pairs_of_throws_72_degrees_apart_fire_two_at_a_time():
             {"firing_order": (*V20.firing_order[:-1], "A1")},
             "firing_order repeats A1 (places 1 and 20); every cylinder fires once a cycle",
         ),
-        ({"firing_order": V20.firing_order[:-1]}, "firing_order lacks B7; every cylinder fires once"),
-        ({"firing_order": ("C1", *V20.firing_order[1:])}, "no cylinder 'C1' (place 1); there are A1 to B10"),
+        (
+            {"firing_order": V20.firing_order[:-1]},
+            "firing_order lacks B7; every cylinder fires once",
+        ),
+        (
+            {"firing_order": ("C1", *V20.firing_order[1:])},
+            "no cylinder 'C1' (place 1); there are A1 to B10",
+        ),
         ({"firing_order": V20.firing_order[::-1]}, "firing_order takes 6480 degrees"),
         ({"bank_angles": (0.0, 0.0)}, "firing_order takes 2520 degrees"),
         (
             {
                 "bank_angles": (0.0, 0.0),
-                "firing_order": tuple(f"{bank}{one[1:]}" for one in V20.firing_order if one[0] == "A" for bank in "AB"),
+                "firing_order": tuple(
+                    f"{bank}{one[1:]}" for one in V20.firing_order if one[0] == "A" for bank in "AB"
+                ),
             },
             "A1 and B1 fire together",
         ),

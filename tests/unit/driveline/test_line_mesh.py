@@ -29,12 +29,23 @@ BACKLASH = 1e-4
 
 def rippled(n_rows: int = 1, n_nodes: int = 32) -> np.ndarray:
     u = np.arange(n_rows * n_nodes).reshape(n_rows, n_nodes) / n_nodes
-    return STIFFNESS * (1 + 0.2 * np.cos(2 * np.pi * u) + (0.1 * np.cos(2 * np.pi * u / n_rows) if n_rows > 1 else 0))
+    return STIFFNESS * (
+        1
+        + 0.2 * np.cos(2 * np.pi * u)
+        + (0.1 * np.cos(2 * np.pi * u / n_rows) if n_rows > 1 else 0)
+    )
 
 
 def phases(**changes):
     return phase_mesh(
-        "m", **{"direction": DIRECTION, "roll_dof": 0, "n_teeth": TEETH, "stiffness": rippled(), **changes}
+        "m",
+        **{
+            "direction": DIRECTION,
+            "roll_dof": 0,
+            "n_teeth": TEETH,
+            "stiffness": rippled(),
+            **changes,
+        },
     )
 
 
@@ -55,21 +66,29 @@ class TestPhaseTable:
     def test_stiffness_repeats_with_every_tooth(self):
         for turned in (0.0, 0.25, 0.5, 7.5, -3.25, 12345.25):
             expected = BITE * STIFFNESS * (1 + 0.2 * math.cos(2 * math.pi * turned))
-            assert_allclose(law_at(phases(), turned, BITE)[layout.FORCE], expected, rtol=1e-9, atol=0)
+            assert_allclose(
+                law_at(phases(), turned, BITE)[layout.FORCE], expected, rtol=1e-9, atol=0
+            )
 
     def test_a_whole_turn_repeats_with_the_turn(self):
         table = rippled(TEETH[0])
         for turned in (0.0, 3.5, 19.75, 23.5):
             tooth, node = int(turned) % TEETH[0], round(turned % 1 * 32)
             expected = BITE * table[tooth, node]
-            assert_allclose(law_at(phases(stiffness=table), turned, BITE)[layout.FORCE], expected, rtol=1e-9, atol=0)
+            assert_allclose(
+                law_at(phases(stiffness=table), turned, BITE)[layout.FORCE],
+                expected,
+                rtol=1e-9,
+                atol=0,
+            )
 
     def test_no_jump_between_the_teeth_of_a_turn(self):
         mesh = phases(stiffness=rippled(TEETH[0]))
         for sign, approach in ((1, BITE), (-1, -BACKLASH - BITE)):
             for pitch in (1, 7, 20):
                 before, after = (
-                    law_at(replace(mesh, backlash=BACKLASH), pitch + off, approach)[0] for off in (-1e-9, 1e-9)
+                    law_at(replace(mesh, backlash=BACKLASH), pitch + off, approach)[0]
+                    for off in (-1e-9, 1e-9)
                 )
                 assert_allclose(after, before, rtol=1e-6, atol=0)
                 assert sign * after > 0
@@ -77,7 +96,12 @@ class TestPhaseTable:
     def test_a_gap_stands_between(self):
         mesh = phases(gap=np.full((1, 32), 2e-6))
         assert law_at(mesh, 0.3, 1.9e-6)[layout.FORCE] == pytest.approx(0.0, abs=0.0)
-        assert_allclose(law_at(mesh, 0.5, BITE)[layout.FORCE], 0.8 * STIFFNESS * (BITE - 2e-6), rtol=1e-9, atol=0)
+        assert_allclose(
+            law_at(mesh, 0.5, BITE)[layout.FORCE],
+            0.8 * STIFFNESS * (BITE - 2e-6),
+            rtol=1e-9,
+            atol=0,
+        )
 
     def test_nothing_within_the_backlash(self):
         mesh = phases(backlash=BACKLASH)
@@ -98,7 +122,9 @@ class TestPhaseTable:
         assert_allclose(fast[layout.LOST], 0.02 * still[layout.FORCE] * 10.0, rtol=1e-9, atol=0)
         assert law_at(mesh, 0.1, BITE, rate=-1e4)[layout.FORCE] == pytest.approx(0.0, abs=0.0)
         back = law_at(mesh, 0.1, -BACKLASH - BITE, rate=-10.0)
-        assert_allclose(back[layout.FORCE], 1.02 * law_at(mesh, 0.1, -BACKLASH - BITE)[0], rtol=1e-9, atol=0)
+        assert_allclose(
+            back[layout.FORCE], 1.02 * law_at(mesh, 0.1, -BACKLASH - BITE)[0], rtol=1e-9, atol=0
+        )
 
 
 class TestHelicalStatics:
@@ -107,7 +133,12 @@ class TestHelicalStatics:
     @pytest.fixture(scope="class")
     @classmethod
     def pair(cls):
-        words = ["system=helical_pair", "mesh.n_slices=12", "mesh.slice_coupling=independent", "mesh.contact=linear"]
+        words = [
+            "system=helical_pair",
+            "mesh.n_slices=12",
+            "mesh.slice_coupling=independent",
+            "mesh.contact=linear",
+        ]
         return read_sliced_pair(read_request(words).config)
 
     @pytest.fixture(scope="class")
@@ -123,7 +154,9 @@ class TestHelicalStatics:
 
     def test_it_is_where_statics_put_it(self, pair, contact, mesh):
         for place, approach in enumerate(contact.approach):
-            assert_allclose(law_at(mesh, place / 16, approach)[layout.FORCE], pair.mesh_force, rtol=1e-9, atol=0)
+            assert_allclose(
+                law_at(mesh, place / 16, approach)[layout.FORCE], pair.mesh_force, rtol=1e-9, atol=0
+            )
 
     def test_near_that_load_it_answers_as_statics_do(self, pair, contact, mesh):
         other = replace(pair, torque=1.02 * pair.torque).transmission_error(n_phases=16).contact
@@ -137,7 +170,9 @@ class TestPairs:
         """Every pair with its own teeth, the missing one too, and the shared body."""
         rolls = np.linspace(0.05, 30.05, 61)
         errors = dict(zip(("pinion_error", "wheel_error"), pairs.errors, strict=True))
-        found = static_mesh(table, pair_states(table, rolls * table.pair.base_pitch, **errors), 500.0)
+        found = static_mesh(
+            table, pair_states(table, rolls * table.pair.base_pitch, **errors), 500.0
+        )
         for turned, approach, load in zip(rolls, found.approach, found.load, strict=True):
             law = law_at(pairs, turned, approach)
             assert_allclose(law[layout.FORCE], load.sum(), rtol=2e-5, atol=0)
@@ -146,8 +181,12 @@ class TestPairs:
         """The mesh is softest where the pairs of tooth 2 would be, once a turn."""
         pairs = replace(pairs, errors=(pairs.errors[0], np.zeros(84)))
         for approach in (BITE * 4, -pairs.backlash - BITE * 4):
-            force = np.array([abs(law_at(pairs, turned, approach)[0]) for turned in np.arange(0.5, 23.5, 0.25)])
-            turn_on = np.array([abs(law_at(pairs, turned, approach)[0]) for turned in np.arange(23.5, 46.5, 0.25)])
+            force = np.array(
+                [abs(law_at(pairs, turned, approach)[0]) for turned in np.arange(0.5, 23.5, 0.25)]
+            )
+            turn_on = np.array(
+                [abs(law_at(pairs, turned, approach)[0]) for turned in np.arange(23.5, 46.5, 0.25)]
+            )
             lost = force < 0.7 * np.median(force)
             assert 0 < lost.sum() < 12
             assert np.array_equal(lost, turn_on < 0.7 * np.median(force))
@@ -156,7 +195,9 @@ class TestPairs:
     def test_the_force_along_the_roll_is_the_slope_of_what_is_stored(self, pairs, approach):
         for turned in (0.313, 2.711, 9.173):
             step = 1e-7
-            below, above = (law_at(pairs, turned + off, approach)[layout.STORED] for off in (-step, step))
+            below, above = (
+                law_at(pairs, turned + off, approach)[layout.STORED] for off in (-step, step)
+            )
             expected = -(above - below) / (2 * step)
             found = law_at(pairs, turned, approach)[layout.ALONG]
             assert_allclose(found, expected, rtol=1e-4, atol=1e-6)
@@ -175,13 +216,16 @@ class TestPairs:
 class TestPhasesBetweenMeshes:
     def test_a_gear_turned_on_by_a_tooth_stands_as_before(self):
         one, other = (
-            mesh_start(30, mate_angle=1.0, drives=True, tooth_angle=angle) for angle in (0.2, 0.2 + 2 * math.pi / 30)
+            mesh_start(30, mate_angle=1.0, drives=True, tooth_angle=angle)
+            for angle in (0.2, 0.2 + 2 * math.pi / 30)
         )
         assert_allclose(one[1], other[1], rtol=0, atol=1e-12)
         assert other[0] == (one[0] + 1) % 30
 
     def test_a_mate_a_tooth_further_on_meets_the_tooth_before(self):
-        one, other = (mesh_start(30, mate_angle=angle, drives=True) for angle in (1.0, 1.0 + 2 * math.pi / 30))
+        one, other = (
+            mesh_start(30, mate_angle=angle, drives=True) for angle in (1.0, 1.0 + 2 * math.pi / 30)
+        )
         assert_allclose(one[1], other[1], rtol=0, atol=1e-12)
         assert other[0] == (one[0] - 1) % 30
 

@@ -30,13 +30,29 @@ class TestLine:
         ("changes", "error", "told"),
         [
             ({"mass": np.eye(3)}, ConfigError, r"mass matrix \(3, 3\) must be \(2, 2\)"),
-            ({"mass": np.diag([1.0, 0.0])}, SimulationError, "inertia of 'second' must be positive"),
-            ({"stiffness": np.array([[1.0, 2.0], [0.0, 1.0]])}, SimulationError, "stiffness matrix is not symmetric"),
+            (
+                {"mass": np.diag([1.0, 0.0])},
+                SimulationError,
+                "inertia of 'second' must be positive",
+            ),
+            (
+                {"stiffness": np.array([[1.0, 2.0], [0.0, 1.0]])},
+                SimulationError,
+                "stiffness matrix is not symmetric",
+            ),
             ({"damping": -np.eye(2)}, SimulationError, "damping matrix would feed energy in"),
             ({"stiffness": np.full((2, 2), np.nan)}, ConfigError, "all finite"),
             ({"rotation": np.ones(3)}, ConfigError, r"rotation \(3,\) must be \(2,\)"),
-            ({"rotation": np.array([1.0, 0.51])}, ConfigError, "mesh 'pair': nominal rotation closes it by -0.001"),
-            ({"rotation": np.zeros(2)}, ConfigError, "roll_dof 0 must be the rotation of its gear a"),
+            (
+                {"rotation": np.array([1.0, 0.51])},
+                ConfigError,
+                "mesh 'pair': nominal rotation closes it by -0.001",
+            ),
+            (
+                {"rotation": np.zeros(2)},
+                ConfigError,
+                "roll_dof 0 must be the rotation of its gear a",
+            ),
         ],
     )
     def test_refused(self, changes, error, told):
@@ -75,7 +91,10 @@ class TestTorques:
         ("torque", "told"),
         [
             ({"dof": 5, "table": np.ones(1)}, r"degree of freedom 5 must lie in 0\.\.1"),
-            ({"dof": 0, "table": np.ones(1), "factor": np.ones(3)}, r"factor \(3,\) must be \(1,\)"),
+            (
+                {"dof": 0, "table": np.ones(1), "factor": np.ones(3)},
+                r"factor \(3,\) must be \(1,\)",
+            ),
         ],
     )
     def test_refused_by_the_line(self, torque, told):
@@ -97,17 +116,23 @@ class TestTorques:
 
     def test_an_angle_that_does_not_turn(self):
         line = replace(chain(2), rotation=np.array([1.0, 0.0]))
-        with refused(ConfigError, "torque on 'disc_1': a table over its angle needs a degree of freedom that turns"):
+        with refused(
+            ConfigError,
+            "torque on 'disc_1': a table over its angle needs a degree of freedom that turns",
+        ):
             run(line, [ShaftTorque(dof=1, table=np.ones(4))])
 
     def test_the_sense_is_that_of_rotation(self):
         """A line whose discs turn backwards moves as the mirror image of one that turns forwards."""
-        table = np.cos(np.arange(64) / 64 * 2 * np.pi) + 0.3 * np.sin(np.arange(64) / 32 * 2 * np.pi)
+        table = np.cos(np.arange(64) / 64 * 2 * np.pi) + 0.3 * np.sin(
+            np.arange(64) / 32 * 2 * np.pi
+        )
         torques, start = [ShaftTorque(dof=0, table=table)], (np.zeros(3), np.zeros(3))
         line, course = chain(3), constant_speed(300.0)
         mirrored = replace(line, rotation=-line.rotation)
         (q, *_), (q_1, *_) = (
-            state_after(one, start, 0.02, 800, torques=torques, course=course) for one in (line, mirrored)
+            state_after(one, start, 0.02, 800, torques=torques, course=course)
+            for one in (line, mirrored)
         )
         np.testing.assert_allclose(q_1, -q, rtol=1e-9, atol=0)
 
@@ -122,7 +147,10 @@ class TestRun:
             ({"channels": [("power", 0)]}, "no channel"),
             ({"duration": 0.0}, "hold no sample"),
             ({"lead_in": -1.0}, "or no start"),
-            ({"start": (np.zeros(3), np.zeros(3))}, r"start must be finite deviations and rates, \(2,\)"),
+            (
+                {"start": (np.zeros(3), np.zeros(3))},
+                r"start must be finite deviations and rates, \(2,\)",
+            ),
         ],
     )
     def test_refused(self, changes, told):
@@ -130,7 +158,13 @@ class TestRun:
             run(two_gears(), **changes)
 
     @pytest.mark.parametrize(
-        "changes", [{"sampling_rate": 0.0}, {"oversampling": 1}, {"oversampling": 1000}, {"max_energy_residual": 0.0}]
+        "changes",
+        [
+            {"sampling_rate": 0.0},
+            {"oversampling": 1},
+            {"oversampling": 1000},
+            {"max_energy_residual": 0.0},
+        ],
     )
     def test_solver(self, changes):
         with refused(ConfigError, "line solver"):
@@ -143,7 +177,10 @@ class TestRun:
     def test_energies_that_do_not_balance(self):
         """Elastic impacts in steps that are a third of what the contact lasts."""
         start = np.zeros(2), np.array([4.0, -1.0])
-        with refused(SimulationError, "the energy balance misses .* more than 0.001; raise the oversampling above 2"):
+        with refused(
+            SimulationError,
+            "the energy balance misses .* more than 0.001; raise the oversampling above 2",
+        ):
             run(two_gears(backlash=1e-4), start=start, solver=replace(SOLVER, oversampling=2))
 
     def test_divergence(self):
@@ -172,7 +209,9 @@ class TestRun:
         assert q[0] == pytest.approx(1e-3 / spring, rel=1e-6)
 
     def test_rest_of_an_unloaded_line_is_where_it_is(self):
-        assert np.abs(static_start(two_gears(backlash=1e-4), constant_speed(10.0), [])).max() < 1e-15
+        assert (
+            np.abs(static_start(two_gears(backlash=1e-4), constant_speed(10.0), [])).max() < 1e-15
+        )
 
     def test_what_drives_backwards_rests_on_the_back_flanks(self):
         line = two_gears(backlash=1e-4)
@@ -181,7 +220,8 @@ class TestRun:
 
 
 @pytest.mark.parametrize(
-    ("missed", "told"), [(0.0123456, "0.0123"), (1.0004e-3, "0.0010004"), (float("nan"), "nan"), (1e-3, "0.001")]
+    ("missed", "told"),
+    [(0.0123456, "0.0123"), (1.0004e-3, "0.0010004"), (float("nan"), "nan"), (1e-3, "0.001")],
 )
 def test_a_residual_just_above_what_is_allowed_reads_above_it(missed, told):
     assert _told_above(missed, 1e-3) == told

@@ -16,7 +16,12 @@ SUPPORT = Support(stiffness_x=1e8, stiffness_y=2e8, damping_x=10.0, damping_y=20
 
 def gear(name: str, node: int, n_teeth: int, module: float = 2e-3) -> LineGear:
     return LineGear(
-        name=name, node=node, n_teeth=n_teeth, base_radius=0.47 * module * n_teeth, mass=1.0, support=SUPPORT
+        name=name,
+        node=node,
+        n_teeth=n_teeth,
+        base_radius=0.47 * module * n_teeth,
+        mass=1.0,
+        support=SUPPORT,
     )
 
 
@@ -48,23 +53,34 @@ def test_an_idler_turns_the_other_way_and_does_not_change_the_ratio():
     line = ShaftLine(
         nodes=tuple(Node(name=name, inertia=1.0) for name in "abc"),
         gears=(gear("a", 0, 20), gear("b", 1, 37), gear("c", 2, 40)),
-        meshes=(GearMesh(driving=0, driven=1, stiffness=1.0), GearMesh(driving=1, driven=2, stiffness=1.0)),
+        meshes=(
+            GearMesh(driving=0, driven=1, stiffness=1.0),
+            GearMesh(driving=1, driven=2, stiffness=1.0),
+        ),
     )
     assert_allclose(line.speed_ratio, [1.0, -20 / 37, 0.5], rtol=1e-15, atol=0)
 
 
 def test_a_loop_that_turns_is_counted_and_one_that_locks_is_refused():
     nodes = tuple(Node(name=name, inertia=1.0) for name in ("in", "out"))
-    meshes = (GearMesh(driving=0, driven=1, stiffness=1e8), GearMesh(driving=2, driven=3, stiffness=1e8, place="row 7"))
+    meshes = (
+        GearMesh(driving=0, driven=1, stiffness=1e8),
+        GearMesh(driving=2, driven=3, stiffness=1e8, place="row 7"),
+    )
     gears = (gear("a", 0, 20), gear("b", 1, 40), gear("c", 0, 30), gear("d", 1, 60))
     assert ShaftLine(nodes=nodes, gears=gears, meshes=meshes).n_loops == 1
-    with pytest.raises(ConfigError, match=r"row 7: this joint closes a loop that locks.* out at -0\.491803.*at -0\.5"):
+    with pytest.raises(
+        ConfigError,
+        match=r"row 7: this joint closes a loop that locks.* out at -0\.491803.*at -0\.5",
+    ):
         ShaftLine(nodes=nodes, gears=(*gears[:3], gear("d", 1, 61)), meshes=meshes)
     with pytest.raises(ConfigError, match="loop that locks"):  # three gears in a ring turn no way
         ShaftLine(
             nodes=(*nodes, Node(name="third", inertia=1.0)),
             gears=tuple(gear(str(place), place, 20) for place in range(3)),
-            meshes=tuple(GearMesh(driving=a, driven=b, stiffness=1.0) for a, b in ((0, 1), (1, 2), (2, 0))),
+            meshes=tuple(
+                GearMesh(driving=a, driven=b, stiffness=1.0) for a, b in ((0, 1), (1, 2), (2, 0))
+            ),
         )
 
 
@@ -74,7 +90,9 @@ def test_what_falls_apart_has_a_part_and_a_rigid_motion_each():
     matrices = line_matrices(line)
     assert matrices.rigid.shape == (2, 4)
     assert_allclose(
-        matrices.whole_stiffness @ matrices.rigid.T, 0.0, atol=1e-9 * np.abs(matrices.whole_stiffness).max()
+        matrices.whole_stiffness @ matrices.rigid.T,
+        0.0,
+        atol=1e-9 * np.abs(matrices.whole_stiffness).max(),
     )
 
 
@@ -84,14 +102,21 @@ def test_matrices_are_what_the_parts_say():
     assert_allclose(np.diag(matrices.mass), [0.1, 1e-3, 5e-3, 8e-3, 2e-3], rtol=0, atol=0)
     assert_allclose(matrices.stiffness[:2, :2], 1e4 * np.array([[1, -1], [-1, 1]]), rtol=0, atol=0)
     assert_allclose(matrices.damping[:2, :2], 0.3 * np.array([[1, -1], [-1, 1]]), rtol=0, atol=0)
-    assert_allclose(matrices.loss_stiffness, 0.05 * matrices.stiffness * (np.arange(5) < 2), rtol=0, atol=0)
+    assert_allclose(
+        matrices.loss_stiffness, 0.05 * matrices.stiffness * (np.arange(5) < 2), rtol=0, atol=0
+    )
     radius = 0.47 * 2e-3
     assert_allclose(
-        matrices.directions, radius * np.array([[0, 20, -40, 0, 0], [0, 20, 0, -60, 0]]), rtol=1e-14, atol=0
+        matrices.directions,
+        radius * np.array([[0, 20, -40, 0, 0], [0, 20, 0, -60, 0]]),
+        rtol=1e-14,
+        atol=0,
     )
     assert_allclose(matrices.rigid, [[1, 1, 0.5, 1 / 3, 0.5]], rtol=1e-14, atol=0)
     assert_allclose(matrices.backlash, [1e-4, 0.0], rtol=0, atol=0)
-    assert_allclose(matrices.mesh_mass[1], radius**-2 / (20**2 / 1e-3 + 60**2 / 8e-3), rtol=1e-12, atol=0)
+    assert_allclose(
+        matrices.mesh_mass[1], radius**-2 / (20**2 / 1e-3 + 60**2 / 8e-3), rtol=1e-12, atol=0
+    )
 
 
 def test_a_rigid_compound_is_one_disc_for_integration():
@@ -99,12 +124,16 @@ def test_a_rigid_compound_is_one_disc_for_integration():
     assert matrices.names == ("motor", "pinion", "left + hub", "right")
     assert_allclose(np.diag(matrices.mass), [0.1, 1e-3, 7e-3, 8e-3], rtol=1e-14, atol=0)
     assert_allclose(matrices.expand @ [1, 2, 3, 4], [1, 2, 3, 4, 3], rtol=0, atol=0)
-    without = branched(shafts=(branched().shafts[0], Shaft(first=2, second=4, stiffness=None, rigid=True)))
+    without = branched(
+        shafts=(branched().shafts[0], Shaft(first=2, second=4, stiffness=None, rigid=True))
+    )
     assert len(line_matrices(without, merge_rigid=False).names) == 4
 
 
 def test_three_nodes_in_a_row_of_rigid_shafts_become_one():
-    rigid = tuple(Shaft(first=a, second=b, stiffness=None, rigid=True) for a, b in ((2, 3), (0, 1), (1, 2)))
+    rigid = tuple(
+        Shaft(first=a, second=b, stiffness=None, rigid=True) for a, b in ((2, 3), (0, 1), (1, 2))
+    )
     line = ShaftLine(nodes=tuple(Node(name=name, inertia=1.0) for name in "abcd"), shafts=rigid)
     assert line.compounds(merge_rigid=False) == ((0, 1, 2, 3),)
 
@@ -123,11 +152,17 @@ def test_lateral_motion_is_in_frames_along_the_first_mesh_of_a_gear():
     ("changes", "message"),
     [
         ({"nodes": ()}, "at least one node"),
-        ({"shafts": (Shaft(first=0, second=9, stiffness=1.0),)}, r"there is no node 9, only 0\.\.4"),
+        (
+            {"shafts": (Shaft(first=0, second=9, stiffness=1.0),)},
+            r"there is no node 9, only 0\.\.4",
+        ),
         ({"meshes": (GearMesh(driving=0, driven=3, stiffness=1.0),)}, "there is no gear 3"),
         ({"gears": (gear("a", 7, 20),), "meshes": ()}, "a: there is no node 7"),
         ({"gears": (gear("a", 0, 20), gear("b", 0, 40))}, "turn with the same node"),
-        ({"gears": (gear("a", 0, 20), gear("b", 1, 40, 3e-3), gear("c", 2, 40))}, "not as their teeth, 20 and 40"),
+        (
+            {"gears": (gear("a", 0, 20), gear("b", 1, 40, 3e-3), gear("c", 2, 40))},
+            "not as their teeth, 20 and 40",
+        ),
     ],
 )
 def test_what_joins_nothing_is_refused(changes, message):
@@ -139,15 +174,30 @@ def test_what_joins_nothing_is_refused(changes, message):
 @pytest.mark.parametrize(
     ("make", "message"),
     [
-        (lambda: Node(name="a", inertia=0.0, place="row 3"), "row 3: inertia 0 kg m2 must be positive"),
+        (
+            lambda: Node(name="a", inertia=0.0, place="row 3"),
+            "row 3: inertia 0 kg m2 must be positive",
+        ),
         (lambda: Node(name="a", inertia=float("nan")), "a: inertia nan"),
         (lambda: Shaft(first=1, second=1, stiffness=1.0), "joins a node to itself"),
         (lambda: Shaft(first=0, second=1, stiffness=None), "no stiffness"),
-        (lambda: Shaft(first=0, second=1, stiffness=-1.0), "stiffness -1 N m/rad must not be negative"),
+        (
+            lambda: Shaft(first=0, second=1, stiffness=-1.0),
+            "stiffness -1 N m/rad must not be negative",
+        ),
         (lambda: Shaft(first=0, second=1, stiffness=0.0), "neither stiffness nor damping"),
-        (lambda: Shaft(first=0, second=1, stiffness=1.0, damping=-1.0), "damping -1 must not be negative"),
-        (lambda: GearMesh(driving=0, driven=1, stiffness=0.0), "mesh stiffness 0 N/m must be positive"),
-        (lambda: GearMesh(driving=0, driven=1, stiffness=1.0, loss_factor=-0.1), "loss factor -0.1"),
+        (
+            lambda: Shaft(first=0, second=1, stiffness=1.0, damping=-1.0),
+            "damping -1 must not be negative",
+        ),
+        (
+            lambda: GearMesh(driving=0, driven=1, stiffness=0.0),
+            "mesh stiffness 0 N/m must be positive",
+        ),
+        (
+            lambda: GearMesh(driving=0, driven=1, stiffness=1.0, loss_factor=-0.1),
+            "loss factor -0.1",
+        ),
         (lambda: GearMesh(driving=0, driven=1, stiffness=1.0, backlash=-0.1), "backlash -0.1"),
         (lambda: replace(gear("a", 0, 20), n_teeth=0), r"a: teeth \(0\) and base radius"),
         (lambda: replace(gear("a", 0, 20), mass=0.0), "a: mass 0 kg"),
@@ -162,6 +212,9 @@ def test_lateral_motion_needs_mass_and_support():
     loose = (replace(gear("p", 1, 20), support=None), *branched().gears[1:])
     with pytest.raises(ConfigError, match="p: its lateral motion needs a mass and a support"):
         line_matrices(branched(gears=loose), lateral=True)
-    soft = (replace(gear("p", 1, 20), support=replace(SUPPORT, stiffness_x=0.0)), *branched().gears[1:])
+    soft = (
+        replace(gear("p", 1, 20), support=replace(SUPPORT, stiffness_x=0.0)),
+        *branched().gears[1:],
+    )
     with pytest.raises(ConfigError, match="p: its support needs stiffness along both axes"):
         line_matrices(branched(gears=soft), lateral=True)

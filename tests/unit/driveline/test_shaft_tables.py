@@ -36,7 +36,10 @@ def line_of(config, tmp_path):
     def make(shafting=SHAFTING, gears=GEARS, **keys):
         (tmp_path / "line.csv").write_text(shafting, encoding="utf-8")
         (tmp_path / "gears.csv").write_text(gears, encoding="utf-8")
-        files = {"shafting_csv": str(tmp_path / "line.csv"), "gears_csv": str(tmp_path / "gears.csv")}
+        files = {
+            "shafting_csv": str(tmp_path / "line.csv"),
+            "gears_csv": str(tmp_path / "gears.csv"),
+        }
         return read_drive_line(config.with_keys("system", **{**files, **keys}))
 
     return make
@@ -81,12 +84,22 @@ def test_rows_may_hold_only_a_joint_and_columns_stand_in_any_order(line_of):
     writer = csv.DictWriter(stream, list(reversed(rows[0])))
     writer.writeheader()
     for row in rows:
-        joint = ("stiffness_knm_per_rad", "edge_from", "edge_to", "edge_kind", "teeth_from", "teeth_to", "loss_factor")
+        joint = (
+            "stiffness_knm_per_rad",
+            "edge_from",
+            "edge_to",
+            "edge_kind",
+            "teeth_from",
+            "teeth_to",
+            "loss_factor",
+        )
         writer.writerow({key: "" if key in joint else value for key, value in row.items()})
     for row in rows[:3]:
         writer.writerow({key: "" if key in ("node", "name", "inertia_kg_m2", "speed_ratio") else value
                          for key, value in row.items()})  # fmt: skip
-    assert line_of(stream.getvalue()).line.speed_ratio.tolist() == line_of().line.speed_ratio.tolist()
+    assert (
+        line_of(stream.getvalue()).line.speed_ratio.tolist() == line_of().line.speed_ratio.tolist()
+    )
 
 
 def test_the_ring_of_a_viscous_damper_counts_half(line_of):
@@ -96,8 +109,14 @@ def test_the_ring_of_a_viscous_damper_counts_half(line_of):
 
 
 def test_a_bare_name_is_a_shipped_table():
-    assert len(read_shafting("key", "engine_shafting")) == len(read_shafting("key", "engine_shafting.csv")) == 67
-    assert {"engine_gears.csv", "engine_shafting.csv", "two_stage_gears.csv"} <= set(shipped_tables())
+    assert (
+        len(read_shafting("key", "engine_shafting"))
+        == len(read_shafting("key", "engine_shafting.csv"))
+        == 67
+    )
+    assert {"engine_gears.csv", "engine_shafting.csv", "two_stage_gears.csv"} <= set(
+        shipped_tables()
+    )
 
 
 def test_shafts_alone_need_no_gears(line_of):
@@ -155,7 +174,11 @@ def test_a_mistake_in_the_line_names_row_and_column(line_of, old, new, message):
 @pytest.mark.parametrize(
     ("old", "new", "message"),
     [
-        ("3,wheel,40", "3,wheel,41", r"line.csv, row 4 .*column teeth_to: 40, but on node 3 .* wheel with 41"),
+        (
+            "3,wheel,40",
+            "3,wheel,41",
+            r"line.csv, row 4 .*column teeth_to: 40, but on node 3 .* wheel with 41",
+        ),
         ("3,wheel,40", "9,wheel,40", r"gears.csv, row 3 .*column node: .* has no node 9"),
         ("3,wheel,40,2", "3,wheel,40,3", "pinion and wheel: .*normal_module differs"),
         ("3,wheel,40,2,20", "3,wheel,40,2,60", r"gears.csv, row 3 .*pressure_angle_deg = 60"),
@@ -164,7 +187,11 @@ def test_a_mistake_in_the_line_names_row_and_column(line_of, old, new, message):
         ("20,2,20,0,20", "20,2,20,95,20", "helix angle below 90 degrees"),
         ("20,2,20,0,20", "20,0,20,0,20", "module must be positive"),
         ("20,2,20,0,20", "20,2,20,0,", "column face_width_mm: it is empty"),
-        ("normal_module_mm", "normal_module", "column normal_module: its unit is missing; write normal_module_mm or"),
+        (
+            "normal_module_mm",
+            "normal_module",
+            "column normal_module: its unit is missing; write normal_module_mm or",
+        ),
         ("3,wheel", "4,spare,40,2,20,0,20\n3,wheel", r"row 3 .*spare meshes with nothing"),
         ("3,wheel", "3,twin,40,2,20,0,20\n3,wheel", "column teeth_to: node 3 has 2 such gears"),
     ],
@@ -193,21 +220,32 @@ def test_a_table_without_content_is_refused(line_of, text, message):
 def test_gears_that_lock_are_named(line_of):
     ring = SHAFTING + ",,,,900,3,2,gear_mesh,39,19,\n"
     gears = GEARS + "3,second,39,2,20,0,20\n2,other,19,2,20,0,20\n"
-    with pytest.raises(ConfigError, match=r"row 7, column edge_to: this joint closes a loop that locks"):
+    with pytest.raises(
+        ConfigError, match=r"row 7, column edge_to: this joint closes a loop that locks"
+    ):
         line_of(ring, gears)
 
 
 @pytest.mark.parametrize(
     ("keys", "message"),
     [
-        ({"shafting_csv": None}, "system.shafting_csv is required: give a path, or one of engine_gears.csv"),
+        (
+            {"shafting_csv": None},
+            "system.shafting_csv is required: give a path, or one of engine_gears.csv",
+        ),
         ({"shafting_csv": "not_there.csv"}, "not_there.csv cannot be read: No such file"),
         ({"gears_csv": None}, "node 3 has no gear to derive it from"),
         ({"backlash_um": -1}, "system.backlash_um = -1 must not be negative"),
         ({"lateral": 1}, "system.lateral = 1 is not true or false"),
-        ({"loss_factor": {"shaft": 3, "coupling": 0, "gear_mesh": 0}}, "system.loss_factor.shaft = 3 must lie in 0..2"),
+        (
+            {"loss_factor": {"shaft": 3, "coupling": 0, "gear_mesh": 0}},
+            "system.loss_factor.shaft = 3 must lie in 0..2",
+        ),
         ({"loss_factor": {"shaft": 0}}, "system.loss_factor: missing coupling, gear_mesh"),
-        ({"campbell": {"low_speed_rpm": 9, "high_speed_rpm": 3, "orders": [1]}}, "low_speed_rpm must lie between"),
+        (
+            {"campbell": {"low_speed_rpm": 9, "high_speed_rpm": 3, "orders": [1]}},
+            "low_speed_rpm must lie between",
+        ),
         ({"campbell": {"low_speed_rpm": 0, "high_speed_rpm": 3, "orders": [0]}}, "all positive"),
         ({"campbell": {"low_speed_rpm": 0, "high_speed_rpm": 3, "orders": []}}, "all positive"),
         ({"support": None}, "system.support = None must be a group of keys"),
@@ -219,7 +257,9 @@ def test_a_mistake_in_the_keys_is_one_line(line_of, keys, message):
         line_of(**keys)
 
 
-@pytest.mark.parametrize(("key", "value"), [("force_n", 0), ("damping_ratio", 1.5), ("bearing", 3), ("shaft", {})])
+@pytest.mark.parametrize(
+    ("key", "value"), [("force_n", 0), ("damping_ratio", 1.5), ("bearing", 3), ("shaft", {})]
+)
 def test_a_mistake_in_the_supports_is_one_line(line_of, config, key, value):
     with pytest.raises(ConfigError, match=f"system.support.{key}"):
         line_of(support={**config["system"]["support"], key: value})

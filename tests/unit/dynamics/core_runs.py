@@ -37,7 +37,9 @@ class CoreRun:
         self.state = np.zeros((2, len(machines[0].dofs), n), dtype=precision)
         self.lost, self.fresh = np.zeros(n, dtype=precision), np.ones(n, dtype=precision)
         self.now = first_step
-        self.work, self.wide, self.near = _kernels.scratch(self.state.shape[1], len(channels), precision)
+        self.work, self.wide, self.near = _kernels.scratch(
+            self.state.shape[1], len(channels), precision
+        )
         for lane in range(n):
             self.begin(lane)
 
@@ -55,7 +57,9 @@ class CoreRun:
     def begin(self, lane: int) -> None:
         """Put one lane at rest where it would stand now."""
         self.state[:, :, lane] = 0.0
-        self.state[0, :, lane] = self.machines[lane].static_start(self.now * self.step) - self.group.rest[:, lane]
+        self.state[0, :, lane] = (
+            self.machines[lane].static_start(self.now * self.step) - self.group.rest[:, lane]
+        )
         self.center[lane], self.fresh[lane] = 0.0, 1.0
 
     def advance(self, n_steps: int) -> np.ndarray:

@@ -45,9 +45,18 @@ def test_a_change_of_what_is_called_is_noticed(tmp_path: Path) -> None:
 
     def asked(called: str) -> list[str]:
         (package / "_called.py").write_text(called)
-        told = {**os.environ, "PYTHONPATH": str(tmp_path), "NUMBA_CACHE_DIR": str(tmp_path / "cache")}
+        told = {
+            **os.environ,
+            "PYTHONPATH": str(tmp_path),
+            "NUMBA_CACHE_DIR": str(tmp_path / "cache"),
+        }
         done = subprocess.run(
-            [sys.executable, "-c", ASK], env=told, cwd=tmp_path, capture_output=True, text=True, check=True
+            [sys.executable, "-c", ASK],
+            env=told,
+            cwd=tmp_path,
+            capture_output=True,
+            text=True,
+            check=True,
         )
         return done.stdout.split()
 

@@ -14,7 +14,12 @@ from gensig.faults.broken import MissingTooth
 
 STEP, N_STEPS = 1 / (51200 * 5), 3000
 PAPER = {"mesh.law": "paper", "mesh.pair_coupling": "sum", "mesh.contact": "linear"}
-CUTS = [(1, 2, 997, 2000), (0, 1500, 0, 1500), (7,) * 428 + (4,), (255, 1, 1, 254, 1, 1, 1, 254, 2232)]
+CUTS = [
+    (1, 2, 997, 2000),
+    (0, 1500, 0, 1500),
+    (7,) * 428 + (4,),
+    (255, 1, 1, 254, 1, 1, 1, 254, 2232),
+]
 PINION_TURN, WHEEL_TURN = 2, 5
 
 
@@ -22,7 +27,16 @@ PINION_TURN, WHEEL_TURN = 2, 5
 def machines(request, machine, dynamics_of):
     """Eight machines of one law: sound and with a missing tooth, light and loaded, fast and slow."""
     law = {} if request.param == "one_sided" else PAPER
-    conditions = [(1800, 20), (2500, 2), (1300, 5), (900, 60), (3600, 20), (1800, 1), (600, 30), (5000, 8)]
+    conditions = [
+        (1800, 20),
+        (2500, 2),
+        (1300, 5),
+        (900, 60),
+        (3600, 20),
+        (1800, 1),
+        (600, 30),
+        (5000, 8),
+    ]
     return [
         dynamics_of(
             machine({**law, "operating.speed_rpm": speed, "operating.torque_nm": torque}),
@@ -56,15 +70,21 @@ class TestPieces:
     @pytest.mark.parametrize("pieces", CUTS)
     def test_together_make_the_whole(self, machines, whole, pieces):
         assert sum(pieces) == N_STEPS > 10 * RECENTER
-        assert [one.tobytes() for one in motion(machines, pieces)] == [one.tobytes() for one in whole]
+        assert [one.tobytes() for one in motion(machines, pieces)] == [
+            one.tobytes() for one in whole
+        ]
 
     def test_a_lane_begins_anew_beside_others_that_go_on(self, machines, whole):
-        state, means, _ = motion(machines, (801, 1199, 1000), begins=(0, 801, 0, 2000, 0, 0, 801, 0))
+        state, means, _ = motion(
+            machines, (801, 1199, 1000), begins=(0, 801, 0, 2000, 0, 0, 801, 0)
+        )
         others = [0, 2, 4, 5, 7]
         assert state[..., others].tobytes() == whole[0][..., others].tobytes()
         assert means[..., others].tobytes() == whole[1][..., others].tobytes()
         for lane, begin in ((1, 801), (3, 2000), (6, 801)):
-            alone = motion([machines[lane]] * LANES, (begin, N_STEPS - begin), begins=(begin,) * LANES)
+            alone = motion(
+                [machines[lane]] * LANES, (begin, N_STEPS - begin), begins=(begin,) * LANES
+            )
             assert state[..., lane].tobytes() == alone[0][..., 0].tobytes()
             assert means[begin:, :, lane].tobytes() == alone[1][begin:, :, 0].tobytes()
 
@@ -87,7 +107,13 @@ class TestRecentring:
     def twins(cls, xiamen, dynamics_of):
         """One machine, and the same whose time began ``SHIFT`` steps earlier, from where the first stands."""
         one = dynamics_of(xiamen, phase=0.3)
-        ahead = one.operating.speed * cls.SHIFT * STEP * one.table.pair.pinion.base_radius / one.table.pair.base_pitch
+        ahead = (
+            one.operating.speed
+            * cls.SHIFT
+            * STEP
+            * one.table.pair.pinion.base_radius
+            / one.table.pair.base_pitch
+        )
         return one, replace(one, start_phase=0.3 - ahead)
 
     @staticmethod
@@ -103,7 +129,9 @@ class TestRecentring:
         return np.array(whole), np.array(bare)
 
     def test_the_motion_goes_on(self, twins):
-        here, there = (self.walk(one, first) for one, first in zip(twins, (0, self.SHIFT), strict=True))
+        here, there = (
+            self.walk(one, first) for one, first in zip(twins, (0, self.SHIFT), strict=True)
+        )
         level = np.abs(here[0]).max(axis=0)
         assert_allclose(here[0] / level, there[0] / level, rtol=0, atol=1e-11)
         # the same instants: a state that was taken together, and one that was not
@@ -134,7 +162,9 @@ class TestBlocks:
     def test_samples_are_those_of_one_low_pass_over_all_means(self, machines, n_samples):
         low_pass = decimator(self.N_FACTOR)
         first = -low_pass.margin * self.N_FACTOR - 1
-        run, whole = (CoreRun(machines, STEP, first_step=first, channels=(0, 1, 5)) for _ in range(2))
+        run, whole = (
+            CoreRun(machines, STEP, first_step=first, channels=(0, 1, 5)) for _ in range(2)
+        )
         found, _ = run.record(low_pass, n_samples)
         means = whole.advance((n_samples + 2 * low_pass.margin) * self.N_FACTOR + 1)
         assert found.tobytes() == low_pass.apply(means).tobytes()

@@ -28,7 +28,9 @@ ROTORS = {"system.motor.inertia_kg_m2": 5e-4, "system.load.inertia_kg_m2": 5e-3}
 
 @pytest.fixture(scope="module")
 def run(machine):
-    return lambda changes=None, faults=(): Run(system=machine({**QUICK, **(changes or {})}), faults=tuple(faults))
+    return lambda changes=None, faults=(): Run(
+        system=machine({**QUICK, **(changes or {})}), faults=tuple(faults)
+    )
 
 
 @pytest.fixture(scope="module")
@@ -61,9 +63,14 @@ class TestSteady:
 
     def test_a_factor_is_another_set_speed(self, record):
         """All but the drive's lead and the mesh damping, which are those of the set speed and torque anyway."""
-        found, expected = record({SPEED: [[0, 1.5], [1, 1.5]]}), record({"operating.speed_rpm": 2700})
+        found, expected = (
+            record({SPEED: [[0, 1.5], [1, 1.5]]}),
+            record({"operating.speed_rpm": 2700}),
+        )
         level = expected.acceleration.std(axis=1, keepdims=True)
-        assert_allclose(found.acceleration / level, expected.acceleration / level, rtol=0, atol=1e-6)
+        assert_allclose(
+            found.acceleration / level, expected.acceleration / level, rtol=0, atol=1e-6
+        )
         assert_allclose(found.mean_speed, expected.mean_speed, rtol=1e-9, atol=0)
 
     def test_the_shaft_turns_at_the_set_speed(self, steady):
@@ -78,7 +85,9 @@ class TestSteady:
         assert_allclose(long.shaft_angle[:n], short.shaft_angle, rtol=0, atol=1e-9)
         expected = (long.shaft_angle[n] - long.shaft_angle[0]) * RATE / n
         assert_allclose(short.mean_speed, expected, rtol=1e-9, atol=0)
-        assert_allclose(short.mean_speed, np.diff(short.shaft_angle).mean() * RATE, rtol=1e-3, atol=0)
+        assert_allclose(
+            short.mean_speed, np.diff(short.shaft_angle).mean() * RATE, rtol=1e-3, atol=0
+        )
 
 
 class TestRamp:
@@ -95,13 +104,21 @@ class TestRamp:
         (found,) = simulate_together([ramp])
         assert np.isfinite(found.acceleration).all()
         n = len(found.shaft_angle)
-        lag = (still.shaft_angle - SET_SPEED * np.arange(n) / RATE) - (found.shaft_angle - turned(ramp, n))
-        twist = self.ACCELERATION * pair_dynamics(ramp).reduced_inertia / pair_dynamics(ramp).drive_stiffness
+        lag = (still.shaft_angle - SET_SPEED * np.arange(n) / RATE) - (
+            found.shaft_angle - turned(ramp, n)
+        )
+        twist = (
+            self.ACCELERATION
+            * pair_dynamics(ramp).reduced_inertia
+            / pair_dynamics(ramp).drive_stiffness
+        )
         if rotors:  # the motor is what the drive holds; its coupling turns the pinion further back
             driven = pair_dynamics(ramp).reduced_inertia - ramp.system.motor.inertia
             twist += self.ACCELERATION * driven / ramp.system.motor.coupling_stiffness
         else:
-            assert_allclose(twist, self.ACCELERATION / (2 * math.pi * DRIVE) ** 2, rtol=1e-12, atol=0)
+            assert_allclose(
+                twist, self.ACCELERATION / (2 * math.pi * DRIVE) ** 2, rtol=1e-12, atol=0
+            )
         assert_allclose(lag.mean(), twist, rtol=2e-3, atol=0)
         assert np.ptp(lag) < 0.05 * twist
 
@@ -138,7 +155,9 @@ class TestTorque:
             while core.now < round((begin + 4 * period) / self.STEP):
                 core.advance(1)
                 deflection.append(core.whole[0, PINION_Y, 0])
-            shares.append(np.mean(deflection) * dynamics.pinion.support.stiffness_y / dynamics.mesh_force)
+            shares.append(
+                np.mean(deflection) * dynamics.pinion.support.stiffness_y / dynamics.mesh_force
+            )
         return shares
 
     @pytest.mark.parametrize("factor", [0.3, 1.0, 1.8])
@@ -174,7 +193,10 @@ class TestNeighbours:
 
     def test_beside_others_that_settle_longer(self, run):
         """The course of all is tabled from when the slowest begins."""
-        changing = {SPEED: [[-0.1, 0.8], [0.01, 0.9], [0.03, 1.2]], TORQUE: [[0.0, 1.0], [0.02, 1.1]]}
+        changing = {
+            SPEED: [[-0.1, 0.8], [0.01, 0.9], [0.03, 1.2]],
+            TORQUE: [[0.0, 1.0], [0.02, 1.1]],
+        }
         runs = [run({**changing, "operating.drive_frequency_hz": rate}) for rate in (20, 5, 7.3)]
         expected = [simulate_together([one])[0] for one in runs]
         for order in list(permutations(range(3)))[::2]:
@@ -186,7 +208,13 @@ def test_rotors_move_and_stay_finite(run):
     """Eight degrees of freedom, on a ramp of speed and torque; every channel lives."""
     channels = ("pinion_y", "pinion_rotation", "wheel_rotation", "motor_rotation", "load_rotation")
     one = run({**ROTORS, SPEED: RAMP, TORQUE: RAMP, "sensing.channels": list(channels)}, MISSING)
-    motions = integrate([pair_dynamics(one)], one.system.solver, sampling_rate=RATE, duration=0.03, channels=channels)
+    motions = integrate(
+        [pair_dynamics(one)],
+        one.system.solver,
+        sampling_rate=RATE,
+        duration=0.03,
+        channels=channels,
+    )
     assert motions.finite.all()
     assert np.isfinite(motions.acceleration).all()
     assert (motions.acceleration.std(axis=-1) > 1.0).all()

@@ -8,7 +8,14 @@ import pytest
 from numpy.testing import assert_allclose
 
 from gensig.dynamics._vector import LANES, n_lanes
-from gensig.dynamics.decimation import ATTENUATION_DB, STORED, decimator, design, in_band_error, usable_band
+from gensig.dynamics.decimation import (
+    ATTENUATION_DB,
+    STORED,
+    decimator,
+    design,
+    in_band_error,
+    usable_band,
+)
 
 RATE = 51200.0
 N_SAMPLES = 2048
@@ -21,7 +28,15 @@ def oversampling(request):
 
 def side_by_side(signals):
     """(channel, step) in the first lane, something else in the others, as (step, channel, lane)."""
-    others = [-signals, signals + 1.0, 0.0 * signals, 2.0 * signals, signals - 1.0, -3.0 * signals, 1.0 - signals]
+    others = [
+        -signals,
+        signals + 1.0,
+        0.0 * signals,
+        2.0 * signals,
+        signals - 1.0,
+        -3.0 * signals,
+        1.0 - signals,
+    ]
     return np.stack([signals, *others], axis=-1).transpose(1, 0, 2)
 
 
@@ -29,7 +44,9 @@ def decimated(frequency, oversampling, phase=0.4):
     """A sine, as means over internal steps, through the decimator, and the same sine sampled at the output rate."""
     low_pass = decimator(oversampling)
     begin = -low_pass.margin * oversampling - 1
-    edge = np.arange(begin, (N_SAMPLES + low_pass.margin) * oversampling + 1) / (RATE * oversampling)
+    edge = np.arange(begin, (N_SAMPLES + low_pass.margin) * oversampling + 1) / (
+        RATE * oversampling
+    )
     turn = 2 * np.pi * frequency
     integral = -np.cos(turn * edge + phase) / turn if frequency else edge * np.sin(phase)
     signal = np.diff(integral) * RATE * oversampling
@@ -71,9 +88,17 @@ def test_channels_and_lanes_are_filtered_by_themselves(n_samples, oversampling):
     """Against the plain sum of taps times means, whatever number of taps is left over after the fours."""
     low_pass, rng = decimator(oversampling), np.random.default_rng(2)
     for taps in (low_pass.taps, low_pass.taps[:-1], low_pass.taps[:-3]):
-        means = rng.standard_normal(((n_samples + 2 * low_pass.margin) * oversampling + 1, 3, LANES))
+        means = rng.standard_normal(
+            ((n_samples + 2 * low_pass.margin) * oversampling + 1, 3, LANES)
+        )
         expected = [
-            [[taps @ means[1 + s * oversampling :, c, lane][: len(taps)] for s in range(n_samples)] for c in range(3)]
+            [
+                [
+                    taps @ means[1 + s * oversampling :, c, lane][: len(taps)]
+                    for s in range(n_samples)
+                ]
+                for c in range(3)
+            ]
             for lane in range(LANES)
         ]
         assert_allclose(replace(low_pass, taps=taps).apply(means), expected, rtol=0, atol=1e-14)
@@ -114,7 +139,9 @@ def test_the_default_and_its_check_are_stored(composed_config):
 def test_in_float32_the_sums_keep_six_digits(oversampling):
     """Sixteen lanes; the samples come back in float64."""
     low_pass, rng = decimator(oversampling), np.random.default_rng(5)
-    means = rng.standard_normal(((20 + 2 * low_pass.margin) * oversampling + 1, 2, n_lanes("float32")))
+    means = rng.standard_normal(
+        ((20 + 2 * low_pass.margin) * oversampling + 1, 2, n_lanes("float32"))
+    )
     found = low_pass.apply(means.astype(np.float32))
     assert found.dtype == np.float64
     assert found.shape == (n_lanes("float32"), 2, 20)
@@ -127,8 +154,12 @@ def test_every_step_that_is_allowed_has_its_low_pass(finest):
     """And so has half of it, by which the error is found; that one must not reach further."""
     coarse, fine = decimator(finest), decimator(2 * finest)
     assert fine.margin <= coarse.margin
-    frequency = np.array([0.0, usable_band(RATE)[1], 0.5 * RATE, 0.7 * RATE, (0.5 * 2 * finest - 0.3) * RATE])
-    turn = np.exp(-2j * np.pi * np.outer(frequency / (2 * finest * RATE), np.arange(len(fine.taps))))
+    frequency = np.array(
+        [0.0, usable_band(RATE)[1], 0.5 * RATE, 0.7 * RATE, (0.5 * 2 * finest - 0.3) * RATE]
+    )
+    turn = np.exp(
+        -2j * np.pi * np.outer(frequency / (2 * finest * RATE), np.arange(len(fine.taps)))
+    )
     gain = np.abs(turn @ fine.taps) * np.sinc(frequency / (2 * finest * RATE))
     assert_allclose(gain[:2], 1.0, rtol=0, atol=10 ** (0.01 / 20) - 1)
     assert gain[2:].max() < 10 ** ((3 - ATTENUATION_DB) / 20)
@@ -152,7 +183,10 @@ class TestInBandError:
 
     def test_is_relative_to_the_level_of_its_channel(self):
         exact = np.array([[self.tones((1000, 1.0)), self.tones((3000, 200.0))]] * 2)
-        off = [[self.tones((5000, 1e-3)), self.tones((5000, 1e-2))], [self.tones((5000, 2e-5)), 0 * self.TIME]]
+        off = [
+            [self.tones((5000, 1e-3)), self.tones((5000, 1e-2))],
+            [self.tones((5000, 2e-5)), 0 * self.TIME],
+        ]
         assert_allclose(self.error(np.add(exact, off), exact), [1e-3, 2e-5], rtol=1e-2, atol=0)
 
     def test_is_that_of_the_worst_channel(self):

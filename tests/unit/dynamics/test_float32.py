@@ -47,7 +47,12 @@ def run(machine):
 
 
 def bits(record):
-    return record.acceleration.tobytes(), record.shaft_angle.tobytes(), record.mean_speed, record.contact_loss_fraction
+    return (
+        record.acceleration.tobytes(),
+        record.shaft_angle.tobytes(),
+        record.mean_speed,
+        record.contact_loss_fraction,
+    )
 
 
 def alone(runs):
@@ -58,7 +63,10 @@ class TestAgreement:
     @pytest.fixture(scope="class", params=CASES)
     @classmethod
     def records(cls, request, run):
-        return [simulate_together([run(*CASES[request.param], name)])[0] for name in ("float32", "float64")]
+        return [
+            simulate_together([run(*CASES[request.param], name)])[0]
+            for name in ("float32", "float64")
+        ]
 
     def test_of_the_signal_in_its_band(self, records):
         """Measured: 1e-6 to 7e-6 of a channel's level, what rounding shakes; at 600 r/min, less level, 1.2e-5."""
@@ -70,7 +78,9 @@ class TestAgreement:
     def test_of_what_the_run_tells(self, records):
         single, double = records
         assert_allclose(single.mean_speed, double.mean_speed, rtol=1e-8, atol=0)
-        assert_allclose(single.contact_loss_fraction, double.contact_loss_fraction, rtol=1e-3, atol=0)
+        assert_allclose(
+            single.contact_loss_fraction, double.contact_loss_fraction, rtol=1e-3, atol=0
+        )
         assert np.abs(single.shaft_angle - double.shaft_angle).max() < 1e-7
 
 
@@ -91,10 +101,30 @@ class TestBits:
         errors = np.random.default_rng(8).normal(0, 3e-6, (2, 84))
         return [
             run(BRIEF, start=Start(tooth_pinion=5, tooth_wheel=60, phase=0.7)),
-            run({**BRIEF, "operating.torque_nm": 2, "operating.speed_rpm": 2500, "gear.backlash_um": 4}, MISSING),
+            run(
+                {
+                    **BRIEF,
+                    "operating.torque_nm": 2,
+                    "operating.speed_rpm": 2500,
+                    "gear.backlash_um": 4,
+                },
+                MISSING,
+            ),
             run({**BRIEF, "mesh.points_per_pitch": 64, "operating.drive_frequency_hz": 9}),
-            run(BRIEF, [one("crack", tooth=4)], specimen=Specimen(pinion_error=errors[0, :23], wheel_error=errors[1])),
-            run({**BRIEF, "operating.torque_nm": 0.5, "gear.backlash_um": 3, "operating.speed_rpm": 3000}, MISSING),
+            run(
+                BRIEF,
+                [one("crack", tooth=4)],
+                specimen=Specimen(pinion_error=errors[0, :23], wheel_error=errors[1]),
+            ),
+            run(
+                {
+                    **BRIEF,
+                    "operating.torque_nm": 0.5,
+                    "gear.backlash_um": 3,
+                    "operating.speed_rpm": 3000,
+                },
+                MISSING,
+            ),
         ]
 
     @pytest.fixture(scope="class")
@@ -124,7 +154,9 @@ class TestBits:
         runs = [run(law), run(law, MISSING), run({**law, "mesh.points_per_pitch": 64})]
         expected = alone(runs)
         for order in ((0, 1, 2), (2, 1, 0)):
-            assert [bits(one) for one in simulate_together([runs[k] for k in order])] == [expected[k] for k in order]
+            assert [bits(one) for one in simulate_together([runs[k] for k in order])] == [
+                expected[k] for k in order
+            ]
 
 
 def test_taking_rotations_together_keeps_the_whole(xiamen, dynamics_of):

@@ -19,7 +19,12 @@ from gensig.sensing.manufacturing import nominal_gearbox
 from gensig.systems.supports import in_gearbox
 from gensig.units import is_turning, read
 
-SUPPORT = {"stiffness_x_n_per_m": 1e8, "stiffness_y_n_per_m": 1e8, "damping_x_ns_per_m": 1.0, "damping_y_ns_per_m": 1.0}
+SUPPORT = {
+    "stiffness_x_n_per_m": 1e8,
+    "stiffness_y_n_per_m": 1e8,
+    "damping_x_ns_per_m": 1.0,
+    "damping_y_ns_per_m": 1.0,
+}
 AXIAL = {"stiffness_z_n_per_m": 2e7, "stiffness_tilt_nm_per_rad": 3e4, "damping_z_ns_per_m": 5.0,
          "damping_tilt_nms_per_rad": 0.1}  # fmt: skip
 
@@ -38,7 +43,9 @@ def test_a_support_takes_axial_keys_or_none(xiamen):
     assert_allclose(read(Support, SUPPORT, "support").stiffness_z, 0.0, rtol=0, atol=0)
     found = read(Support, {**SUPPORT, **AXIAL}, "support")
     assert_allclose(
-        [found.stiffness_z, found.stiffness_tilt, found.damping_z, found.damping_tilt], [2e7, 3e4, 5.0, 0.1], rtol=1e-12
+        [found.stiffness_z, found.stiffness_tilt, found.damping_z, found.damping_tilt],
+        [2e7, 3e4, 5.0, 0.1],
+        rtol=1e-12,
     )
 
 
@@ -104,7 +111,9 @@ def test_more_pairs_than_are_followed_are_refused(helical):
 
 def test_channels_along_the_axis_are_those_of_helical_gears(helical, spur):
     check_channels(("pinion_z", "wheel_z"), helical.dofs)
-    with pytest.raises(ConfigError, match=r"sensing\.channels: no channel pinion_z; allowed: pinion_x"):
+    with pytest.raises(
+        ConfigError, match=r"sensing\.channels: no channel pinion_z; allowed: pinion_x"
+    ):
         check_channels(("pinion_z",), spur.dofs)
     assert [name for name in helical.dofs if is_turning(name)] == [
         "pinion_rotation", "wheel_rotation", "pinion_tilt_x", "pinion_tilt_y", "wheel_tilt_x", "wheel_tilt_y"

@@ -61,9 +61,17 @@ def mix(run):
         gaps = law.get("mesh.law") != "paper"
         pinion, wheel = np.random.default_rng(8).normal(0, 3e-6, (2, 84))
         return [
-            run({**law, "operating.speed_rpm": 1300}, start=Start(tooth_pinion=5, tooth_wheel=60, phase=0.7)),
             run(
-                {**law, "operating.torque_nm": 2, "operating.speed_rpm": 2500, "gear.backlash_um": 4},
+                {**law, "operating.speed_rpm": 1300},
+                start=Start(tooth_pinion=5, tooth_wheel=60, phase=0.7),
+            ),
+            run(
+                {
+                    **law,
+                    "operating.torque_nm": 2,
+                    "operating.speed_rpm": 2500,
+                    "gear.backlash_um": 4,
+                },
                 TWO_MISSING if gaps else MISSING,
                 specimen=Specimen(
                     pinion_error=pinion[:23],
@@ -77,17 +85,37 @@ def mix(run):
                 {**law, "operating.torque_nm": 60},
                 [one("crack", tooth=4), one("pitch_error", gear="wheel", tooth=3)] if gaps else (),
                 gearbox=Gearbox(
-                    stiffness_factor=np.array([1.1, 0.9, 1.0, 1.2]), damping_factor=np.full(4, 0.9), gain=np.ones(4)
+                    stiffness_factor=np.array([1.1, 0.9, 1.0, 1.2]),
+                    damping_factor=np.full(4, 0.9),
+                    gain=np.ones(4),
                 ),
             ),
-            run({**law, "operating.torque_nm": 0.5, "gear.backlash_um": 3, "operating.speed_rpm": 3000}, MISSING),
-            run({**law, "operating.speed_rpm": 400}, [one("crack", gear="wheel", tooth=k) for k in range(2)]),
+            run(
+                {
+                    **law,
+                    "operating.torque_nm": 0.5,
+                    "gear.backlash_um": 3,
+                    "operating.speed_rpm": 3000,
+                },
+                MISSING,
+            ),
+            run(
+                {**law, "operating.speed_rpm": 400},
+                [one("crack", gear="wheel", tooth=k) for k in range(2)],
+            ),
             run(
                 {**law, **GEOMETRY, "mesh.points_per_pitch": 64},
                 MANY_PITS,
                 start=Start(tooth_pinion=2, tooth_wheel=1, phase=0.9),
             ),
-            run({**law, "mesh.friction_coefficient": 0, "operating.speed_rpm": 6000, "operating.torque_nm": 100}),
+            run(
+                {
+                    **law,
+                    "mesh.friction_coefficient": 0,
+                    "operating.speed_rpm": 6000,
+                    "operating.torque_nm": 100,
+                }
+            ),
         ]
 
     return make
@@ -115,7 +143,12 @@ def diverging(run):
 
 def bits(record):
     assert isinstance(record, CleanRecord), record
-    told = record.mean_speed, record.contact_loss_fraction, record.integration_error, record.integration_check
+    told = (
+        record.mean_speed,
+        record.contact_loss_fraction,
+        record.integration_error,
+        record.integration_check,
+    )
     return record.acceleration.tobytes(), record.shaft_angle.tobytes(), repr(told)
 
 
@@ -125,7 +158,11 @@ def alone(runs):
 
 def different(found, expected):
     """Places at which records differ in any bit."""
-    return [n for n, pair in enumerate(zip(found, expected, strict=True)) if bits(pair[0]) != bits(pair[1])]
+    return [
+        n
+        for n, pair in enumerate(zip(found, expected, strict=True))
+        if bits(pair[0]) != bits(pair[1])
+    ]
 
 
 class TestBitsAlone:
@@ -143,7 +180,9 @@ class TestBitsAlone:
         expected = alone(runs)
         rng = np.random.default_rng(1)
         for order in (range(LANES - 1, -1, -1), *(rng.permutation(LANES) for _ in range(6))):
-            assert not different(simulate_together([runs[k] for k in order]), [expected[k] for k in order])
+            assert not different(
+                simulate_together([runs[k] for k in order]), [expected[k] for k in order]
+            )
 
     @pytest.mark.parametrize("n", [1, 2, 3, 7, 9])
     def test_in_groups_of(self, mixed, n):
@@ -166,12 +205,18 @@ class TestBitsAlone:
         runs = [run(), run(slow), run(soft), run({"operating.drive_frequency_hz": 9}, MISSING)]
         expected = alone(runs)
         for order in ((0, 1, 2, 3), (1, 0, 3, 2), (2, 3, 0, 1), (3, 2, 1, 0)):
-            assert not different(simulate_together([runs[k] for k in order]), [expected[k] for k in order])
+            assert not different(
+                simulate_together([runs[k] for k in order]), [expected[k] for k in order]
+            )
         assert not different(simulate_together(runs[:2]), expected[:2])
 
     @pytest.mark.filterwarnings("ignore::gensig.dynamics.integrator.CoarseStepWarning")
     def test_beside_one_that_cannot_settle_in_coarse_steps(self, run):
-        runs = [run(), run({"gear.pinion.support.stiffness_y_n_per_m": 2e10}), run({"operating.speed_rpm": 1200})]
+        runs = [
+            run(),
+            run({"gear.pinion.support.stiffness_y_n_per_m": 2e10}),
+            run({"operating.speed_rpm": 1200}),
+        ]
         assert not different(simulate_together(runs), alone(runs))
 
     @pytest.mark.parametrize("seed", range(4))
@@ -210,7 +255,12 @@ class TestOneThatFails:
     def test_all_but_one(self, run):
         runs = [diverging(run()), diverging(run()), run(), diverging(run())]
         found = simulate_together(runs)
-        assert [isinstance(record, SimulationError) for record in found] == [True, True, False, True]
+        assert [isinstance(record, SimulationError) for record in found] == [
+            True,
+            True,
+            False,
+            True,
+        ]
         assert not different(found[2:3], alone(runs[2:3]))
 
     def test_the_error_is_looked_for_all_the_same(self, run):
@@ -255,7 +305,14 @@ class TestError:
         fast = {"operating.speed_rpm": 6000, "operating.torque_nm": 60, "solver.oversampling": 5,
                 "solver.max_error": LIMIT, "operating.duration_s": 0.1}  # fmt: skip
         calm, light = {**fast, "operating.speed_rpm": 1200}, {**fast, "operating.torque_nm": 5}
-        return [run(calm), run(fast, MISSING), run(calm, MISSING), run(fast), run(calm), run(light, TWO_MISSING)]
+        return [
+            run(calm),
+            run(fast, MISSING),
+            run(calm, MISSING),
+            run(fast),
+            run(calm),
+            run(light, TWO_MISSING),
+        ]
 
     @pytest.fixture(scope="class")
     @classmethod
@@ -325,7 +382,12 @@ class TestMotions:
         assert found.acceleration.shape == (2, 2, 256)
         assert found.shaft_angle.shape == (2, 256)
         assert found.check.shape == (2, 2, 0)
-        assert found.mean_speed.shape == found.contact_loss_fraction.shape == found.finite.shape == (2,)
+        assert (
+            found.mean_speed.shape
+            == found.contact_loss_fraction.shape
+            == found.finite.shape
+            == (2,)
+        )
         assert found.finite.all()
 
     def test_lanes_without_a_machine_repeat_the_first(self, xiamen, dynamics_of):
@@ -339,7 +401,10 @@ class TestMotions:
     def test_any_number_of_machines_comes_back_in_order(self, motions, machine, dynamics_of):
         """More than a group takes, of two kinds of settling; every motion is that of the machine alone."""
         stiff = machine({"gear.pinion.support.stiffness_y_n_per_m": 2e9})
-        machines = [dynamics_of(stiff if k % 3 == 1 else machine({}), phase=0.05 * k) for k in range(LANES + 3)]
+        machines = [
+            dynamics_of(stiff if k % 3 == 1 else machine({}), phase=0.05 * k)
+            for k in range(LANES + 3)
+        ]
         groups = lane_groups(machines, BRIEF)
         assert [len(group) for group in groups] == [7, 4]
         together = motions(machines)
@@ -352,7 +417,9 @@ class TestMotions:
 
 def test_a_group_takes_teeth_of_different_numbers(machine, dynamics_of):
     """Every lane's places point at its own tables."""
-    machines = [dynamics_of(machine(changes)) for changes in ({}, GEOMETRY, {"mesh.points_per_pitch": 64})]
+    machines = [
+        dynamics_of(machine(changes)) for changes in ({}, GEOMETRY, {"mesh.points_per_pitch": 64})
+    ]
     group = pack(machines, 1e-6)
     teeth = [23 + 84, 31 + 61, *[23 + 84] * (LANES - 2)]
     assert len(group.tooth_row) == len(group.tooth_error) == sum(teeth)

@@ -49,13 +49,22 @@ def rebuilt(group, part, lane, n):
     return matrix
 
 
-SOFT = {"gear.pinion.support.stiffness_x_n_per_m": 0.0, "gear.wheel.support.damping_y_ns_per_m": 0.0}
+SOFT = {
+    "gear.pinion.support.stiffness_x_n_per_m": 0.0,
+    "gear.wheel.support.damping_y_ns_per_m": 0.0,
+}
 STIFF = {"gear.pinion.support.stiffness_x_n_per_m": 9e5, "operating.torque_nm": 31.0}
 ROTORS = {"system.motor.inertia_kg_m2": 2e-3, "system.load.inertia_kg_m2": 5e-2}
-LIGHT = {**ROTORS, "system.motor.coupling_stiffness_nm_per_rad": 500, "system.load.coupling_damping_ratio": 0.2}
+LIGHT = {
+    **ROTORS,
+    "system.motor.coupling_stiffness_nm_per_rad": 500,
+    "system.load.coupling_damping_ratio": 0.2,
+}
 
 
-@pytest.mark.parametrize("kinds", [(SOFT, {}, STIFF), (ROTORS, LIGHT, {**STIFF, **ROTORS})], ids=["pair", "rotors"])
+@pytest.mark.parametrize(
+    "kinds", [(SOFT, {}, STIFF), (ROTORS, LIGHT, {**STIFF, **ROTORS})], ids=["pair", "rotors"]
+)
 def test_a_group_holds_the_matrices_of_each_machine(machine, dynamics_of, kinds):
     """Also where a machine lacks an entry that its neighbour has; an empty lane repeats the first."""
     machines = [dynamics_of(machine(changes)) for changes in kinds]
@@ -72,20 +81,31 @@ def test_a_group_holds_the_matrices_of_each_machine(machine, dynamics_of, kinds)
             "carried": system.mass * system.rotation,
         }
         for name, values in expected.items():
-            assert_allclose(getattr(group, name)[lane::LANES], values, rtol=1e-15, atol=1e-12 * np.abs(values).max())
+            assert_allclose(
+                getattr(group, name)[lane::LANES],
+                values,
+                rtol=1e-15,
+                atol=1e-12 * np.abs(values).max(),
+            )
 
 
 def test_one_compiled_program_takes_every_machine(machine, dynamics_of):
     """Arrays of another layout would have it compiled anew, which takes most of a minute."""
     course = {"operating.speed_profile": [[0, 1], [1, 2]]}
-    kinds = [numba.typeof(pack([dynamics_of(machine(changes))], 1e-6)) for changes in ({}, ROTORS, course)]
+    kinds = [
+        numba.typeof(pack([dynamics_of(machine(changes))], 1e-6))
+        for changes in ({}, ROTORS, course)
+    ]
     assert kinds[0] == kinds[1] == kinds[2]
 
 
 def mesh_forces(dynamics, law, n):
     """Forces and torques of a mesh law on every degree of freedom, (dof,)."""
     normal, friction, moment_p, moment_w, along = law[:5]
-    radius_p, radius_w = dynamics.table.pair.pinion.base_radius, dynamics.table.pair.wheel.base_radius
+    radius_p, radius_w = (
+        dynamics.table.pair.pinion.base_radius,
+        dynamics.table.pair.wheel.base_radius,
+    )
     pinion = friction, normal, radius_p * (along - normal) + moment_p
     wheel = -friction, -normal, radius_w * normal + moment_w
     return np.array([*pinion, *wheel, *np.zeros(n - 6)])
@@ -98,7 +118,10 @@ def test_the_compiled_right_hand_side_is_that_of_the_matrices(machine, dynamics_
     dynamics, rng = dynamics_of(machine(changes)), np.random.default_rng(6)
     system, direction, n = dynamics.system(), dynamics.approach_direction(), len(dynamics.dofs)
     for _ in range(10):
-        q = rng.uniform(0.8, 1.5) * dynamics.static_start(0.0) + 1e-3 * rng.standard_normal() * system.rotation
+        q = (
+            rng.uniform(0.8, 1.5) * dynamics.static_start(0.0)
+            + 1e-3 * rng.standard_normal() * system.rotation
+        )
         q[[0, 3]] += 1e-5 * rng.standard_normal(2)
         q[6:] += 1e-4 * rng.standard_normal(n - 6)
         v = 1e-3 * rng.standard_normal(n) + rng.standard_normal() * system.rotation
@@ -150,4 +173,9 @@ class TestPairModes:
         assert (modes(0.0, drive=False) < 1e-2).sum() == 2
 
     def test_the_drive_holds_it_at_five_hertz(self, modes, xiamen):
-        assert_allclose(modes(3.28e8)[0] * 2 * np.pi, xiamen.operating.drive_frequency * 2 * np.pi, rtol=2e-3, atol=0)
+        assert_allclose(
+            modes(3.28e8)[0] * 2 * np.pi,
+            xiamen.operating.drive_frequency * 2 * np.pi,
+            rtol=2e-3,
+            atol=0,
+        )

@@ -25,7 +25,11 @@ from gensig.systems.run import Start
 
 
 def run(system, dynamics, **changes):
-    values = {"sampling_rate": 51200.0, "duration": system.operating.duration, "channels": ("pinion_y",)}
+    values = {
+        "sampling_rate": 51200.0,
+        "duration": system.operating.duration,
+        "channels": ("pinion_y",),
+    }
     values.update(changes)
     return integrate([dynamics], values.pop("solver", system.solver), **values)
 
@@ -37,19 +41,25 @@ def test_static_start_is_in_equilibrium_along_the_line_of_action(xiamen, dynamic
     force = laws(dynamics, [(dynamics.start_roll, q @ direction, 0.0, 0.0)])[0, 0]
     assert_allclose(force, dynamics.mesh_force, rtol=1e-6, atol=0)
     system = dynamics.system()
-    assert_allclose(system.stiffness[[1, 4], [1, 4]] * q[[1, 4]], [force, -force], rtol=1e-6, atol=0)
+    assert_allclose(
+        system.stiffness[[1, 4], [1, 4]] * q[[1, 4]], [force, -force], rtol=1e-6, atol=0
+    )
 
 
 def test_reduced_values(xiamen, dynamics_of):
     dynamics = dynamics_of(xiamen)
-    assert_allclose(dynamics.mesh_force, 925.37, rtol=1e-5, atol=0)  # spur reference (docs/validation.md), section 3.4
+    assert_allclose(
+        dynamics.mesh_force, 925.37, rtol=1e-5, atol=0
+    )  # spur reference (docs/validation.md), section 3.4
     assert_allclose(dynamics.mesh_frequency, 690.0, rtol=1e-12, atol=0)
     inverse = 21.61293e-3**2 / 4.858e-5 + 78.93418e-3**2 / 3.509e-3
     assert_allclose(dynamics.equivalent_mass, 1 / inverse, rtol=1e-5, atol=0)
 
 
 def test_mean_mesh_stiffness_ignores_the_faulty_tooth(xiamen, dynamics_of):
-    sound, faulty = (dynamics_of(xiamen, faults) for faults in ((), (MissingTooth(gear="pinion", tooth=3),)))
+    sound, faulty = (
+        dynamics_of(xiamen, faults) for faults in ((), (MissingTooth(gear="pinion", tooth=3),))
+    )
     assert_allclose(faulty.mean_mesh_stiffness, sound.mean_mesh_stiffness, rtol=1e-9, atol=0)
     assert 2e8 < sound.mean_mesh_stiffness < 3e8
 
@@ -58,14 +68,19 @@ def test_friction_torque_is_a_per_cent_loss(xiamen, dynamics_of, machine):
     torque = dynamics_of(xiamen).friction_torque()
     assert 0.003 < torque / xiamen.operating.torque < 0.02
     assert_allclose(
-        dynamics_of(machine({"mesh.friction_coefficient": 0.1})).friction_torque(), 2 * torque, rtol=1e-9, atol=0
+        dynamics_of(machine({"mesh.friction_coefficient": 0.1})).friction_torque(),
+        2 * torque,
+        rtol=1e-9,
+        atol=0,
     )
 
 
 def test_the_system_is_not_driven_on_balance(xiamen, dynamics_of):
     """Load and drive differ by the mean friction torque only."""
     force, dynamics = dynamics_of(xiamen).system().force, dynamics_of(xiamen)
-    assert_allclose(force[2] + force[5] / xiamen.pair.ratio, dynamics.friction_torque(), rtol=1e-9, atol=0)
+    assert_allclose(
+        force[2] + force[5] / xiamen.pair.ratio, dynamics.friction_torque(), rtol=1e-9, atol=0
+    )
 
 
 def test_settling_time_follows_the_slowest_motion_and_is_capped(machine, dynamics_of):
@@ -79,16 +94,27 @@ def test_settling_time_follows_the_slowest_motion_and_is_capped(machine, dynamic
 
 class TestRefusals:
     def test_unknown_channels_list_the_known(self, xiamen, dynamics_of):
-        with pytest.raises(ConfigError, match=r"no channel housing; allowed: pinion_x, pinion_y, pinion_rotation"):
+        with pytest.raises(
+            ConfigError, match=r"no channel housing; allowed: pinion_x, pinion_y, pinion_rotation"
+        ):
             run(xiamen, dynamics_of(xiamen), channels=("housing",))
 
     def test_a_step_too_long(self, xiamen, dynamics_of):
         with pytest.raises(SimulationError, match=r"raise solver.oversampling to at least \d+$"):
-            run(xiamen, dynamics_of(xiamen), sampling_rate=6e3, solver=Solver(oversampling=2, precision="float64"))
+            run(
+                xiamen,
+                dynamics_of(xiamen),
+                sampling_rate=6e3,
+                solver=Solver(oversampling=2, precision="float64"),
+            )
 
     @pytest.mark.filterwarnings("ignore::gensig.dynamics.integrator.CoarseStepWarning")
-    @pytest.mark.parametrize(("rate", "oversampling"), [(6e3, 2), (6e3, 3), (1e3, 2), (1e3, 17), (10.0, 2)])
-    def test_the_step_that_it_names_is_the_longest_that_will_do(self, xiamen, dynamics_of, rate, oversampling):
+    @pytest.mark.parametrize(
+        ("rate", "oversampling"), [(6e3, 2), (6e3, 3), (1e3, 2), (1e3, 17), (10.0, 2)]
+    )
+    def test_the_step_that_it_names_is_the_longest_that_will_do(
+        self, xiamen, dynamics_of, rate, oversampling
+    ):
         dynamics = dynamics_of(xiamen)
         with pytest.raises(SimulationError) as caught:
             check_step(dynamics, rate, oversampling)
@@ -100,7 +126,9 @@ class TestRefusals:
         with pytest.raises(SimulationError, match=f"to at least {enough}$"):
             check_step(dynamics, rate, enough - 1)
 
-    def test_a_coarse_step_is_warned_of_where_nothing_looks_at_its_error(self, xiamen, dynamics_of, recwarn):
+    def test_a_coarse_step_is_warned_of_where_nothing_looks_at_its_error(
+        self, xiamen, dynamics_of, recwarn
+    ):
         dynamics, rate = dynamics_of(xiamen), 51200.0
         with pytest.warns(
             CoarseStepWarning, match=r"internal steps to a period of the mesh mode .* raise solver"
@@ -134,12 +162,16 @@ class TestRefusals:
         machine().check()
         with pytest.raises(ConfigError, match="side by side with 4 channels"):
             machine({"operating.duration_s": 2000.0}).check()
-        with pytest.raises(SimulationError, match=r"solver\.oversampling = 2 makes internal steps of"):
+        with pytest.raises(
+            SimulationError, match=r"solver\.oversampling = 2 makes internal steps of"
+        ):
             machine({"solver.oversampling": 2, "sensing.sampling_rate_hz": 6000}).check()
 
     def test_a_duration_without_samples(self, machine, dynamics_of):
         system = machine({"operating.duration_s": 1e-6})
-        with pytest.raises(ConfigError, match=re.escape("operating.duration_s = 1e-06 holds no sample")):
+        with pytest.raises(
+            ConfigError, match=re.escape("operating.duration_s = 1e-06 holds no sample")
+        ):
             run(system, dynamics_of(system))
 
     @pytest.mark.parametrize(
@@ -155,7 +187,9 @@ class TestRefusals:
         with pytest.raises(ConfigError, match=re.escape(text)):
             Solver(**{"oversampling": 8, "precision": "float64", **changes})
 
-    @pytest.mark.parametrize(("key", "unit"), [("stiffness_x", "n_per_m"), ("damping_y", "ns_per_m")])
+    @pytest.mark.parametrize(
+        ("key", "unit"), [("stiffness_x", "n_per_m"), ("damping_y", "ns_per_m")]
+    )
     def test_supports_name_the_key_as_typed(self, xiamen, key, unit):
         with pytest.raises(ConfigError, match=f"{key}_{unit} = -1 must not be negative"):
             replace(xiamen.pinion.support, **{key: -1.0})
@@ -176,8 +210,15 @@ class TestRefusals:
 
 def test_solid_disc():
     mass, inertia = solid_disc(0.1, 0.0, 0.02, 7800.0)
-    assert_allclose([mass, inertia], [7800 * math.pi * 2e-4, 0.5 * 7800 * math.pi * 2e-4 * 0.01], rtol=1e-12, atol=0)
-    assert Support(stiffness_x=1.0, stiffness_y=1.0, damping_x=0.0, damping_y=0.0).damping_x == pytest.approx(0.0)
+    assert_allclose(
+        [mass, inertia],
+        [7800 * math.pi * 2e-4, 0.5 * 7800 * math.pi * 2e-4 * 0.01],
+        rtol=1e-12,
+        atol=0,
+    )
+    assert Support(
+        stiffness_x=1.0, stiffness_y=1.0, damping_x=0.0, damping_y=0.0
+    ).damping_x == pytest.approx(0.0)
 
 
 class TestRecord:
@@ -204,7 +245,9 @@ class TestRecord:
     def test_contact_is_lost_only_where_the_load_is_too_light(self, machine):
         tooth = (MissingTooth(gear="pinion", tooth=3),)
         light, rated = (
-            machine({"operating.torque_nm": torque, "operating.duration_s": 0.1}).simulate(tooth).contact_loss_fraction
+            machine({"operating.torque_nm": torque, "operating.duration_s": 0.1})
+            .simulate(tooth)
+            .contact_loss_fraction
             for torque in (2, 20)
         )
         assert light > 0
@@ -223,11 +266,19 @@ class TestRecord:
 
     def test_the_reference_rise_of_a_missing_tooth(self, machine):
         """Spur reference (docs/validation.md), table 5.2, "gap" rows: the same law elsewhere, pairs not coupled."""
-        terms = {"contact": "linear", "elasticity": "plane_stress", "body": "sainsot", "tooth": "to_contact"}
+        terms = {
+            "contact": "linear",
+            "elasticity": "plane_stress",
+            "body": "sainsot",
+            "tooth": "to_contact",
+        }
         own = {f"mesh.{key}": value for key, value in terms.items()}
         system = machine({**own, "mesh.pair_coupling": "sum", "operating.duration_s": 0.3})
         healthy, missing = (
-            system.simulate(faults).acceleration[1] for faults in ((), (MissingTooth(gear="pinion", tooth=3),))
+            system.simulate(faults).acceleration[1]
+            for faults in ((), (MissingTooth(gear="pinion", tooth=3),))
         )
         assert_allclose([healthy.std(), missing.std()], [158.2, 183.9], rtol=0.05, atol=0)
-        assert_allclose(np.abs(missing).max() / np.abs(healthy).max(), 2404 / 694, rtol=0.15, atol=0)
+        assert_allclose(
+            np.abs(missing).max() / np.abs(healthy).max(), 2404 / 694, rtol=0.15, atol=0
+        )

@@ -24,12 +24,16 @@ def test_across_the_line_of_action_a_gear_is_one_mass_on_its_support(xiamen, dyn
     dynamics, w = dynamics_of(xiamen), np.array([10.0, 1e3, 1e5])
     found = accelerations(dynamics, w, force_on(dynamics, PINION_X, 3))
     body = xiamen.pinion
-    by_hand = -(w**2) / (body.support.stiffness_x - w**2 * body.mass + 1j * w * body.support.damping_x)
+    by_hand = -(w**2) / (
+        body.support.stiffness_x - w**2 * body.mass + 1j * w * body.support.damping_x
+    )
     assert_allclose(found[:, PINION_X], by_hand, rtol=1e-9, atol=0)
     assert np.all(np.delete(found, PINION_X, axis=1) == 0.0)
 
 
-def test_far_above_every_mode_a_mass_is_free_and_far_below_the_support_is_a_spring(xiamen, dynamics_of):
+def test_far_above_every_mode_a_mass_is_free_and_far_below_the_support_is_a_spring(
+    xiamen, dynamics_of
+):
     dynamics, w = dynamics_of(xiamen), np.array([1e-3, 1e9])
     low, high = accelerations(dynamics, w, force_on(dynamics, WHEEL_Y, 2))[:, WHEEL_Y]
     assert_allclose(high, 1.0 / xiamen.wheel.mass, rtol=1e-3, atol=0)
@@ -50,11 +54,15 @@ def test_the_motion_in_time_settles_to_it(xiamen, dynamics_of, rotors, dof):
     push = np.zeros((2 * n, 1))
     push[n + place] = 1.0 / system.mass[place]
     wanted = accelerations(dynamics, np.array([w]), force_on(dynamics, place))[0]
-    still = np.linalg.solve(1j * w * np.eye(2 * n) - state, push[:, 0])  # so that nothing has to settle
+    still = np.linalg.solve(
+        1j * w * np.eye(2 * n) - state, push[:, 0]
+    )  # so that nothing has to settle
     times = np.arange(4000) * step
     force = np.cos(w * times)
     # an independent solution in time from that state on stays on it, for two periods
-    _, _, motion = lsim((state, push, np.eye(2 * n), np.zeros((2 * n, 1))), force, times, X0=still.real)
+    _, _, motion = lsim(
+        (state, push, np.eye(2 * n), np.zeros((2 * n, 1))), force, times, X0=still.real
+    )
     found = (motion @ state[n:].T) + push[n:, 0] * force[:, None]
     expected = np.real(wanted * np.exp(1j * w * times)[:, None])
     assert_allclose(found, expected, rtol=0, atol=1e-4 * np.abs(expected).max())

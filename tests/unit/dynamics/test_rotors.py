@@ -20,7 +20,12 @@ from gensig.systems.registry import read_system
 
 MOTOR = Rotor(inertia=2e-3, coupling_stiffness=3e3, coupling_damping_ratio=0.05)
 LOAD = Rotor(inertia=8e-2, coupling_stiffness=1e4, coupling_damping_ratio=0.03)
-MACHINES = {"pair": {}, "motor": {"motor": MOTOR}, "load": {"load": LOAD}, "both": {"motor": MOTOR, "load": LOAD}}
+MACHINES = {
+    "pair": {},
+    "motor": {"motor": MOTOR},
+    "load": {"load": LOAD},
+    "both": {"motor": MOTOR, "load": LOAD},
+}
 COURSES = {
     "constant": {},
     "slower": {"speed_profile": Profile(times=(0.5, 1.0), factors=(0.3, 1.0))},
@@ -65,7 +70,10 @@ def drive_matrices(dynamics):
     place[driver, driver] = 1.0
     rate = 2 * math.pi * dynamics.operating.drive_frequency
     reduced = dynamics.system().rotation ** 2 @ dynamics.system().mass
-    return place * reduced * rate**2, place * 2 * dynamics.operating.drive_damping_ratio * reduced * rate
+    return (
+        place * reduced * rate** 2,
+        place * 2 * dynamics.operating.drive_damping_ratio * reduced * rate,
+    )
 
 
 def mesh_force(dynamics, time, q):
@@ -75,7 +83,10 @@ def mesh_force(dynamics, time, q):
     )
     states, approach = dynamics._states(roll), q @ dynamics.approach_direction()
     return brentq(
-        lambda force: static_mesh(dynamics.table, states, force).approach[0] - approach, 1e-3, 1e5, rtol=1e-12
+        lambda force: static_mesh(dynamics.table, states, force).approach[0] - approach,
+        1e-3,
+        1e5,
+        rtol=1e-12,
     )
 
 
@@ -90,23 +101,39 @@ def residual(dynamics, time, q):
 class TestEquations:
     def test_a_degree_of_freedom_for_each_body_that_there_is(self, dynamics, rotors):
         system = dynamics.system()
-        assert dynamics.dofs == system.names == (*PAIR_DOFS, *[f"{name}_rotation" for name in rotors])
+        assert (
+            dynamics.dofs == system.names == (*PAIR_DOFS, *[f"{name}_rotation" for name in rotors])
+        )
         assert set(dynamics.dofs) <= set(DOFS)
-        assert_allclose(system.mass[6:], [rotor.inertia for rotor in rotors.values()], rtol=0, atol=0)
+        assert_allclose(
+            system.mass[6:], [rotor.inertia for rotor in rotors.values()], rtol=0, atol=0
+        )
         direction = dynamics.approach_direction()
         assert direction.shape == (len(dynamics.dofs),)
         assert_allclose(direction[6:], 0, rtol=0, atol=0)
 
     def test_each_body_turns_with_the_pinion_at_its_ratio(self, dynamics):
-        expected = {"pinion_rotation": 1, "motor_rotation": 1, "wheel_rotation": 23 / 84, "load_rotation": 23 / 84}
+        expected = {
+            "pinion_rotation": 1,
+            "motor_rotation": 1,
+            "wheel_rotation": 23 / 84,
+            "load_rotation": 23 / 84,
+        }
         assert_allclose(
-            dynamics.system().rotation, [expected.get(name, 0) for name in dynamics.dofs], rtol=1e-15, atol=0
+            dynamics.system().rotation,
+            [expected.get(name, 0) for name in dynamics.dofs],
+            rtol=1e-15,
+            atol=0,
         )
 
     def test_turning_as_a_whole_strains_nothing_but_the_drive(self, dynamics):
         system = dynamics.system()
-        for matrix, drive in zip((system.stiffness, system.damping), drive_matrices(dynamics), strict=True):
-            assert_allclose((matrix - drive) @ system.rotation, 0, rtol=0, atol=1e-12 * np.abs(matrix).max())
+        for matrix, drive in zip(
+            (system.stiffness, system.damping), drive_matrices(dynamics), strict=True
+        ):
+            assert_allclose(
+                (matrix - drive) @ system.rotation, 0, rtol=0, atol=1e-12 * np.abs(matrix).max()
+            )
         assert_allclose(dynamics.approach_direction() @ system.rotation, 0, rtol=0, atol=1e-15)
 
     def test_that_law_sees_a_wrong_ratio(self, whole):
@@ -119,10 +146,14 @@ class TestEquations:
         """At its frequency and damping ratio, whatever is driven."""
         system, operating = dynamics.system(), smooth.operating
         inertia = system.rotation @ np.diag(system.mass) @ system.rotation
-        stiffness, damping = (system.rotation @ part @ system.rotation for part in (system.stiffness, system.damping))
+        stiffness, damping = (
+            system.rotation @ part @ system.rotation for part in (system.stiffness, system.damping)
+        )
         rate = math.sqrt(stiffness / inertia)
         assert_allclose(rate / (2 * math.pi), operating.drive_frequency, rtol=1e-12, atol=0)
-        assert_allclose(damping / (2 * inertia * rate), operating.drive_damping_ratio, rtol=1e-12, atol=0)
+        assert_allclose(
+            damping / (2 * inertia * rate), operating.drive_damping_ratio, rtol=1e-12, atol=0
+        )
 
     def test_torques_act_at_the_ends_and_balance(self, dynamics, smooth):
         system, lead = dynamics.system(), np.zeros(len(dynamics.dofs))
@@ -143,7 +174,10 @@ class TestTorsion:
 
     @pytest.mark.parametrize(
         ("rotor", "names"),
-        [(MOTOR, ("pinion_rotation", "motor_rotation")), (LOAD, ("wheel_rotation", "load_rotation"))],
+        [
+            (MOTOR, ("pinion_rotation", "motor_rotation")),
+            (LOAD, ("wheel_rotation", "load_rotation")),
+        ],
     )
     def test_two_inertias_on_a_spring(self, whole, rotor, names):
         system = whole.system()
@@ -160,7 +194,9 @@ class TestTorsion:
         turning = found[np.imag(found) > 1.0]
         expected = math.sqrt(rotor.coupling_stiffness * (1 / free.mass[0] + 1 / free.mass[1]))
         assert_allclose(np.abs(turning), [expected], rtol=1e-9, atol=0)
-        assert_allclose(-np.real(turning) / np.abs(turning), [rotor.coupling_damping_ratio], rtol=1e-9, atol=0)
+        assert_allclose(
+            -np.real(turning) / np.abs(turning), [rotor.coupling_damping_ratio], rtol=1e-9, atol=0
+        )
         assert (np.abs(found) < 1e-6 * expected).sum() == 2
 
     def test_three_inertias_where_teeth_and_bearings_are_rigid(self, whole):
@@ -169,7 +205,11 @@ class TestTorsion:
         rigid = np.diag([1e13, 1e13, 0, 1e13, 1e13, 0, 0, 0])
         root = np.sqrt(np.outer(system.mass, system.mass))
         found = np.sort(np.abs(np.linalg.eigvalsh((matrix + rigid) / root)))[:3]
-        j1, j2, j3 = MOTOR.inertia, system.mass[2] + system.mass[5] / ratio**2, LOAD.inertia / ratio**2
+        j1, j2, j3 = (
+            MOTOR.inertia,
+            system.mass[2] + system.mass[5] / ratio**2,
+            LOAD.inertia / ratio**2,
+        )
         k1, k2 = MOTOR.coupling_stiffness, LOAD.coupling_stiffness / ratio**2
         total = k1 * (1 / j1 + 1 / j2) + k2 * (1 / j2 + 1 / j3)
         product = k1 * k2 * (j1 + j2 + j3) / (j1 * j2 * j3)
@@ -207,23 +247,33 @@ class TestStart:
 
     def test_the_start_follows_the_nominal_angle(self, dynamics):
         slower = on_course(dynamics, "slower")
-        assert_allclose(slower.static_start(-0.4), dynamics.static_start(-0.12), rtol=1e-12, atol=1e-18)
+        assert_allclose(
+            slower.static_start(-0.4), dynamics.static_start(-0.12), rtol=1e-12, atol=1e-18
+        )
         assert np.abs(slower.static_start(-0.4) - dynamics.static_start(-0.4)).max() > 1e-8
 
     def test_the_twist_follows_the_torque(self, whole):
         light = on_course(whole, "lighter").static_start(-0.2)
         assert_allclose(light[6] * MOTOR.coupling_stiffness, 0.3 * 20, rtol=1e-12, atol=0)
-        assert_allclose((light[5] - light[7]) * LOAD.coupling_stiffness, 0.3 * 20 * 84 / 23, rtol=1e-9, atol=0)
+        assert_allclose(
+            (light[5] - light[7]) * LOAD.coupling_stiffness, 0.3 * 20 * 84 / 23, rtol=1e-9, atol=0
+        )
 
     def test_no_torque_leaves_everything_at_rest(self, dynamics):
-        idle = replace(dynamics.operating, torque_profile=Profile(times=(0.0, 1.0), factors=(0.0, 1.0)))
+        idle = replace(
+            dynamics.operating, torque_profile=Profile(times=(0.0, 1.0), factors=(0.0, 1.0))
+        )
         assert_allclose(replace(dynamics, operating=idle).static_start(-0.2), 0, rtol=0, atol=0)
 
 
 def test_power_in_is_stored_and_dissipated_on_a_ramp(whole):
     """The inertia force of the turning frame, with speeds and energies as an observer at rest sees them."""
     moving = on_course(whole, "ramp")
-    system, direction, (drive_k, drive_c) = moving.system(), moving.approach_direction(), drive_matrices(moving)
+    system, direction, (drive_k, drive_c) = (
+        moving.system(),
+        moving.approach_direction(),
+        drive_matrices(moving),
+    )
     n = len(system.mass)
     stiffness = system.stiffness - drive_k + 2.5e8 * np.outer(direction, direction)
     damping = system.damping - drive_c
@@ -234,7 +284,9 @@ def test_power_in_is_stored_and_dissipated_on_a_ramp(whole):
         outside = system.force * nominal.torque_factor - drive_k @ q - drive_c @ v
         inertia = system.mass * system.rotation * nominal.acceleration
         a = (outside - inertia - damping @ v - stiffness @ q) / system.mass
-        return np.concatenate([v, a, [outside @ (v + system.rotation * nominal.speed), v @ damping @ v]])
+        return np.concatenate(
+            [v, a, [outside @ (v + system.rotation * nominal.speed), v @ damping @ v]]
+        )
 
     def energy(time, state):
         speeds = state[n : 2 * n] + system.rotation * moving.nominal(np.array([time])).speed
@@ -257,11 +309,22 @@ class TestConfiguration:
         assert dynamics_of(xiamen).dofs == PAIR_DOFS
 
     def test_both(self, machine):
-        load = {"inertia_kg_m2": 0.5, "coupling_stiffness_nm_per_rad": 2.5e4, "coupling_damping_ratio": 0.2}
-        keys = {"system.motor.inertia_kg_m2": 2e-3, **{f"system.load.{key}": value for key, value in load.items()}}
+        load = {
+            "inertia_kg_m2": 0.5,
+            "coupling_stiffness_nm_per_rad": 2.5e4,
+            "coupling_damping_ratio": 0.2,
+        }
+        keys = {
+            "system.motor.inertia_kg_m2": 2e-3,
+            **{f"system.load.{key}": value for key, value in load.items()},
+        }
         system = machine(keys)
-        assert system.motor == Rotor(inertia=2e-3, coupling_stiffness=3e3, coupling_damping_ratio=0.05)
-        assert system.load == Rotor(inertia=0.5, coupling_stiffness=2.5e4, coupling_damping_ratio=0.2)
+        assert system.motor == Rotor(
+            inertia=2e-3, coupling_stiffness=3e3, coupling_damping_ratio=0.05
+        )
+        assert system.load == Rotor(
+            inertia=0.5, coupling_stiffness=2.5e4, coupling_damping_ratio=0.2
+        )
 
     def test_a_whole_group_may_be_null_or_absent(self, config_with):
         config = config_with({"system.motor": None})
@@ -269,7 +332,9 @@ class TestConfiguration:
         assert system.motor is system.load is None
 
     def test_coupling_damping(self):
-        assert_allclose(MOTOR.coupling_damping(2e-3), 2 * 0.05 * math.sqrt(3e3 * 1e-3), rtol=1e-12, atol=0)
+        assert_allclose(
+            MOTOR.coupling_damping(2e-3), 2 * 0.05 * math.sqrt(3e3 * 1e-3), rtol=1e-12, atol=0
+        )
 
     @pytest.mark.parametrize("side", ["motor", "load"])
     @pytest.mark.parametrize(
@@ -283,8 +348,14 @@ class TestConfiguration:
                 {"inertia_kg_m2": 1, "coupling_stiffness_nm_per_rad": 0},
                 ".coupling_stiffness_nm_per_rad = 0 must be positive",
             ),
-            ({"inertia_kg_m2": 1, "coupling_stiffness_nm_per_rad": None}, ".coupling_stiffness_nm_per_rad is null"),
-            ({"inertia_kg_m2": 1, "coupling_damping_ratio": -0.1}, ".coupling_damping_ratio = -0.1 must be positive"),
+            (
+                {"inertia_kg_m2": 1, "coupling_stiffness_nm_per_rad": None},
+                ".coupling_stiffness_nm_per_rad is null",
+            ),
+            (
+                {"inertia_kg_m2": 1, "coupling_damping_ratio": -0.1},
+                ".coupling_damping_ratio = -0.1 must be positive",
+            ),
         ],
     )
     def test_refusals(self, machine, side, changes, text):
@@ -320,7 +391,10 @@ class TestMeshNumbers:
         first = fresh.mean_mesh_stiffness
         assert fresh.mean_mesh_stiffness == first
         assert len(calls) == 1
-        assert replace(fresh, start_phase=0.9, **MACHINES["both"]).mean_mesh_stiffness.hex() == first.hex()
+        assert (
+            replace(fresh, start_phase=0.9, **MACHINES["both"]).mean_mesh_stiffness.hex()
+            == first.hex()
+        )
         lighter = replace(fresh, operating=replace(fresh.operating, torque=2.0))
         assert lighter.mean_mesh_stiffness < first
 
@@ -331,10 +405,14 @@ class TestMeshNumbers:
 
         def softer(n_soft):
             kind = (np.arange(23) < n_soft).astype(int)
-            rows = {name: np.repeat(getattr(table.pinion, name), 2, axis=0) for name in ("gap", "gap_slope", "present")}
+            rows = {
+                name: np.repeat(getattr(table.pinion, name), 2, axis=0)
+                for name in ("gap", "gap_slope", "present")
+            }
             rows["compliance_slope"] = np.repeat(table.pinion.compliance_slope, 2, axis=0)
             return mesh_statics.mean_mesh_stiffness(
-                replace(table, pinion=replace(table.pinion, compliance=soft, kind=kind, **rows)), force
+                replace(table, pinion=replace(table.pinion, compliance=soft, kind=kind, **rows)),
+                force,
             )
 
         assert softer(11) == sound

@@ -26,7 +26,9 @@ def stepped(scheme: Tableau, angle: float) -> complex:
 
 def order(scheme: Tableau) -> float:
     """Order of a scheme: the slope of its error over the step, less the one of a single step."""
-    errors = [abs(stepped(scheme, angle) - complex(np.cos(angle), -np.sin(angle))) for angle in ANGLES]
+    errors = [
+        abs(stepped(scheme, angle) - complex(np.cos(angle), -np.sin(angle))) for angle in ANGLES
+    ]
     return float(np.polyfit(np.log(ANGLES), np.log(errors), 1)[0]) - 1.0
 
 
@@ -51,10 +53,16 @@ def test_the_middle_of_a_cubic_is_exact() -> None:
     begin, end = -0.4, 0.9
     values, slopes = [cubic(x) for x in (begin, end)], [cubic.deriv()(x) for x in (begin, end)]
     middle, d = 0.5 * (begin + end), end - begin
-    value = CUBIC_MIDDLE.value_by_values * sum(values) + CUBIC_MIDDLE.value_by_slopes * d * (slopes[0] - slopes[1])
-    slope = CUBIC_MIDDLE.slope_by_values * (values[1] - values[0]) / d - CUBIC_MIDDLE.slope_by_slopes * sum(slopes)
+    value = CUBIC_MIDDLE.value_by_values * sum(values) + CUBIC_MIDDLE.value_by_slopes * d * (
+        slopes[0] - slopes[1]
+    )
+    slope = CUBIC_MIDDLE.slope_by_values * (
+        values[1] - values[0]
+    ) / d - CUBIC_MIDDLE.slope_by_slopes * sum(slopes)
     assert_allclose([value, slope], [cubic(middle), cubic.deriv()(middle)], rtol=1e-14, atol=0)
-    assert_allclose(d * (slopes[0] + 4.0 * slope + slopes[1]) / 6.0, values[1] - values[0], rtol=1e-14, atol=0)
+    assert_allclose(
+        d * (slopes[0] + 4.0 * slope + slopes[1]) / 6.0, values[1] - values[0], rtol=1e-14, atol=0
+    )
 
 
 def test_newmark_keeps_the_energy_of_an_oscillator() -> None:
@@ -68,7 +76,9 @@ def test_newmark_keeps_the_energy_of_an_oscillator() -> None:
     a_1 = -q_1
     taylor = q + h * v + h**2 * ((0.5 - NEWMARK.beta) * a + NEWMARK.beta * a_1)
     assert_allclose(q_1, taylor, rtol=1e-14, atol=0)
-    assert_allclose(v_1, v + h * ((1.0 - NEWMARK.gamma) * a + NEWMARK.gamma * a_1), rtol=1e-14, atol=0)
+    assert_allclose(
+        v_1, v + h * ((1.0 - NEWMARK.gamma) * a + NEWMARK.gamma * a_1), rtol=1e-14, atol=0
+    )
 
 
 @pytest.mark.parametrize(("beta", "gamma"), [(1 / 6, 0.5), (0.25, 0.6), (0.3025, 0.6)])

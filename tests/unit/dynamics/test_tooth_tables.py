@@ -38,7 +38,9 @@ def motions(dynamics):
     """Instants over more turns than a wheel has, driven and coasting, (instant, 4)."""
     rng, n = np.random.default_rng(9), 4000
     roll = dynamics.table.pair.base_pitch * rng.uniform(-200, 200, n)
-    return np.column_stack([roll, rng.uniform(-4e-5, 4e-5, n), 1e-3 * rng.standard_normal(n), rng.uniform(2, 6, n)])
+    return np.column_stack(
+        [roll, rng.uniform(-4e-5, 4e-5, n), 1e-3 * rng.standard_normal(n), rng.uniform(2, 6, n)]
+    )
 
 
 @pytest.fixture
@@ -64,7 +66,9 @@ def test_many_products_stand_by_themselves(xiamen, dynamics_of, dynamics):
 def test_both_layouts_give_one_law(dynamics, motions, laid_out):
     by_pair, by_tooth = (laid_out(many, lambda: laws(dynamics, motions)) for many in (False, True))
     for name, found, expected in zip(LAW, by_tooth.T, by_pair.T, strict=True):
-        assert_allclose(found, expected, rtol=1e-12, atol=1e-12 * np.abs(expected).max(), err_msg=name)
+        assert_allclose(
+            found, expected, rtol=1e-12, atol=1e-12 * np.abs(expected).max(), err_msg=name
+        )
     assert (by_pair[:, 0] > 0).mean() > 0.2
     assert (by_pair[:, 0] < 0).mean() > 0.2
 
@@ -73,7 +77,9 @@ def test_teeth_differ_in_that_law(dynamics, motions, xiamen, dynamics_of):
     """What a table that forgot the pits or the wheel's rows would give is far off."""
     found = laws(dynamics, motions)[:, 0]
     for some in (PITS[:5], PITS[5:], ()):
-        sound = dynamics_of(xiamen, some, pinion_error=dynamics.pinion_error, wheel_error=dynamics.wheel_error)
+        sound = dynamics_of(
+            xiamen, some, pinion_error=dynamics.pinion_error, wheel_error=dynamics.wheel_error
+        )
         other = laws(sound, motions)[:, 0]
         assert np.abs(other - found).max() > 0.05 * np.abs(found).max()
 

@@ -28,7 +28,12 @@ N_GROUPS = 400
 ODD = {"float64": [np.inf, -np.inf, np.nan, 0.0, -0.0, 5e-324, -1e-310, 1.7e308, -1.7e308, 1.0],
        "float32": [np.inf, -np.inf, np.nan, 0.0, -0.0, 1e-45, -1e-40, 3.4e38, -3.4e38, 1.0]}  # fmt: skip
 EXPONENTS = {"float64": 200, "float32": 25}
-OPERATIONS = {"add": operator.add, "sub": operator.sub, "mul": operator.mul, "truediv": operator.truediv}
+OPERATIONS = {
+    "add": operator.add,
+    "sub": operator.sub,
+    "mul": operator.mul,
+    "truediv": operator.truediv,
+}
 COMPILED = njit(error_model="numpy")
 CHOICE, N_LANE_BY_LANE = 12, 13  # results before: two vectors, vector and number, number and vector
 
@@ -55,7 +60,9 @@ def lane_by_lane(read, per_row, n):
             store(out, there + 10 * n, x * a)
             store(out, there + 11 * n, x / a)
             store(
-                out, there + 12 * n, where_above(a, b, read(rows, here + 2 * per_row), read(rows, here + 3 * per_row))
+                out,
+                there + 12 * n,
+                where_above(a, b, read(rows, here + 2 * per_row), read(rows, here + 3 * per_row)),
             )
             above[k] = any_above(a, b)
 
@@ -135,7 +142,9 @@ def numbers(precision):
 @pytest.fixture(scope="module")
 def rows(precision, shape, numbers):
     """(group, a to d, lane); some of a equal to b."""
-    values = numbers(N_GROUPS, 4, n_lanes(precision) if shape == "group" else FOUR).astype(precision)
+    values = numbers(N_GROUPS, 4, n_lanes(precision) if shape == "group" else FOUR).astype(
+        precision
+    )
     values[::5, 1] = values[::5, 0]
     return values
 
@@ -254,7 +263,9 @@ def test_rows_move_as_rows_of_a_table(precision):
 def test_a_vector_goes_into_an_array_of_its_own_kind_only(precision):
     (other,) = (name for name in PRECISIONS if name != precision)
     values, out = np.zeros(16, dtype=precision), np.full(16, 7.0, dtype=other)
-    with pytest.raises(TypeError, match=f"{precision}x{n_lanes(precision)} is no row of an array of {other}"):
+    with pytest.raises(
+        TypeError, match=f"{precision}x{n_lanes(precision)} is no row of an array of {other}"
+    ):
         move(values, 0, 0, out)
     with pytest.raises(TypeError, match=f"{precision}x{FOUR} does not fit an array of {other}"):
         move_four(values, 0, 0, out)

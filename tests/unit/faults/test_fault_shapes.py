@@ -83,9 +83,15 @@ class TestWhatChanges:
     @pytest.mark.parametrize("kind", KINDS)
     def test_the_sound_tooth_stays_sound(self, tooth_of, kind):
         before = tooth_of()
-        copies = before.material_loss.copy(), before.flank_deviation.copy(), before.slice_edges.copy()
+        copies = (
+            before.material_loss.copy(),
+            before.flank_deviation.copy(),
+            before.slice_edges.copy(),
+        )
         tooth_of(one(kind, tooth=3), one("wear", tooth=3), one("misalignment", tooth=3))
-        for found, copy in zip((before.material_loss, before.flank_deviation, before.slice_edges), copies, strict=True):
+        for found, copy in zip(
+            (before.material_loss, before.flank_deviation, before.slice_edges), copies, strict=True
+        ):
             assert_allclose(found, copy, rtol=0, atol=0)
         assert before.present
         assert before.cracks == ()
@@ -103,19 +109,25 @@ class TestWhatChanges:
 
     def test_neighbors_stay_sound(self, xiamen):
         assert set(faulty_teeth(xiamen.pair, [one("crack", tooth=3)])) == {("pinion", 3)}
-        assert set(faulty_teeth(xiamen.pair, [one("runout", tooth=3)])) == {("pinion", k) for k in range(23)}
+        assert set(faulty_teeth(xiamen.pair, [one("runout", tooth=3)])) == {
+            ("pinion", k) for k in range(23)
+        }
 
 
 class TestThePapersSections:
     def test_a_crack_changes_sections_only(self, tooth_of):
         sound, tooth = tooth_of(), tooth_of(one("crack"))
-        (area, moment), (sound_area, sound_moment) = (sections(t, papers_crack=True) for t in (tooth, sound))
+        (area, moment), (sound_area, sound_moment) = (
+            sections(t, papers_crack=True) for t in (tooth, sound)
+        )
         assert np.all(area <= sound_area)
         assert area.min() > 0
         assert (moment < sound_moment).any()
         rc = tooth.profile.curvature_radius
         assert_allclose(bearing_width(tooth, rc), bearing_width(sound, rc), rtol=0, atol=0)
-        for found, expected in zip(sections(tooth, papers_crack=False), (sound_area, sound_moment), strict=True):
+        for found, expected in zip(
+            sections(tooth, papers_crack=False), (sound_area, sound_moment), strict=True
+        ):
             assert_allclose(found, expected, rtol=0, atol=0)
 
     def test_a_crack_keeps_half_plus_h_q(self, tooth_of):
@@ -139,7 +151,9 @@ class TestThePapersSections:
         expected = 2 * half * width - pit_width * depth
         centroid = -pit_width * depth * (half - depth / 2) / expected
         about_middle = (
-            (2 * half) ** 3 * width / 12 - pit_width * depth**3 / 12 - pit_width * depth * (half - depth / 2) ** 2
+            (2 * half) ** 3 * width / 12
+            - pit_width * depth**3 / 12
+            - pit_width * depth * (half - depth / 2) ** 2
         )
         assert_allclose(area[inside], expected, rtol=1e-12, atol=0)
         assert_allclose(moment[inside], about_middle - expected * centroid**2, rtol=1e-9, atol=0)
@@ -158,15 +172,21 @@ class TestThePapersSections:
 
     def test_even_wear_narrows_nothing(self, tooth_of):
         worn = tooth_of(one("wear", wear_profile=None, wear_depth_um=100))
-        assert_allclose(bearing_width(worn, worn.profile.curvature_radius), 20e-3, rtol=1e-12, atol=0)
+        assert_allclose(
+            bearing_width(worn, worn.profile.curvature_radius), 20e-3, rtol=1e-12, atol=0
+        )
         both = tooth_of(one("pitting"), one("wear", wear_profile=None, wear_depth_um=100))
-        assert_allclose(bearing_width(both, both.profile.curvature_radius).min(), 10e-3, rtol=1e-12, atol=0)
+        assert_allclose(
+            bearing_width(both, both.profile.curvature_radius).min(), 10e-3, rtol=1e-12, atol=0
+        )
 
     def test_loss_makes_sections_smaller(self, tooth_of):
         """Parallel axes over slices that differ: never more than what was there, by any fault."""
         sound = sections(tooth_of(), papers_crack=False)
         for kind in ("pitting", "spalling", "distributed_pitting", "chipped", "broken", "wear"):
-            for found, whole in zip(sections(tooth_of(one(kind)), papers_crack=False), sound, strict=True):
+            for found, whole in zip(
+                sections(tooth_of(one(kind)), papers_crack=False), sound, strict=True
+            ):
                 assert np.all(found > 0)
                 assert np.all(found <= whole * (1 + 1e-12))
                 assert (found < whole).any()
@@ -177,17 +197,23 @@ class TestCrackFront:
 
     @staticmethod
     def depth(tooth_of, front, width):
-        (crack,) = tooth_of(one("crack", crack_depth_mm=2.0, crack_front=front, crack_width_mm=width)).cracks
+        (crack,) = tooth_of(
+            one("crack", crack_depth_mm=2.0, crack_front=front, crack_width_mm=width)
+        ).cracks
         return crack.depth
 
     @pytest.mark.parametrize("width", WIDTHS)
-    @pytest.mark.parametrize(("front", "mean"), [("straight", 1.0), ("parabolic", 2 / 3), ("linear", 1 / 2)])
+    @pytest.mark.parametrize(
+        ("front", "mean"), [("straight", 1.0), ("parabolic", 2 / 3), ("linear", 1 / 2)]
+    )
     def test_mean_depth_in_closed_form(self, xiamen, tooth_of, front, mean, width):
         depth = self.depth(tooth_of, front, width)
         assert_allclose(depth.mean(), 2e-3 * mean * width / FULL, rtol=1e-12, atol=0)
         fault = one("crack", crack_depth_mm=2.0, crack_front=front, crack_width_mm=width)
         chord = fault.root_chord(xiamen.pair.pinion)
-        assert_allclose(fault.severity(xiamen.pair.pinion), depth.mean() / chord, rtol=1e-12, atol=0)
+        assert_allclose(
+            fault.severity(xiamen.pair.pinion), depth.mean() / chord, rtol=1e-12, atol=0
+        )
 
     @pytest.mark.parametrize("width", WIDTHS)
     @pytest.mark.parametrize(
@@ -210,7 +236,12 @@ class TestCrackFront:
 
     def test_null_is_the_whole_face(self, tooth_of):
         for front in ("straight", "parabolic", "linear"):
-            assert_allclose(self.depth(tooth_of, front, None), self.depth(tooth_of, front, FULL), rtol=1e-12, atol=0)
+            assert_allclose(
+                self.depth(tooth_of, front, None),
+                self.depth(tooth_of, front, FULL),
+                rtol=1e-12,
+                atol=0,
+            )
         assert len(self.depth(tooth_of, "straight", None)) == 1
 
     def test_without_width_or_depth_there_is_none(self, tooth_of):
@@ -220,7 +251,15 @@ class TestCrackFront:
 
 class TestHoles:
     def test_a_pit_lies_where_it_is_put(self, tooth_of):
-        tooth = tooth_of(one("pitting", pit_face_position_mm=7, pit_position_mm=2, pit_width_mm=6, pit_length_mm=1))
+        tooth = tooth_of(
+            one(
+                "pitting",
+                pit_face_position_mm=7,
+                pit_position_mm=2,
+                pit_width_mm=6,
+                pit_length_mm=1,
+            )
+        )
         deep = tooth.material_loss > 0
         assert_allclose(np.unique(tooth.material_loss), [0, 0.5e-3], rtol=1e-12, atol=0)
         assert_allclose(tooth.slice_edges, [0, 4e-3, 10e-3, 20e-3], rtol=1e-12, atol=0)
@@ -247,10 +286,17 @@ class TestHoles:
         worn = tooth_of(one("wear", wear_depth_um=30, wear_profile=[0, 1, 0.5]))
         share = np.linspace(0, 1, worn.material_loss.shape[1])
         assert_allclose(
-            worn.material_loss[0], 30e-6 * np.interp(share, [0, 0.5, 1], [0, 1, 0.5]), rtol=1e-9, atol=1e-18
+            worn.material_loss[0],
+            30e-6 * np.interp(share, [0, 0.5, 1], [0, 1, 0.5]),
+            rtol=1e-9,
+            atol=1e-18,
         )
         twice = tooth_of(*[one("wear", wear_depth_um=30)] * 2)
-        assert_allclose(twice.material_loss, 2 * tooth_of(one("wear", wear_depth_um=30)).material_loss, rtol=1e-12)
+        assert_allclose(
+            twice.material_loss,
+            2 * tooth_of(one("wear", wear_depth_um=30)).material_loss,
+            rtol=1e-12,
+        )
 
 
 @pytest.mark.parametrize("gear", GEARS)
@@ -268,8 +314,14 @@ class TestTips:
     def test_without_involute_there_is_no_tooth(self, xiamen, gear):
         body = getattr(xiamen.pair, gear)
         low = body.tip_radius - on_flank(healthy_tooth(body))[0]
-        for height, present in ((low - 1e-4, True), (low + 1e-5, False), (tooth_height(body), False)):
-            tooth = one("broken", gear=gear, broken_height_mm=1e3 * height).apply(healthy_tooth(body), 0)
+        for height, present in (
+            (low - 1e-4, True),
+            (low + 1e-5, False),
+            (tooth_height(body), False),
+        ):
+            tooth = one("broken", gear=gear, broken_height_mm=1e3 * height).apply(
+                healthy_tooth(body), 0
+            )
             assert tooth.present == present
 
     def test_a_triangular_chip_falls_off_along_the_face(self, xiamen, gear):
@@ -277,7 +329,9 @@ class TestTips:
         chip = one("chipped", gear=gear, chip_height_mm=2, chip_width_mm=8)
         tooth = chip.apply(healthy_tooth(body), 0)
         gone = np.isinf(tooth.material_loss)
-        height = np.array([body.tip_radius - on_flank(tooth)[row].min() if row.any() else 0.0 for row in gone])
+        height = np.array(
+            [body.tip_radius - on_flank(tooth)[row].min() if row.any() else 0.0 for row in gone]
+        )
         expected = 2e-3 * np.maximum(1 - across(tooth) / 8e-3, 0)
         # a node of the flank, and the arc of the tip, which is lower beside the centreline
         atol = np.diff(on_flank(tooth)).max() + body.tip_radius - on_flank(tooth)[-1]
@@ -285,7 +339,9 @@ class TestTips:
         assert tooth.tip_curvature_radius == tooth.profile.curvature_radius[-1]
 
     def test_a_rectangular_chip_does_not(self, xiamen, gear):
-        tooth = one("chipped", gear=gear, chip_shape="rectangular").apply(healthy_tooth(getattr(xiamen.pair, gear)), 0)
+        tooth = one("chipped", gear=gear, chip_shape="rectangular").apply(
+            healthy_tooth(getattr(xiamen.pair, gear)), 0
+        )
         assert_allclose(tooth.slice_edges, [0, 8e-3, 20e-3], rtol=1e-12, atol=0)
         assert np.isinf(tooth.material_loss).any(axis=1).tolist() == [True, False]
 
@@ -293,11 +349,14 @@ class TestTips:
 class TestDistributedPitting:
     @staticmethod
     def pits(xiamen, number=0, **changes):
-        return one("distributed_pitting", **changes).apply(healthy_tooth(xiamen.pair.pinion), number)
+        return one("distributed_pitting", **changes).apply(
+            healthy_tooth(xiamen.pair.pinion), number
+        )
 
     def test_the_seed_and_the_tooth_decide(self, xiamen):
         first, again, other_seed, other_tooth = (
-            self.pits(xiamen, **own).material_loss for own in ({}, {}, {"pit_seed": 1}, {"number": 1})
+            self.pits(xiamen, **own).material_loss
+            for own in ({}, {}, {"pit_seed": 1}, {"number": 1})
         )
         assert_allclose(first, again, rtol=0, atol=0)
         assert not np.array_equal(first, other_seed)
@@ -305,7 +364,9 @@ class TestDistributedPitting:
         assert not np.array_equal(other_seed, other_tooth)
 
     def test_a_larger_share_has_all_pits_of_a_smaller(self, xiamen):
-        series = [self.pits(xiamen, pitted_share=share).material_loss for share in (0.02, 0.05, 0.1, 0.3)]
+        series = [
+            self.pits(xiamen, pitted_share=share).material_loss for share in (0.02, 0.05, 0.1, 0.3)
+        ]
         for less, more in pairwise(series):
             assert np.all(more >= less)
             assert (more > less).any()
@@ -331,7 +392,9 @@ class TestDistributedPitting:
     def test_sizes_are_log_normal_about_the_median(self, xiamen):
         even = self.pits(xiamen, diameter_scatter=0.0).material_loss
         assert_allclose(np.unique(even), [0, 0.1e-3], rtol=1e-12, atol=0)
-        depths = np.unique(np.concatenate([np.unique(self.pits(xiamen, k).material_loss) for k in range(12)]))[1:]
+        depths = np.unique(
+            np.concatenate([np.unique(self.pits(xiamen, k).material_loss) for k in range(12)])
+        )[1:]
         # deep pits cover shallow ones, so that the median seen lies a little above the one drawn
         assert 0.1e-3 < np.median(depths) < 0.13e-3
         assert 0.3 < np.log(depths).std() < 0.45

@@ -25,7 +25,9 @@ def rows(table, gear, tooth):
 
 
 def assert_same_tooth(table, other, gear, tooth):
-    for key, found, expected in zip(KEYS, rows(table, gear, tooth), rows(other, gear, tooth), strict=True):
+    for key, found, expected in zip(
+        KEYS, rows(table, gear, tooth), rows(other, gear, tooth), strict=True
+    ):
         assert_allclose(found, expected, rtol=1e-12, atol=1e-18, err_msg=f"{key} of tooth {tooth}")
 
 
@@ -55,9 +57,9 @@ class TestSeveralTeeth:
     def test_runout_moves_every_tooth_differently(self, xiamen):
         table = xiamen.mesh_table((one("runout", tooth=4),))
         assert sorted(table.pinion.kind.tolist()) == list(range(1, 24))
-        assert faulty_teeth(xiamen.pair, [one("runout", tooth=4, eccentricity_um=0)])["pinion", 0] is healthy_tooth(
-            xiamen.pair.pinion
-        )
+        assert faulty_teeth(xiamen.pair, [one("runout", tooth=4, eccentricity_um=0)])[
+            "pinion", 0
+        ] is healthy_tooth(xiamen.pair.pinion)
 
     @pytest.mark.parametrize(
         ("tooth", "first", "teeth"),
@@ -70,7 +72,10 @@ class TestSeveralTeeth:
 
     def test_a_fault_can_be_a_key(self):
         """Tables are kept by their faults."""
-        assert len({one("wear", tooth=[1, 5]), one("wear", tooth=[1, 5]), one("wear", tooth="all")}) == 2
+        assert (
+            len({one("wear", tooth=[1, 5]), one("wear", tooth=[1, 5]), one("wear", tooth="all")})
+            == 2
+        )
 
 
 class TestCompound:
@@ -92,14 +97,22 @@ class TestCompound:
         assert np.flatnonzero(both.pinion.kind).tolist() == [2]
 
     def test_order_on_different_teeth_is_nothing(self, xiamen):
-        faults = one("crack", tooth=2), one("pitting", tooth=9), one("wear", gear="wheel", tooth="all")
+        faults = (
+            one("crack", tooth=2),
+            one("pitting", tooth=9),
+            one("wear", gear="wheel", tooth="all"),
+        )
         one_way, other = xiamen.mesh_table(faults), xiamen.mesh_table(faults[::-1])
         for gear, tooth in (("pinion", 2), ("pinion", 9), ("pinion", 0), ("wheel", 3)):
             assert_same_tooth(one_way, other, gear, tooth)
 
     def test_a_fault_on_some_of_the_worn_teeth(self, xiamen):
         """Teeth to which the same has happened stay one object, whatever came before."""
-        faults = one("wear", tooth="all"), one("crack", tooth=[3, 4]), one("wear", tooth=[4, 5], wear_depth_um=3)
+        faults = (
+            one("wear", tooth="all"),
+            one("crack", tooth=[3, 4]),
+            one("wear", tooth=[4, 5], wear_depth_um=3),
+        )
         table = xiamen.mesh_table(faults)
         kind = table.pinion.kind
         assert len(set(kind.tolist())) == 4
@@ -109,13 +122,19 @@ class TestCompound:
 
     def test_loss_and_deviation_add_to_one_gap(self, xiamen):
         """Even wear of a misplaced tooth: the gaps add."""
-        wear, pitch = one("wear", tooth=2, wear_profile=None, wear_depth_um=10), one("pitch_error", tooth=2)
+        wear, pitch = (
+            one("wear", tooth=2, wear_profile=None, wear_depth_um=10),
+            one("pitch_error", tooth=2),
+        )
         table = xiamen.mesh_table((wear, pitch))
         gap, at_pitch_point = rows(table, "pinion", 2)[1], xiamen.pair.pitch_point
         assert np.interp(at_pitch_point, table.position, gap) == pytest.approx(30e-6, rel=1e-9)
 
     def test_a_cracked_missing_tooth_is_missing(self, xiamen):
-        for faults in ((one("missing_tooth"), one("crack")), (one("pitting"), one("missing_tooth"))):
+        for faults in (
+            (one("missing_tooth"), one("crack")),
+            (one("pitting"), one("missing_tooth")),
+        ):
             table = xiamen.mesh_table(faults)
             assert not table.pinion.present[table.pinion.kind[0]]
 

@@ -38,7 +38,11 @@ def test_what_pulls_a_crack_open_on_one_flank_presses_it_together_on_the_other()
 
 def test_what_is_of_a_flank_stays_with_it():
     pit = Pitting(**ON, pit_length=1e-3, pit_width=2e-3, pit_depth=1e-4)
-    for fault in (pit, PitchError(**ON, pitch_error=5e-6, limit=1e-4), Wear(**ON, wear_depth=1e-5, limit=1e-4)):
+    for fault in (
+        pit,
+        PitchError(**ON, pitch_error=5e-6, limit=1e-4),
+        Wear(**ON, wear_depth=1e-5, limit=1e-4),
+    ):
         assert fault.on_other_flank() is None
 
 

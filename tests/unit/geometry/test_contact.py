@@ -33,7 +33,11 @@ def test_reference_line_of_action(pair):
     assert_allclose(pair.transverse_contact_ratio, 1.71178, rtol=0, atol=6e-6)
     assert_allclose(pair.base_pitch, 5.90426e-3, rtol=0, atol=6e-9)
     assert_allclose(pair.tangent_length, 36.59616e-3, rtol=0, atol=6e-9)
-    found = [pair.start_curvature_radius, pair.end_curvature_radius, pair.pinion_curvature(pair.pitch_point)]
+    found = [
+        pair.start_curvature_radius,
+        pair.end_curvature_radius,
+        pair.pinion_curvature(pair.pitch_point),
+    ]
     assert_allclose(found, [2.45827e-3, 12.56508e-3, 7.86646e-3], rtol=0, atol=6e-9)
 
 
@@ -42,15 +46,25 @@ class TestShifts:
     def test_curvatures_add_up_and_the_pitch_point_halves_by_ratio(self, shifted, shifts):
         pair = shifted(*shifts)
         s = np.linspace(0, pair.path_of_contact, 7)
-        assert_allclose(pair.pinion_curvature(s) + pair.wheel_curvature(s), pair.tangent_length, rtol=1e-12, atol=0)
-        at_pitch_point = pair.wheel_curvature(pair.pitch_point) / pair.pinion_curvature(pair.pitch_point)
+        assert_allclose(
+            pair.pinion_curvature(s) + pair.wheel_curvature(s),
+            pair.tangent_length,
+            rtol=1e-12,
+            atol=0,
+        )
+        at_pitch_point = pair.wheel_curvature(pair.pitch_point) / pair.pinion_curvature(
+            pair.pitch_point
+        )
         assert_allclose(at_pitch_point, pair.ratio, rtol=1e-12, atol=0)
         assert_allclose(pair.wheel.base_pitch, pair.pinion.base_pitch, rtol=1e-12, atol=0)
 
     def test_teeth_fill_the_working_pitch_circle(self, shifted, shifts):
         """No play at the working centre distance: both tooth thicknesses make one pitch (an independent reading)."""
         pair = shifted(*shifts)
-        radii = [gear.base_radius / math.cos(pair.working_pressure_angle) for gear in (pair.pinion, pair.wheel)]
+        radii = [
+            gear.base_radius / math.cos(pair.working_pressure_angle)
+            for gear in (pair.pinion, pair.wheel)
+        ]
         thickness = sum(
             2 * radius * gear.half_tooth_angle_at(radius)
             for gear, radius in zip((pair.pinion, pair.wheel), radii, strict=True)
@@ -86,10 +100,14 @@ def outline_distance(pair, pinion_position, wheel_position, corner_of):
     def wheel_flank(rho):
         start = pair.tangent_length - pair.start_curvature_radius - wheel_position
         r = pair.wheel.base_radius
-        return center[:, None] + turn(-r * normal[:, None] - along[:, None] * rho, (rho - start) / r)
+        return center[:, None] + turn(
+            -r * normal[:, None] - along[:, None] * rho, (rho - start) / r
+        )
 
     gear, flank, mate = (
-        (pair.pinion, pinion_flank, wheel_flank) if corner_of == "pinion" else (pair.wheel, wheel_flank, pinion_flank)
+        (pair.pinion, pinion_flank, wheel_flank)
+        if corner_of == "pinion"
+        else (pair.wheel, wheel_flank, pinion_flank)
     )
     corner = flank(np.array([math.sqrt(gear.tip_radius**2 - gear.base_radius**2)]))
     rho = np.linspace(0, 40e-3, 4001)
@@ -109,11 +127,16 @@ class TestCornerGap:
 
     def test_it_opens_monotonically(self, pair):
         s = np.linspace(0, 5e-3, 200)
-        for gap in (corner_gap(pair, pair.path_of_contact + s), corner_gap(pair, -s), corner_gap_by_pinion(pair, -s)):
+        for gap in (
+            corner_gap(pair, pair.path_of_contact + s),
+            corner_gap(pair, -s),
+            corner_gap_by_pinion(pair, -s),
+        ):
             assert np.all(np.diff(gap) > 0)
 
     @pytest.mark.parametrize(
-        ("side", "expected"), [("before", [1.61, 10.0, 28.8, 57.5, 115.9]), ("after", [0.83, 5.25, 15.4, 31.3, 64.2])]
+        ("side", "expected"),
+        [("before", [1.61, 10.0, 28.8, 57.5, 115.9]), ("after", [0.83, 5.25, 15.4, 31.3, 64.2])],
     )
     def test_reference_numbers(self, pair, side, expected):
         # spur reference (docs/validation.md), section 5.3, point 6
@@ -143,14 +166,27 @@ class TestCornerGap:
 
 class TestPairsThatCannotMesh:
     def test_interference(self, pair):
-        with pytest.raises(GeometryError, match=r"pinion: contact would reach curvature radius .* \(interference\)"):
-            replace(pair, wheel=replace(pair.wheel, addendum_coefficient=1.2, cutter_tip_radius_coefficient=0.3))
+        with pytest.raises(
+            GeometryError, match=r"pinion: contact would reach curvature radius .* \(interference\)"
+        ):
+            replace(
+                pair,
+                wheel=replace(
+                    pair.wheel, addendum_coefficient=1.2, cutter_tip_radius_coefficient=0.3
+                ),
+            )
         assert replace(pair, wheel=replace(pair.wheel, addendum_coefficient=1.02))
 
     def test_tip_in_the_root(self, pair):
-        shallow = {"clearance_coefficient": 0.02, "cutter_tip_radius_coefficient": 0.01, "profile_shift": 0.6}
+        shallow = {
+            "clearance_coefficient": 0.02,
+            "cutter_tip_radius_coefficient": 0.01,
+            "profile_shift": 0.6,
+        }
         large = replace(pair.pinion, n_teeth=40)
-        with pytest.raises(GeometryError, match=r"pinion: its tip cuts .* mm into the root of the wheel"):
+        with pytest.raises(
+            GeometryError, match=r"pinion: its tip cuts .* mm into the root of the wheel"
+        ):
             replace(pair, pinion=replace(large, **shallow), wheel=replace(pair.wheel, **shallow))
         assert replace(pair, pinion=large)
 
@@ -169,6 +205,8 @@ class TestPairsThatCannotMesh:
             backlash=0.0,
         )
         assert short.transverse_contact_ratio < 1
-        with pytest.raises(GeometryError, match=f"contact ratio {short.transverse_contact_ratio:.4f} is below 1"):
+        with pytest.raises(
+            GeometryError, match=f"contact ratio {short.transverse_contact_ratio:.4f} is below 1"
+        ):
             short.require_continuous_drive()
         pair.require_continuous_drive()

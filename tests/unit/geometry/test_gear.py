@@ -30,13 +30,17 @@ def test_radii_and_angles_of_the_reference_pair(gear_with, n_teeth):
     gear = gear_with(n_teeth=n_teeth)
     for key, value in TABLE[n_teeth].items():
         assert_allclose(getattr(gear, key), value * 1e-3, rtol=0, atol=6e-9)
-    assert_allclose([gear.half_tooth_angle_base, gear.root_half_angle], ANGLES[n_teeth], rtol=0, atol=6e-7)
+    assert_allclose(
+        [gear.half_tooth_angle_base, gear.root_half_angle], ANGLES[n_teeth], rtol=0, atol=6e-7
+    )
 
 
 @pytest.mark.parametrize(("n_teeth", "where"), MIDDLES)
 def test_middle_of_the_root_curve(gear_with, n_teeth, where):
     expected = np.array(MIDDLES[n_teeth, where]) * 1e-3
-    assert_allclose(root_curve_point(gear_with(n_teeth=n_teeth), where), expected, rtol=0, atol=2e-8)
+    assert_allclose(
+        root_curve_point(gear_with(n_teeth=n_teeth), where), expected, rtol=0, atol=2e-8
+    )
 
 
 def test_profile_covers_root_to_tip(xiamen):
@@ -44,7 +48,9 @@ def test_profile_covers_root_to_tip(xiamen):
     profile = tooth_profile(gear)
     x, y = profile.abscissa, profile.half_thickness
     assert len(x) == profile.n_root_cells + len(profile.curvature_radius)
-    assert_allclose(np.hypot(x[[0, -1]], y[[0, -1]]), [gear.root_radius, gear.tip_radius], rtol=1e-12, atol=0)
+    assert_allclose(
+        np.hypot(x[[0, -1]], y[[0, -1]]), [gear.root_radius, gear.tip_radius], rtol=1e-12, atol=0
+    )
     assert np.all(np.diff(x) > 0)
 
 
@@ -96,7 +102,10 @@ def test_a_large_shift_makes_the_tooth_pointed(gear_with):
             {"cutter_tip_radius_coefficient": 0.5},
             "cutter_tip_radius_coefficient = 0.5 must be positive and at most 0.38",
         ),
-        ({"bore_radius": 21e-3}, "bore_radius_mm = 21 must lie between 0 and the root radius 20.5 mm"),
+        (
+            {"bore_radius": 21e-3},
+            "bore_radius_mm = 21 must lie between 0 and the root radius 20.5 mm",
+        ),
         ({"bore_radius": 0.0}, "bore_radius_mm = 0 must lie between"),
     ],
 )
@@ -106,6 +115,10 @@ def test_sizes_that_cannot_be(xiamen, changes, text):
 
 
 def test_a_rack_tip_wider_than_the_space_is_refused(gear_with):
-    with pytest.raises(GeometryError, match=r"cutter_tip_radius_coefficient = 0\.38 is wider than the space"):
+    with pytest.raises(
+        GeometryError, match=r"cutter_tip_radius_coefficient = 0\.38 is wider than the space"
+    ):
         gear_with(n_teeth=40, pressure_angle=math.radians(25.0))
-    assert gear_with(n_teeth=40, pressure_angle=math.radians(25.0), cutter_tip_radius_coefficient=0.3)
+    assert gear_with(
+        n_teeth=40, pressure_angle=math.radians(25.0), cutter_tip_radius_coefficient=0.3
+    )

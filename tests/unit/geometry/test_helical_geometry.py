@@ -33,7 +33,9 @@ def beihang(addendum=1.0, helix=18.0):
     """Pair of the paper on transmission error."""
     rack = {"module": 1.3, "angle": 17.5, "addendum": addendum}
     pinion = gear("pinion", 61, -0.077, 15, helix=helix, **rack)
-    return GearPair(pinion=pinion, wheel=gear("wheel", 132, 0.150, 14, helix=-helix, **rack), backlash=1e-4)
+    return GearPair(
+        pinion=pinion, wheel=gear("wheel", 132, 0.150, 14, helix=-helix, **rack), backlash=1e-4
+    )
 
 
 def chongqing(pinion_shift, shift_sum):
@@ -52,7 +54,9 @@ def test_figures_of_the_transmission_error_paper():
     assert beihang(addendum=1.2423).total_contact_ratio == pytest.approx(3.325, abs=5e-4)
     force = 178 / pair.pinion.pitch_radius
     assert force == pytest.approx(4269.6, rel=2e-5)
-    assert force / math.cos(pair.pinion.transverse_pressure_angle) == pytest.approx(4498.1, rel=2e-5)
+    assert force / math.cos(pair.pinion.transverse_pressure_angle) == pytest.approx(
+        4498.1, rel=2e-5
+    )
 
 
 def test_figures_of_the_temperature_paper():
@@ -67,7 +71,10 @@ def test_figures_of_the_temperature_paper():
 
 
 def test_helix_zero_is_the_spur_gear_to_the_bit():
-    helical, spur = beihang(helix=0.0).pinion, dataclasses.replace(beihang(helix=0.0).pinion, helix_angle=-0.0)
+    helical, spur = (
+        beihang(helix=0.0).pinion,
+        dataclasses.replace(beihang(helix=0.0).pinion, helix_angle=-0.0),
+    )
     assert helical.transverse_pressure_angle == helical.pressure_angle
     assert helical.transverse_module == helical.normal_module
     for name in (
@@ -86,8 +93,12 @@ def test_normal_and_transverse_section_tell_the_same_tooth(helix):
     beta, alpha_n, alpha_t = one.helix_angle, one.pressure_angle, one.transverse_pressure_angle
     # the normal base pitch is that of the rack
     normal_base_pitch = math.pi * one.normal_module * math.cos(alpha_n)
-    assert one.base_pitch * math.cos(one.base_helix_angle) == pytest.approx(normal_base_pitch, rel=1e-12)
-    assert math.tan(one.base_helix_angle) == pytest.approx(math.tan(beta) * math.cos(alpha_t), rel=1e-12)
+    assert one.base_pitch * math.cos(one.base_helix_angle) == pytest.approx(
+        normal_base_pitch, rel=1e-12
+    )
+    assert math.tan(one.base_helix_angle) == pytest.approx(
+        math.tan(beta) * math.cos(alpha_t), rel=1e-12
+    )
     # thickness on the reference cylinder, normal to the teeth, is the rack's: pi m / 2 + 2 x m tan(alpha_n)
     thickness = 2 * one.pitch_radius * one.half_tooth_angle_at(one.pitch_radius) * math.cos(beta)
     rack = one.normal_module * (0.5 * math.pi + 2 * one.profile_shift * math.tan(alpha_n))
@@ -102,7 +113,12 @@ def test_root_curve_ends_on_the_involute_with_its_direction(helix):
     u, v = involute_point(one, one.junction_curvature_radius + np.array([0.0, 1e-9]))
     assert math.hypot(x[0] - u[0], y[0] - v[0]) < 1e-12
     assert (
-        abs(math.remainder(math.atan2(y[1] - y[0], x[1] - x[0]) - math.atan2(v[1] - v[0], u[1] - u[0]), math.pi)) < 1e-4
+        abs(
+            math.remainder(
+                math.atan2(y[1] - y[0], x[1] - x[0]) - math.atan2(v[1] - v[0], u[1] - u[0]), math.pi
+            )
+        )
+        < 1e-4
     )
 
 
@@ -110,7 +126,10 @@ def test_working_angle_closes_the_backlash():
     """At the working centre distance both teeth fill the pitch on the working pitch circles."""
     pair = beihang()
     working = pair.working_pressure_angle
-    share = sum(one.n_teeth * (one.half_tooth_angle_base - involute(working)) for one in (pair.pinion, pair.wheel))
+    share = sum(
+        one.n_teeth * (one.half_tooth_angle_base - involute(working))
+        for one in (pair.pinion, pair.wheel)
+    )
     assert share == pytest.approx(math.pi, rel=1e-12)
 
 
@@ -118,6 +137,8 @@ def test_hands_that_do_not_match_are_refused():
     pair = beihang()
     for other in (18.0, -17.0, 0.0):
         with pytest.raises(GeometryError, match=r"equal and of opposite hand"):
-            dataclasses.replace(pair, wheel=dataclasses.replace(pair.wheel, helix_angle=math.radians(other)))
+            dataclasses.replace(
+                pair, wheel=dataclasses.replace(pair.wheel, helix_angle=math.radians(other))
+            )
     with pytest.raises(GeometryError, match="must lie between -45 and 45"):
         dataclasses.replace(pair.pinion, helix_angle=math.radians(50))

@@ -36,19 +36,27 @@ def pair(*words):
 
 def test_figures_of_the_pump_drive():
     """Computed independently of this project for 54/54, m 3, b 20: factors and the forces that give the stress."""
-    outer, tip = (case(PUMP, f"strength.load_point={point}") for point in ("outer_single_pair", "tip"))
+    outer, tip = (
+        case(PUMP, f"strength.load_point={point}") for point in ("outer_single_pair", "tip")
+    )
     assert outer.decisive == tip.decisive == "wheel"
     factors = outer.factors["wheel"]
-    assert (factors.form_factor, factors.stress_correction_factor) == pytest.approx((1.167, 2.141), abs=6e-4)
+    assert (factors.form_factor, factors.stress_correction_factor) == pytest.approx(
+        (1.167, 2.141), abs=6e-4
+    )
     factors = tip.factors["wheel"]
-    assert (factors.form_factor, factors.stress_correction_factor) == pytest.approx((2.312, 1.714), abs=6e-4)
+    assert (factors.form_factor, factors.stress_correction_factor) == pytest.approx(
+        (2.312, 1.714), abs=6e-4
+    )
     assert factors.contact_ratio_factor == pytest.approx(0.674, abs=6e-4)
     for stress, forces in ((349.39e6, (8393, 7847)), (292.88e6, (7036, 6578))):
         assert (outer.force_for(stress), tip.force_for(stress)) == pytest.approx(forces, abs=1.0)
 
 
 def test_a_force_gives_the_stress_it_was_asked_for():
-    loaded = case(PUMP, "strength.application_factor=1.25", "strength.face_load_factor=1.2").under(349.39e6)
+    loaded = case(PUMP, "strength.application_factor=1.25", "strength.face_load_factor=1.2").under(
+        349.39e6
+    )
     found = loaded.gears()["wheel"]
     assert found.stress == pytest.approx(349.39e6, rel=1e-12)
     assert found.nominal == pytest.approx(349.39e6 / 1.5, rel=1e-12)
@@ -58,10 +66,15 @@ def test_a_force_gives_the_stress_it_was_asked_for():
 
 def test_stress_goes_with_force_and_against_width_and_module_squared():
     base = case(*EQUAL).gears()["wheel"].nominal
-    assert case(*EQUAL, "operating.torque_nm=260").gears()["wheel"].nominal == pytest.approx(2.0 * base)
+    assert case(*EQUAL, "operating.torque_nm=260").gears()["wheel"].nominal == pytest.approx(
+        2.0 * base
+    )
     wide = case(*EQUAL, "gear.pinion.face_width_mm=40", "gear.wheel.face_width_mm=40")
     assert wide.gears()["wheel"].nominal == pytest.approx(0.5 * base)
-    large = [f"gear.{key}" for key in ("normal_module_mm=6", "pinion.bore_radius_mm=63", "wheel.bore_radius_mm=63")]
+    large = [
+        f"gear.{key}"
+        for key in ("normal_module_mm=6", "pinion.bore_radius_mm=63", "wheel.bore_radius_mm=63")
+    ]
     # at the same torque the force is half too
     assert case(*EQUAL, *large).gears()["wheel"].nominal == pytest.approx(0.25 * base, rel=1e-9)
 
@@ -77,12 +90,20 @@ def test_a_wider_gear_is_helped_by_a_module_at_either_end():
 def test_no_helix_is_a_spur_gear():
     spur = case(PUMP).factors["wheel"].stress_per_force
     for edition in (2019, 2006):
-        words = (PUMP, "system=helical_pair", f"strength.edition={edition}", "gear.helix_angle_deg=0.01")
+        words = (
+            PUMP,
+            "system=helical_pair",
+            f"strength.edition={edition}",
+            "gear.helix_angle_deg=0.01",
+        )
         assert case(*words).factors["wheel"].stress_per_force == pytest.approx(spur, rel=2e-3)
 
 
 def test_load_distribution_goes_on_at_its_bounds():
-    few, many = pair("system=helical_pair", "gear.addendum_coefficient=0.9"), pair("system=helical_pair")
+    few, many = (
+        pair("system=helical_pair", "gear.addendum_coefficient=0.9"),
+        pair("system=helical_pair"),
+    )
     assert normal_contact_ratio(few) < 2.0 < normal_contact_ratio(many)
     for found in (few, many):
         ratio = normal_contact_ratio(found)
@@ -92,7 +113,9 @@ def test_load_distribution_goes_on_at_its_bounds():
                 pinion=replace(found.pinion, face_width=width),
                 wheel=replace(found.wheel, face_width=width),
             )
-            for width in np.array([1e-9, 0.5, 0.999999, 1.5]) * found.face_width / found.overlap_ratio
+            for width in np.array([1e-9, 0.5, 0.999999, 1.5])
+            * found.face_width
+            / found.overlap_ratio
         ]
         values = [load_distribution_factor(one) for one in narrow]
         assert values[0] == pytest.approx(1.0 if ratio < 2.0 else math.sqrt(0.5), rel=1e-6)
@@ -108,7 +131,9 @@ def test_load_distribution_goes_on_at_its_bounds():
 def test_helix_factor():
     found = pair("system=helical_pair")  # 18 degrees, overlap above 1
     assert helix_factor(found, edition=2006) == pytest.approx(1.0 - 18.0 / 120.0)
-    assert helix_factor(found, edition=2019) == pytest.approx(0.85 / math.cos(math.radians(18.0)) ** 3)
+    assert helix_factor(found, edition=2019) == pytest.approx(
+        0.85 / math.cos(math.radians(18.0)) ** 3
+    )
     steep = pair("system=helical_pair", "gear.helix_angle_deg=38")
     assert helix_factor(steep, edition=2006) == pytest.approx(0.75)
     assert helix_factor(pair(PUMP), edition=2019) == 1.0
@@ -117,14 +142,19 @@ def test_helix_factor():
 def test_rim_and_deep_teeth():
     wheel = pair(PUMP).wheel
     height = wheel.tip_radius - wheel.root_radius
-    rims = {share: replace(wheel, bore_radius=wheel.root_radius - share * height) for share in (0.51, 0.8, 1.2, 3.0)}
+    rims = {
+        share: replace(wheel, bore_radius=wheel.root_radius - share * height)
+        for share in (0.51, 0.8, 1.2, 3.0)
+    }
     values = {share: rim_thickness_factor(gear) for share, gear in rims.items()}
     assert values[3.0] == values[1.2] == 1.0
     assert values[0.8] == pytest.approx(1.6 * math.log(2.242 / 0.8))
     assert values[0.51] > values[0.8] > 1.6
     with pytest.raises(GeometryError, match="reduce bore_radius_mm"):
         rim_thickness_factor(replace(wheel, bore_radius=wheel.root_radius - 0.4 * height))
-    assert [deep_tooth_factor(ratio, 4) for ratio in (2.0, 2.3, 2.6)] == pytest.approx([1.0, 0.8342, 0.7])
+    assert [deep_tooth_factor(ratio, 4) for ratio in (2.0, 2.3, 2.6)] == pytest.approx(
+        [1.0, 0.8342, 0.7]
+    )
     assert deep_tooth_factor(2.3, 5) == 1.0
     assert deep_tooth_factor(2.6, None) == 0.7
 
@@ -158,17 +188,27 @@ def test_equal_gears_see_the_same_from_either_end():
     path = case(*EQUAL).pair.path_of_contact
     inside = np.linspace(0.01, 0.99, 60) * path
     np.testing.assert_allclose(
-        np.interp(inside, history.roll, pinion), np.interp(path - inside, history.roll, wheel), rtol=5e-3
+        np.interp(inside, history.roll, pinion),
+        np.interp(path - inside, history.roll, wheel),
+        rtol=5e-3,
     )
     assert pinion.max() == pytest.approx(wheel.max(), rel=1e-7)
-    assert pinion[inside.searchsorted(0.2 * path)] != pytest.approx(wheel[inside.searchsorted(0.2 * path)], rel=0.1)
+    assert pinion[inside.searchsorted(0.2 * path)] != pytest.approx(
+        wheel[inside.searchsorted(0.2 * path)], rel=0.1
+    )
 
 
 @pytest.mark.parametrize("coupling", ["coupled", "independent"])
 @pytest.mark.parametrize("law", ["paper", "one_sided"])
 def test_slices_of_a_spur_pair_are_the_pair_itself(coupling, law):
     whole = case(*EQUAL, f"mesh.law={law}", "operating.torque_nm=400").history()
-    words = (*EQUAL, f"mesh.law={law}", "system=helical_pair", f"mesh.slice_coupling={coupling}", "mesh.n_slices=8")
+    words = (
+        *EQUAL,
+        f"mesh.law={law}",
+        "system=helical_pair",
+        f"mesh.slice_coupling={coupling}",
+        "mesh.n_slices=8",
+    )
     sliced = case(*words, "gear=engine_pump_drive", "operating.torque_nm=400").history()
     for name in ("pinion", "wheel"):
         inside = np.linspace(0.02, 0.98, 200) * whole.roll[-2]
@@ -182,14 +222,19 @@ def test_slices_of_a_spur_pair_are_the_pair_itself(coupling, law):
 
 def test_spreading_keeps_the_sum_and_evens_out():
     rng = np.random.default_rng(1)
-    own, structure = rng.random((3, 2, 40)) * (rng.random((3, 2, 40)) > 0.5), 1.0 + rng.random((3, 2, 40))
+    own, structure = (
+        rng.random((3, 2, 40)) * (rng.random((3, 2, 40)) > 0.5),
+        1.0 + rng.random((3, 2, 40)),
+    )
     found = spread_along_face(own, structure, 9.0)
     np.testing.assert_allclose(found.sum(axis=2), own.sum(axis=2), rtol=1e-12)
     assert found.min() > 0.0
     assert found.max() < own.max()
     np.testing.assert_allclose(spread_along_face(own, structure, 0.0), own)
     even = np.ones((1, 40))
-    np.testing.assert_allclose(spread_along_face(even, np.full((1, 40), 2.0), 9.0), even, rtol=1e-12)
+    np.testing.assert_allclose(
+        spread_along_face(even, np.full((1, 40), 2.0), 9.0), even, rtol=1e-12
+    )
     # one loaded slice: exponential to either side, over the root of the coupling
     one = np.zeros((1, 401))
     one[0, 200] = 1.0

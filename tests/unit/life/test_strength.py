@@ -29,7 +29,10 @@ def safe(strength, stress=349.39e6, **changes):
 def test_the_papers_safety_factors(strength):
     assert safe(strength).paper == pytest.approx(1.353, abs=5e-4)
     assert safe(strength, 292.88e6).paper == pytest.approx(1.614, abs=5e-4)
-    assert [reliability(safe(strength, stress).paper) for stress in (349.39e6, 292.88e6)] == ["general", "higher"]
+    assert [reliability(safe(strength, stress).paper) for stress in (349.39e6, 292.88e6)] == [
+        "general",
+        "higher",
+    ]
 
 
 def test_iso_counts_the_test_gears_own_notch(strength):
@@ -53,7 +56,9 @@ def test_every_factor_is_a_factor(strength, key):
 
 def test_safety_falls_with_the_stress_and_rises_with_the_limit(strength):
     assert safe(strength, 2e8).iso == pytest.approx(2.0 * safe(strength, 4e8).iso)
-    assert safe(strength, bending_limit=2.0 * strength.bending_limit).paper == pytest.approx(2.0 * safe(strength).paper)
+    assert safe(strength, bending_limit=2.0 * strength.bending_limit).paper == pytest.approx(
+        2.0 * safe(strength).paper
+    )
 
 
 def test_life_factor():
@@ -99,7 +104,10 @@ def test_every_option_is_a_strength():
         ({"bending_limit_mpa": 0}, "strength.bending_limit_mpa = 0 must be positive"),
         ({"life_factor": -1}, "strength.life_factor = -1 must be positive"),
         ({"n_load_cycles": 0}, "strength.n_load_cycles = 0 must be positive"),
-        ({"load_point": "middle"}, "strength.load_point = 'middle'; allowed: outer_single_pair, tip"),
+        (
+            {"load_point": "middle"},
+            "strength.load_point = 'middle'; allowed: outer_single_pair, tip",
+        ),
         ({"edition": 1996}, "strength.edition = 1996; allowed: 2019, 2006"),
         ({"bending_limit": 5}, "write it as 'bending_limit_mpa'"),
         ({"dynamic_factor": "high"}, "strength.dynamic_factor = 'high' is not a number"),

@@ -34,7 +34,9 @@ def touching(found, angle=TANGENT):
     """Where our own root curve makes ``angle`` with the centreline: its parameter gamma."""
 
     def slope(gamma):
-        roll = (found.rounding_center_depth / math.tan(gamma) + found.rounding_center_offset) / found.pitch_radius
+        roll = (
+            found.rounding_center_depth / math.tan(gamma) + found.rounding_center_offset
+        ) / found.pitch_radius
         return gamma - roll - angle
 
     return brentq(slope, found.pressure_angle, 0.5 * math.pi)
@@ -58,7 +60,9 @@ def test_the_critical_section_lies_on_our_own_root_curve(n_teeth, shift, roundin
     around = at + np.linspace(-2e-2, 2e-2, 201)
     x, y = root_curve(found, around)
     dx, dy = np.gradient(x, around), np.gradient(y, around)
-    curvature = np.abs(dx * np.gradient(dy, around) - dy * np.gradient(dx, around)) / np.hypot(dx, dy) ** 3
+    curvature = (
+        np.abs(dx * np.gradient(dy, around) - dy * np.gradient(dx, around)) / np.hypot(dx, dy) ** 3
+    )
     assert section.fillet_radius == pytest.approx(1.0 / curvature[100], rel=1e-5)
 
 
@@ -110,7 +114,12 @@ def test_many_teeth_are_a_rack():
     alpha, rounding, found = math.radians(20.0), 0.38, gear(10**6, module=1e-3)
     # centre of the circle: b from the centreline, a below the pitch line; tangent at 30 degrees to the centreline
     a = 1.25 - rounding
-    b = math.pi / 4.0 + 1.25 * math.tan(alpha) - rounding * math.tan(alpha) + rounding / math.cos(alpha)
+    b = (
+        math.pi / 4.0
+        + 1.25 * math.tan(alpha)
+        - rounding * math.tan(alpha)
+        + rounding / math.cos(alpha)
+    )
     section, loading = root_section(found), root_loading(found, 0.0)
     thickness, depth = 2.0 * (b - rounding * math.cos(TANGENT)), a + rounding * math.sin(TANGENT)
     assert section.thickness == pytest.approx(1e-3 * thickness, rel=1e-5)
@@ -119,13 +128,19 @@ def test_many_teeth_are_a_rack():
     arm = 1.0 + depth - half_tip * math.tan(alpha)
     assert loading.lever_arm[0] == pytest.approx(1e-3 * arm, rel=1e-5)
     assert loading.form_factor[0] == pytest.approx(6.0 * arm / thickness**2, rel=1e-4)
-    assert (loading.form_factor[0], loading.stress_correction_factor[0]) == pytest.approx((2.06, 1.97), rel=5e-3)
+    assert (loading.form_factor[0], loading.stress_correction_factor[0]) == pytest.approx(
+        (2.06, 1.97), rel=5e-3
+    )
 
 
 def test_factors_do_not_depend_on_size_and_a_rounder_root_has_less_stress():
-    small, large = (root_loading(gear(30, module=size), [0.0, 2.0 * size]) for size in (1e-3, 25e-3))
+    small, large = (
+        root_loading(gear(30, module=size), [0.0, 2.0 * size]) for size in (1e-3, 25e-3)
+    )
     np.testing.assert_allclose(small.stress_factor, large.stress_factor, rtol=1e-12)
-    sharp, round_ = (root_loading(gear(30, rounding=radius), 0.0).stress_factor[0] for radius in (0.2, 0.38))
+    sharp, round_ = (
+        root_loading(gear(30, rounding=radius), 0.0).stress_factor[0] for radius in (0.2, 0.38)
+    )
     assert sharp > 1.03 * round_
     higher, lower = root_loading(gear(30), [0.0, 2e-3]).stress_factor
     assert higher > lower
@@ -148,7 +163,8 @@ def test_a_helical_gear_has_the_factors_of_its_virtual_gear():
     helical = gear(40, helix=20.0)
     virtual = virtual_gear(helical)
     near = [
-        root_loading(gear(n), 0.0).stress_factor[0] for n in (math.floor(virtual.n_teeth), math.ceil(virtual.n_teeth))
+        root_loading(gear(n), 0.0).stress_factor[0]
+        for n in (math.floor(virtual.n_teeth), math.ceil(virtual.n_teeth))
     ]
     assert virtual.n_teeth == pytest.approx(40 / math.cos(math.radians(20.0)) ** 3, rel=0.02)
     assert min(near) < root_loading(helical, 0.0).stress_factor[0] < max(near)

@@ -112,7 +112,13 @@ def test_laws_know_their_range_and_refuse_a_negative_life():
             law.life(torque, speed)
     assert power.life(500.0, 6.0, allow_extrapolation=True) > 0.0
     printed = FittedLaw(
-        form="logarithm", a=709.3, b=127.3, c=0.0, torque=(10.0, 300.0), speed=(12.0, 12.0), largest_error=0.0
+        form="logarithm",
+        a=709.3,
+        b=127.3,
+        c=0.0,
+        torque=(10.0, 300.0),
+        speed=(12.0, 12.0),
+        largest_error=0.0,
     )
     with pytest.raises(SimulationError, match="gives a life of -"):  # inside its range
         printed.life(265.0, 12.0)
@@ -130,7 +136,9 @@ def test_local_exponent(full):
     assert torque_exponent(full) == pytest.approx(1.0, abs=0.15)
 
 
-@pytest.mark.parametrize("words", [FULL, ("system=helical_pair", "mesh.n_slices=8", "wear.threshold_um=5")])
+@pytest.mark.parametrize(
+    "words", [FULL, ("system=helical_pair", "mesh.n_slices=8", "wear.threshold_um=5")]
+)
 def test_what_is_worn_off_is_a_fault(words):
     case = case_of(*words)
     depth = wear_life(case).depth[-1]
@@ -146,7 +154,10 @@ def test_what_is_worn_off_is_a_fault(words):
         inside = (curvature > curvature.min() + 4e-4) & (curvature < curvature.max() - 4e-4)
         found = np.interp(curvature, tooth.profile.curvature_radius, loss)
         assert_allclose(found[inside], mean[inside], atol=0.05 * mean.max())
-        assert loss[tooth.profile.curvature_radius < curvature[order][0] - 4e-4].max(initial=0.0) == 0.0
+        assert (
+            loss[tooth.profile.curvature_radius < curvature[order][0] - 4e-4].max(initial=0.0)
+            == 0.0
+        )
 
 
 def test_turns_until_the_same_teeth_meet(full):
@@ -176,7 +187,10 @@ def test_turns_until_the_same_teeth_meet(full):
         (["wear.step_um=0"], "wear.step_um = 0 must be positive"),
         (["wear.wheel=3"], "wear.wheel = 3 must be a group of keys"),
         (["wear.transmission_error_limit_um=0"], "must be positive"),
-        (["wear.transmission_error_limit_um=9", "wear.geometry=unworn"], "needs wear.geometry=worn"),
+        (
+            ["wear.transmission_error_limit_um=9", "wear.geometry=unworn"],
+            "needs wear.geometry=worn",
+        ),
         (["wear.transmission_error_limit_um=9", "wear.sharing=one_pair"], "wear.sharing=mesh"),
         (["wear.transmission_error_limit_um=9", "gear=harbin_38_55"], "needs wear.sharing=mesh"),
         (["operating.torque_nm=0"], "operating.torque_nm = 0 must be positive"),
@@ -201,7 +215,9 @@ def test_a_history_with_gaps_is_refused(full):
 
 
 def test_values_of_a_gear_override_those_of_both():
-    keys = compose("generate", ["wear.pinion.coefficient=1e-6", "wear.wheel.hardness_hbs=200"])["wear"]
+    keys = compose("generate", ["wear.pinion.coefficient=1e-6", "wear.wheel.hardness_hbs=200"])[
+        "wear"
+    ]
     options = read_wear_options(keys)
     assert options.wear_factor("pinion") == pytest.approx(1e-6 / (187 * 9.80665e6))
     assert options.wear_factor("wheel") == pytest.approx(6.25e-6 / (200 * 9.80665e6))

@@ -33,9 +33,13 @@ def test_what_goes_in_comes_out(gear, heat, bore, convection):
     rise = body.temperature - cooled.oil_temperature
     # the faces cool steeply near hot rims: integrate finely
     fine = np.linspace(body.radius[0], body.radius[-1], 20001)
-    faces = 4.0 * math.pi * convection * np.trapezoid(np.interp(fine, body.radius, rise) * fine, fine)
+    faces = (
+        4.0 * math.pi * convection * np.trapezoid(np.interp(fine, body.radius, rise) * fine, fine)
+    )
     teeth = cooled.tooth_convection * tooth_surface(gear) * rise[-1]
-    tolerance = 2e-4 if convection < 1e4 else 0.1  # the table's points are 0.6 mm apart, the fin's length is 6 mm there
+    tolerance = (
+        2e-4 if convection < 1e4 else 0.1
+    )  # the table's points are 0.6 mm apart, the fin's length is 6 mm there
     assert faces + teeth + body.to_bore == pytest.approx(6000.0, rel=tolerance)
     assert body.to_oil == pytest.approx(6000.0 - body.to_bore)
     if bore is None:
@@ -57,7 +61,9 @@ def test_the_disc_obeys_its_equation(gear, heat):
 def test_without_convection_at_the_faces_it_is_the_paper_s_equation_4(gear, heat):
     body = solved_body(gear, 6000.0, replace(heat, face_convection=0.0), bore_temperature=50.0)
     radius, ends = body.radius, body.temperature[[0, -1]]
-    expected = ends[0] + (ends[1] - ends[0]) * np.log(radius / radius[0]) / np.log(radius[-1] / radius[0])
+    expected = ends[0] + (ends[1] - ends[0]) * np.log(radius / radius[0]) / np.log(
+        radius[-1] / radius[0]
+    )
     np.testing.assert_allclose(body.temperature, expected, rtol=1e-10)
     assert ends[1] > ends[0] + 5.0
 
@@ -93,7 +99,9 @@ def test_a_known_temperature_is_the_same_all_over(gear):
 
 def test_a_gear_that_nothing_cools_is_refused(gear, heat):
     closed = replace(heat, face_convection=0.0, tooth_convection=0.0)
-    with pytest.raises(ConfigError, match=r"^pinion: nothing cools it; give heat.face_convection_w_per_m2k"):
+    with pytest.raises(
+        ConfigError, match=r"^pinion: nothing cools it; give heat.face_convection_w_per_m2k"
+    ):
         solved_body(gear, 6000.0, closed, bore_temperature=None)
     held = solved_body(gear, 6000.0, closed, bore_temperature=60.0)
     assert held.to_bore == pytest.approx(6000.0)

@@ -13,7 +13,11 @@ from gensig.errors import ExtrapolationError
 from gensig.geometry.tooth import healthy_tooth
 from gensig.geometry.tooth_profile import involute_point, load_angle, tooth_profile
 from gensig.mesh.compliance import tooth_compliance
-from gensig.mesh.fillet_foundation import ExtrapolationWarning, body_coefficients, fillet_foundation_compliance
+from gensig.mesh.fillet_foundation import (
+    ExtrapolationWarning,
+    body_coefficients,
+    fillet_foundation_compliance,
+)
 from gensig.mesh.local_contact import linear_contact
 
 # pinion at B, C and E, 1e-12 m/N (spur reference (docs/validation.md), table 2.2)
@@ -30,7 +34,9 @@ PINION = {
 def test_terms_of_the_reference_pinion(xiamen, term):
     gear, material = xiamen.pair.pinion, xiamen.material
     if term == "foundation":
-        found = fillet_foundation_compliance(gear, load_angle(gear, CURVATURE), material, allow_extrapolation=False)
+        found = fillet_foundation_compliance(
+            gear, load_angle(gear, CURVATURE), material, allow_extrapolation=False
+        )
     else:
         found = getattr(tooth_compliance(healthy_tooth(gear), CURVATURE, material), term)
     assert_allclose(found, np.array(PINION[term]) * 1e-12, rtol=1e-3, atol=0.01e-12)
@@ -50,8 +56,12 @@ def test_running_sums_equal_direct_quadrature(xiamen):
         return moment**2 / (material.youngs_modulus * (2 * half) ** 3 * gear.face_width / 12)
 
     knee = fine.abscissa[fine.n_root_cells]
-    expected = sum(quad(integrand, *ends, limit=200)[0] for ends in ((fine.abscissa[0], knee), (knee, x_load)))
-    assert_allclose(tooth_compliance(healthy_tooth(gear), rho, material).bending, expected, rtol=1e-4, atol=0)
+    expected = sum(
+        quad(integrand, *ends, limit=200)[0] for ends in ((fine.abscissa[0], knee), (knee, x_load))
+    )
+    assert_allclose(
+        tooth_compliance(healthy_tooth(gear), rho, material).bending, expected, rtol=1e-4, atol=0
+    )
 
 
 @pytest.mark.parametrize("term", ["bending", "shear", "axial"])
@@ -61,7 +71,9 @@ def test_quadrature_is_converged(xiamen, term):
     coarse, fine = (
         getattr(
             tooth_compliance(
-                healthy_tooth(gear, tooth_profile(gear, n_root_cells=n, n_flank_cells=3 * n // 2)), rho, xiamen.material
+                healthy_tooth(gear, tooth_profile(gear, n_root_cells=n, n_flank_cells=3 * n // 2)),
+                rho,
+                xiamen.material,
             ),
             term,
         )
@@ -76,8 +88,15 @@ def test_compliance_scales_with_modulus_and_width(xiamen, factor):
     base = tooth_compliance(healthy_tooth(gear), CURVATURE, material).total
     stiff = replace(material, youngs_modulus=factor * material.youngs_modulus)
     wide = healthy_tooth(replace(gear, face_width=factor * gear.face_width))
-    assert_allclose(tooth_compliance(healthy_tooth(gear), CURVATURE, stiff).total, base / factor, rtol=1e-12, atol=0)
-    assert_allclose(tooth_compliance(wide, CURVATURE, material).total, base / factor, rtol=1e-12, atol=0)
+    assert_allclose(
+        tooth_compliance(healthy_tooth(gear), CURVATURE, stiff).total,
+        base / factor,
+        rtol=1e-12,
+        atol=0,
+    )
+    assert_allclose(
+        tooth_compliance(wide, CURVATURE, material).total, base / factor, rtol=1e-12, atol=0
+    )
 
 
 def test_contact_term(xiamen):
@@ -108,7 +127,9 @@ class TestRangeOfTheBodyFit:
     @pytest.mark.parametrize("bore", [1e-3, 17e-3])
     def test_refused_beyond_unless_allowed(self, gear_with, bore):
         gear = gear_with(bore_radius=bore)
-        with pytest.raises(ExtrapolationError, match=r"pinion: root radius over bore radius h_f .*bore_radius_mm"):
+        with pytest.raises(
+            ExtrapolationError, match=r"pinion: root radius over bore radius h_f .*bore_radius_mm"
+        ):
             body_coefficients(gear, allow_extrapolation=False)
         with pytest.warns(ExtrapolationWarning):
             assert body_coefficients(gear, allow_extrapolation=True)

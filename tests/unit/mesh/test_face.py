@@ -27,7 +27,9 @@ def gap_rows(system, *faults):
 
 class TestLowerEnvelope:
     @pytest.fixture(
-        scope="class", params=[("rough", 1), ("smooth", 2), ("steps", 3), ("broken", 4)], ids=lambda own: own[0]
+        scope="class",
+        params=[("rough", 1), ("smooth", 2), ("steps", 3), ("broken", 4)],
+        ids=lambda own: own[0],
     )
     @classmethod
     def flank(cls, request):
@@ -35,7 +37,9 @@ class TestLowerEnvelope:
         name, seed = request.param
         rng = np.random.default_rng(seed)
         arc = np.sort(rng.uniform(0.0, 6e-3, 80))
-        back = rng.uniform(0.0, {"rough": 60, "smooth": 5, "steps": 0.1, "broken": 30}[name] * UM, (5, len(arc)))
+        back = rng.uniform(
+            0.0, {"rough": 60, "smooth": 5, "steps": 0.1, "broken": 30}[name] * UM, (5, len(arc))
+        )
         if name == "smooth":
             back = np.cumsum(back - back.mean(axis=1, keepdims=True), axis=1)
         if name == "steps":
@@ -59,10 +63,16 @@ class TestLowerEnvelope:
         place = arc[:-1, None] + np.diff(arc)[:, None] * share
         with np.errstate(invalid="ignore"):
             height = back[:, :-1, None] + np.diff(back, axis=1)[..., None] * share
-        height = np.where(np.isfinite(back[:, :-1, None]) & np.isfinite(back[:, 1:, None]), height, np.inf)
+        height = np.where(
+            np.isfinite(back[:, :-1, None]) & np.isfinite(back[:, 1:, None]), height, np.inf
+        )
         flat, where = height.reshape(len(back), -1), place.ravel()
         return np.stack(
-            [(flat + (where - x) ** 2 / (2 * rho)).min(axis=1) for x, rho in zip(center, radius, strict=True)], axis=1
+            [
+                (flat + (where - x) ** 2 / (2 * rho)).min(axis=1)
+                for x, rho in zip(center, radius, strict=True)
+            ],
+            axis=1,
         )
 
     def test_it_is_the_minimum(self, flank):
@@ -95,7 +105,9 @@ class TestRigidFlanks:
     @pytest.mark.parametrize("depth_mm", [0.05, 0.5])
     def test_a_short_pit_over_the_whole_face_opens_22_um(self, xiamen, depth_mm):
         """The mate rides on its edges, 0.52 mm of flank to either side: x^2 / (2 rho) with rho 6.2 mm at C."""
-        gap, table = gap_rows(xiamen, one("pitting", tooth=0, pit_width_mm=20, pit_depth_mm=depth_mm))
+        gap, table = gap_rows(
+            xiamen, one("pitting", tooth=0, pit_width_mm=20, pit_depth_mm=depth_mm)
+        )
         assert_allclose(gap[on_path(table)].max(), 22 * UM, rtol=0, atol=2 * UM)
         assert_allclose(table.position[gap.argmax()], xiamen.pair.pitch_point, rtol=0, atol=0.1e-3)
 
@@ -131,7 +143,9 @@ class TestRigidFlanks:
         short = replace(body, addendum_coefficient=addendum, clearance_coefficient=clearance)
         pair = replace(system.pair, **{gear: short})
         gap, table = gap_rows(system, fault)
-        from_its_own_start = table.position + system.pair.start_curvature_radius - pair.start_curvature_radius
+        from_its_own_start = (
+            table.position + system.pair.start_curvature_radius - pair.start_curvature_radius
+        )
         return gap[on_path(table)], corner_gap_by_pinion(pair, from_its_own_start)[on_path(table)]
 
     @pytest.mark.parametrize("gear", GEARS)
@@ -155,7 +169,9 @@ def shared(law: ContactLaw, slice_gap, width, load, bending):
     """Gap and compliance of the compiled sharing, (node,) each."""
     gap, compliance = np.empty_like(load), np.empty_like(load)
     unit = np.broadcast_to(bending, load.shape).copy()
-    share_over_slices(slice_gap, width, load, law.factor, law.constant, law.log_weight, unit, gap, compliance)
+    share_over_slices(
+        slice_gap, width, load, law.factor, law.constant, law.log_weight, unit, gap, compliance
+    )
     return gap, compliance
 
 
@@ -198,12 +214,18 @@ def approach_by_root_finding(law, bending, node, slice_gap, width, load):
 
         # beyond it the law would give way under less load
         highest = law.constant[node] + bending / law.factor - 1.0
-        return np.exp(highest if excess(highest) < 0 else brentq(excess, -60.0, highest, xtol=1e-14, rtol=1e-14))
+        return np.exp(
+            highest
+            if excess(highest) < 0
+            else brentq(excess, -60.0, highest, xtol=1e-14, rtol=1e-14)
+        )
 
     first = slice_gap.min()
 
     def missing(approach):
-        return sum(w * line_load(approach - g) for w, g in zip(width, slice_gap, strict=True)) - load
+        return (
+            sum(w * line_load(approach - g) for w, g in zip(width, slice_gap, strict=True)) - load
+        )
 
     return brentq(missing, first, first + 300 * UM, xtol=1e-18, rtol=1e-12)
 
@@ -232,7 +254,10 @@ class TestShareOverSlices:
         gap, compliance = shared(law, slice_gap, width, load, bending)
         assert_allclose(gap, slice_gap.min(axis=0), rtol=0, atol=0)
         approach = gap + (compliance + bending / width.sum()) * load
-        expected = [approach_by_root_finding(law, bending, k, slice_gap[:, k], width, load[k]) for k in range(10)]
+        expected = [
+            approach_by_root_finding(law, bending, k, slice_gap[:, k], width, load[k])
+            for k in range(10)
+        ]
         assert_allclose(approach, expected, rtol=1e-9 if law.log_weight == 0 else 1e-6, atol=0)
         touching = np.isfinite(slice_gap).sum(axis=0) - (slice_gap < approach).sum(axis=0)
         assert touching.min() == 0
@@ -242,12 +267,16 @@ class TestShareOverSlices:
         slice_gap, width, load = random_face
         rng = np.random.default_rng(2)
         for _ in range(200):
-            more = slice_gap + rng.uniform(0, 3 * UM, slice_gap.shape) * (rng.random(slice_gap.shape) < 0.2)
+            more = slice_gap + rng.uniform(0, 3 * UM, slice_gap.shape) * (
+                rng.random(slice_gap.shape) < 0.2
+            )
             before, after = (
                 gap + (c + bending / width.sum()) * load
                 for gap, c in (shared(law, g, width, load, bending) for g in (slice_gap, more))
             )
-            assert np.all(after >= before - (1e-9 if law.log_weight == 0 else 1e-8) * np.abs(before))
+            assert np.all(
+                after >= before - (1e-9 if law.log_weight == 0 else 1e-8) * np.abs(before)
+            )
             slice_gap = more
 
     def test_the_order_of_the_slices_is_nothing(self, law, bending, random_face):
@@ -283,5 +312,9 @@ class TestShareOverSlices:
 def test_bearing_width_narrows_as_the_paper_has_it(xiamen):
     fault = one("pitting", tooth=0, pit_width_mm=6)
     tooth = faulty_teeth(xiamen.pair, [fault])["pinion", 0]
-    at = np.asarray(xiamen.pair.pinion_curvature(np.array([0.0, xiamen.pair.pitch_point, xiamen.pair.path_of_contact])))
+    at = np.asarray(
+        xiamen.pair.pinion_curvature(
+            np.array([0.0, xiamen.pair.pitch_point, xiamen.pair.path_of_contact])
+        )
+    )
     assert_allclose(bearing_width(tooth, at), [20e-3, 14e-3, 20e-3], rtol=1e-12, atol=0)

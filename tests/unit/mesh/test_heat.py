@@ -24,12 +24,22 @@ SPEED = 125.0
 
 @pytest.fixture(scope="module")
 def duty():
-    return read_duty(compose("generate", ["system=helical_pair", "gear=chongqing_40_162", "heat=chongqing_rated"]))
+    return read_duty(
+        compose(
+            "generate", ["system=helical_pair", "gear=chongqing_40_162", "heat=chongqing_rated"]
+        )
+    )
 
 
 def flash(duty, position, load, *, friction=0.05, speed=SPEED):
     return flash_temperature(
-        duty.system.pair, position, load, duty.system.material, duty.heat, friction=friction, speed=speed
+        duty.system.pair,
+        position,
+        load,
+        duty.system.material,
+        duty.heat,
+        friction=friction,
+        speed=speed,
     )
 
 
@@ -37,7 +47,9 @@ def test_friction_heat_is_friction_times_load_times_sliding(duty):
     """Even loads along the path: the mean of |v1 - v2| has a closed form."""
     pair, force, n = duty.system.pair, 1e5, 4000
     position = (np.arange(n) + 0.5)[None, None] / n * pair.path_of_contact
-    found = friction_heat(pair, position, np.ones_like(position), force=force, friction=0.04, speed=SPEED)
+    found = friction_heat(
+        pair, position, np.ones_like(position), force=force, friction=0.04, speed=SPEED
+    )
     before, after = pair.pitch_point, pair.path_of_contact - pair.pitch_point
     mean = 0.5 * (before**2 + after**2) / (before + after) * SPEED * (1.0 + 1.0 / pair.ratio)
     assert found == pytest.approx(0.04 * force / math.cos(pair.base_helix_angle) * mean, rel=1e-6)
@@ -83,25 +95,63 @@ def test_half_width_is_the_one_of_the_pressure(duty):
 def test_modulus_falls_by_three_per_cent_in_a_hundred_kelvin(duty):
     assert duty.heat.modulus_ratio(20.0) == pytest.approx(1.0, abs=1e-15)
     assert 0.960 < duty.heat.modulus_ratio(120.0) < 0.975
-    assert replace(duty.heat, reference_temperature=100.0).modulus_ratio(100.0) == pytest.approx(1.0, abs=1e-15)
+    assert replace(duty.heat, reference_temperature=100.0).modulus_ratio(100.0) == pytest.approx(
+        1.0, abs=1e-15
+    )
 
 
 @pytest.mark.parametrize(
     ("words", "error", "message"),
     [
-        (["heat.oil_temperature_degc=400"], ExtrapolationError, "heat.oil_temperature_degc = 400 lies beyond the mate"),
+        (
+            ["heat.oil_temperature_degc=400"],
+            ExtrapolationError,
+            "heat.oil_temperature_degc = 400 lies beyond the mate",
+        ),
         (["heat.pinion_temperature_degc=-80"], ExtrapolationError, "-75 to 300 degrees Celsius"),
-        (["heat.face_convection_w_per_m2k=-1"], ConfigError, "heat.face_convection_w_per_m2k = -1 must lie in 0..1"),
-        (["heat.convection_speed_rpm=0"], ConfigError, "heat.convection_speed_rpm = 0 must be positive, or null"),
-        (["heat.pinion_heat_share=1.2"], ConfigError, "heat.pinion_heat_share = 1.2 must lie in 0..1"),
+        (
+            ["heat.face_convection_w_per_m2k=-1"],
+            ConfigError,
+            "heat.face_convection_w_per_m2k = -1 must lie in 0..1",
+        ),
+        (
+            ["heat.convection_speed_rpm=0"],
+            ConfigError,
+            "heat.convection_speed_rpm = 0 must be positive, or null",
+        ),
+        (
+            ["heat.pinion_heat_share=1.2"],
+            ConfigError,
+            "heat.pinion_heat_share = 1.2 must lie in 0..1",
+        ),
         (["heat.expansion_per_k=1"], ConfigError, "heat.expansion_per_k = 1 must lie in 0..0.0001"),
-        (["heat.conductivity_w_per_mk=0"], ConfigError, "heat.conductivity_w_per_mk = 0 must lie in 1..500"),
+        (
+            ["heat.conductivity_w_per_mk=0"],
+            ConfigError,
+            "heat.conductivity_w_per_mk = 0 must lie in 1..500",
+        ),
         (["heat.modulus_gpa=[200,190]"], ConfigError, "has 7 and heat.modulus_gpa 2 values"),
-        (["heat.modulus_temperature_degc=[20,10]", "heat.modulus_gpa=[1,2]"], ConfigError, "temperatures that rise"),
-        (["heat.modulus_temperature_degc=[10,20]", "heat.modulus_gpa=[-1,2]"], ConfigError, "= -1 must be positive"),
-        (["heat.growth=yes_please"], ConfigError, "heat.growth = 'yes_please' is not true or false"),
+        (
+            ["heat.modulus_temperature_degc=[20,10]", "heat.modulus_gpa=[1,2]"],
+            ConfigError,
+            "temperatures that rise",
+        ),
+        (
+            ["heat.modulus_temperature_degc=[10,20]", "heat.modulus_gpa=[-1,2]"],
+            ConfigError,
+            "= -1 must be positive",
+        ),
+        (
+            ["heat.growth=yes_please"],
+            ConfigError,
+            "heat.growth = 'yes_please' is not true or false",
+        ),
         (["+heat.oil_temperature_k=300"], ConfigError, "'oil_temperature_k'"),
-        (["heat.oil_temperature_degc=null"], ConfigError, "heat.oil_temperature_degc is null; give a value"),
+        (
+            ["heat.oil_temperature_degc=null"],
+            ConfigError,
+            "heat.oil_temperature_degc is null; give a value",
+        ),
     ],
 )
 def test_inputs_that_make_no_heat_are_refused(words, error, message):

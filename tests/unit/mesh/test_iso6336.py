@@ -81,7 +81,9 @@ def test_basic_rack_factor_is_the_mean_of_both_gears(pair):
 
 
 def test_a_larger_pressure_angle_stiffens_by_2_percent_a_degree(pair):
-    steep = replace(pair.pinion, pressure_angle=math.radians(25.0), cutter_tip_radius_coefficient=0.3)
+    steep = replace(
+        pair.pinion, pressure_angle=math.radians(25.0), cutter_tip_radius_coefficient=0.3
+    )
     assert_allclose(iso6336.basic_rack_factor(steep), 0.975 * 1.1, rtol=1e-12, atol=0)
 
 

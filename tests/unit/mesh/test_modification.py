@@ -38,7 +38,9 @@ def test_reliefs_have_their_depth_at_the_ends_and_run_out_over_their_height(pair
     )  # fmt: skip
     position, _, deviation = at(pair, of_pair(pinion=side))
     # the pinion's tip leaves at E, its lowest point enters at A; beyond both the end counts
-    np.testing.assert_allclose(deviation[:, position >= pair.path_of_contact], 8 * MICRO, rtol=1e-12)
+    np.testing.assert_allclose(
+        deviation[:, position >= pair.path_of_contact], 8 * MICRO, rtol=1e-12
+    )
     np.testing.assert_allclose(deviation[:, position <= 0.0], 3 * MICRO, rtol=1e-12)
     radius = np.hypot(pair.pinion.base_radius, pair.pinion_curvature(position))
     begin = radius > pair.pinion.tip_radius - 0.25 * MILLI  # the upper half of the relief
@@ -88,9 +90,18 @@ def test_nothing_is_nothing(pair):
 @pytest.mark.parametrize(
     ("changes", "message"),
     [
-        (["modification.pinion.tip_relief_um=-1"], "modification.pinion.tip_relief_um = -1 must not be negative"),
-        (["modification.wheel.root_relief_um=1"], "modification.wheel.root_relief_height_mm = 0: a relief of 1 um"),
-        (["modification.wheel.profile_shape=round"], "modification.wheel.profile_shape = 'round'; allowed: linear"),
+        (
+            ["modification.pinion.tip_relief_um=-1"],
+            "modification.pinion.tip_relief_um = -1 must not be negative",
+        ),
+        (
+            ["modification.wheel.root_relief_um=1"],
+            "modification.wheel.root_relief_height_mm = 0: a relief of 1 um",
+        ),
+        (
+            ["modification.wheel.profile_shape=round"],
+            "modification.wheel.profile_shape = 'round'; allowed: linear",
+        ),
         (["+modification.wheel.tip=1"], "modification.wheel: unknown key 'tip'"),
         (["+modification.helix=1"], "modification: unknown key 'helix'"),
     ],
@@ -103,9 +114,14 @@ def test_keys_that_make_no_flank_are_refused(changes, message):
 
 def test_reliefs_that_overlap_are_refused(pair):
     tall = FlankModification(
-        tip_relief=MICRO, tip_relief_height=2 * MILLI, root_relief=MICRO, root_relief_height=2 * MILLI
+        tip_relief=MICRO,
+        tip_relief_height=2 * MILLI,
+        root_relief=MICRO,
+        root_relief_height=2 * MILLI,
     )
-    with pytest.raises(ConfigError, match=r"tip_relief_height_mm = 2 and root_relief_height_mm = 2 overlap"):
+    with pytest.raises(
+        ConfigError, match=r"tip_relief_height_mm = 2 and root_relief_height_mm = 2 overlap"
+    ):
         at(pair, of_pair(pinion=tall))
     with pytest.raises(ConfigError, match="at both ends overlaps on a face of 14 mm"):
         at(pair, of_pair(wheel=FlankModification(end_relief=MICRO, end_relief_width=8 * MILLI)))

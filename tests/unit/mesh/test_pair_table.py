@@ -24,7 +24,9 @@ SINGLE_PAIR = np.array([1.5692, 2.0650, 2.0929, 2.0864, 1.5779])
 
 def test_single_pair_stiffness_of_the_reference_pair(paper_machine):
     position = RC_MM * 1e-3 - paper_machine.pair.start_curvature_radius
-    assert_allclose(1e-8 / pair_compliance(paper_machine.mesh_table(), position), SINGLE_PAIR, rtol=1e-3, atol=0)
+    assert_allclose(
+        1e-8 / pair_compliance(paper_machine.mesh_table(), position), SINGLE_PAIR, rtol=1e-3, atol=0
+    )
 
 
 def test_sound_teeth_have_the_corner_gap_and_nothing_else(xiamen):
@@ -32,7 +34,9 @@ def test_sound_teeth_have_the_corner_gap_and_nothing_else(xiamen):
     expected = corner_gap_by_pinion(xiamen.pair, table.position)
     near = expected < 1e-4
     # the parabolas of the table cut that much off where the gap begins
-    assert_allclose((table.pinion.gap[0] + table.wheel.gap[0])[near], expected[near], rtol=0, atol=5e-9)
+    assert_allclose(
+        (table.pinion.gap[0] + table.wheel.gap[0])[near], expected[near], rtol=0, atol=5e-9
+    )
     assert table.pinion.kind.tolist() == [0] * 23
     assert table.wheel.kind.tolist() == [0] * 84
 
@@ -63,7 +67,9 @@ class TestFlankSides:
     def contact(system, share, **faults):
         """Contact compliance of the pair at places on the path, (phase,) m/N, with a fault on either gear."""
         at = np.linspace(0.0, system.pair.path_of_contact, 9)
-        sides = flank_sides(system.pair, at, system.material, system.mesh, system.mesh_force, pinion_share=share)
+        sides = flank_sides(
+            system.pair, at, system.material, system.mesh, system.mesh_force, pinion_share=share
+        )
         bending = slice_bending(system.pair, at, system.material, system.mesh)
         total = 0.0
         for name, side in sides.items():
@@ -83,7 +89,11 @@ class TestFlankSides:
     @pytest.mark.parametrize("bending", ["whole", "by_slice"])
     def test_the_split_is_nothing_for_faulty_ones(self, machine, gear, bending):
         system = machine({"mesh.bending": bending})
-        fault = {gear: one("chipped", gear=gear, chip_width_mm=10, chip_shape="rectangular", chip_height_mm=3)}
+        fault = {
+            gear: one(
+                "chipped", gear=gear, chip_width_mm=10, chip_shape="rectangular", chip_height_mm=3
+            )
+        }
         totals = [self.contact(system, share, **fault)[0] for share in (0.0, 0.5, 1.0)]
         for total in totals[1:]:
             assert_allclose(total, totals[0], rtol=1e-12, atol=0)
@@ -91,7 +101,12 @@ class TestFlankSides:
         # half of the face at most: the law at half the width, and there the slices' own bending once more
         at = np.linspace(0.0, system.pair.path_of_contact, 9)
         more = slice_bending(system.pair, at, system.material, system.mesh)
-        most = contact_law(system.pair, at, system.material, system.mesh).compliance(10e-3, system.mesh_force) + more
+        most = (
+            contact_law(system.pair, at, system.material, system.mesh).compliance(
+                10e-3, system.mesh_force
+            )
+            + more
+        )
         assert np.all(totals[0] <= most * (1 + 1e-4))
         assert_allclose((totals[0] / most).max(), 1.0, rtol=1e-3, atol=0)
         assert_allclose((totals[0] / sound).min(), 1.0, rtol=1e-9, atol=0)
@@ -103,18 +118,29 @@ class TestFlankSides:
             side, tip = sides[name], healthy_tooth(sides[name].gear).profile.curvature_radius[-1]
             assert side.curvature.max() == pytest.approx(tip, rel=1e-9)
             assert side.flank_curvature[high] > tip * 1.05
-            assert_allclose(side.flank_curvature[[low, 1]], side.curvature[[low, 1]], rtol=1e-12, atol=0)
+            assert_allclose(
+                side.flank_curvature[[low, 1]], side.curvature[[low, 1]], rtol=1e-12, atol=0
+            )
 
 
 class TestRows:
     def test_equal_structures_are_computed_once(self, xiamen, monkeypatch):
         """Flanks that only stand elsewhere bend as the sound one does, and teeth that are one object are one row."""
         computed, original = [], module.structural_compliance
-        monkeypatch.setattr(module, "structural_compliance", lambda *own: computed.append(1) or original(*own))
+        monkeypatch.setattr(
+            module, "structural_compliance", lambda *own: computed.append(1) or original(*own)
+        )
         for faults, n_rows, n_structures in (
             ((one("runout", gear="wheel"),), 85, 0),
             ((one("wear", gear="wheel", tooth="all"),), 2, 1),
-            ((one("crack", gear="wheel", tooth=[1, 2]), one("pitch_error", gear="wheel", tooth=[2, 3])), 4, 1),
+            (
+                (
+                    one("crack", gear="wheel", tooth=[1, 2]),
+                    one("pitch_error", gear="wheel", tooth=[2, 3]),
+                ),
+                4,
+                1,
+            ),
             ((one("misalignment", gear="wheel", tooth="all"),), 2, 1),
         ):
             pair_table(
@@ -122,7 +148,9 @@ class TestRows:
             )  # the sound gears' own structures
             computed.clear()
             teeth = faulty_teeth(xiamen.pair, faults)
-            table = pair_table(xiamen.pair, xiamen.material, xiamen.mesh, teeth, load=xiamen.mesh_force)
+            table = pair_table(
+                xiamen.pair, xiamen.material, xiamen.mesh, teeth, load=xiamen.mesh_force
+            )
             assert (len(table.wheel.compliance), len(computed)) == (n_rows, n_structures)
             assert len(table.wheel.present) == n_rows
 
@@ -131,11 +159,16 @@ class TestRows:
     def test_curves_and_tables_agree(self, xiamen, kind, gear):
         """The gap of the faulty pair by ``stiffness_curves`` and by the table."""
         fault = one(kind, gear=gear, tooth=0)
-        table, curves = xiamen.mesh_table((fault,)), xiamen.stiffness_curves((fault,), points_per_tooth=1)
+        table, curves = (
+            xiamen.mesh_table((fault,)),
+            xiamen.stiffness_curves((fault,), points_per_tooth=1),
+        )
         side, at = side_of(table, gear), curves.contact_position * xiamen.pair.base_pitch
         expected = np.interp(at, table.position, side.gap[side.kind[0]] - side.gap[0])
         # straight between nodes, whose parabolas round steps off, against the value itself
-        assert_allclose(curves.faulty_pair_gap, expected, rtol=0, atol=2e-9 + 3e-3 * np.abs(expected).max())
+        assert_allclose(
+            curves.faulty_pair_gap, expected, rtol=0, atol=2e-9 + 3e-3 * np.abs(expected).max()
+        )
         assert np.all(np.isfinite(side.compliance))
         assert side.compliance.min() > 0
         assert np.isfinite(side.gap[:, on_path(table)]).all()

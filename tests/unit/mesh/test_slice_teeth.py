@@ -49,18 +49,31 @@ def approach_of(*words, n_periods=9, meeting=None):
         # over part of the width the bodies give way slice by slice here, and as a whole there
         (("fault=crack", "fault.crack_depth_mm=2", "fault.crack_width_mm=10"), 3e-3),
         (("fault=crack", "fault.crack_depth_mm=2", "fault.crack_width_mm=5"), 3e-3),
-        (("fault=crack", "fault.crack_depth_mm=2", "fault.crack_width_mm=15", "fault.crack_front=parabolic"), 3e-3),
+        (
+            (
+                "fault=crack",
+                "fault.crack_depth_mm=2",
+                "fault.crack_width_mm=15",
+                "fault.crack_front=parabolic",
+            ),
+            3e-3,
+        ),
         (("fault=chipped",), 0.015),
         (("fault=pitting",), 0.05),
     ],
 )
 def test_spur_pair_s_own_table_with_zero_helix(fault, share):
     system, teeth, roll, approach = approach_of(*SPUR, *fault)
-    table = loaded_pair_table(system.pair, system.material, system.mesh, teeth, force=system.mesh_force)
+    table = loaded_pair_table(
+        system.pair, system.material, system.mesh, teeth, force=system.mesh_force
+    )
     exact = static_mesh(table, pair_states(table, roll), system.mesh_force).approach
     np.testing.assert_allclose(approach, exact, rtol=share)
     sound = approach_of(*SPUR)[3]
-    assert np.abs(exact - sound).max() > 2.0 * share * exact.max() or fault[0] in ("fault=chipped", "fault=pitting")
+    assert np.abs(exact - sound).max() > 2.0 * share * exact.max() or fault[0] in (
+        "fault=chipped",
+        "fault=pitting",
+    )
 
 
 def test_errors_of_single_teeth_are_those_of_the_spur_pair():
@@ -91,7 +104,9 @@ def test_misalignment_is_the_spur_pair_s_while_the_whole_face_bears(misalignment
         f"fault.misalignment_um={misalignment}",
     )
     system, teeth, roll, approach = approach_of(*words, n_periods=1)
-    table = loaded_pair_table(system.pair, system.material, system.mesh, teeth, force=system.mesh_force)
+    table = loaded_pair_table(
+        system.pair, system.material, system.mesh, teeth, force=system.mesh_force
+    )
     exact = static_mesh(table, pair_states(table, roll), system.mesh_force).approach
     np.testing.assert_allclose(approach, exact, rtol=0.01)
     assert approach.mean() > approach_of(*words[:2], n_periods=1)[3].mean() + 0.4e-6 * misalignment
@@ -99,7 +114,9 @@ def test_misalignment_is_the_spur_pair_s_while_the_whole_face_bears(misalignment
 
 def test_misalignment_of_teeth_is_that_of_the_shafts():
     """As a fault of the pinion's teeth, tilted about the end that bears, and as a modification of the pair."""
-    tilted = approach_of("fault=misalignment", "fault.misalignment_um=14", "gear.pinion.face_width_mm=14")[3]
+    tilted = approach_of(
+        "fault=misalignment", "fault.misalignment_um=14", "gear.pinion.face_width_mm=14"
+    )[3]
     system, _ = case("modification.misalignment_um=14", "gear.pinion.face_width_mm=14")
     roll = system.phases(32, first_period=-3, n_periods=9)
     shafts = loaded_contact(system.sliced_mesh(), roll, system.mesh_force).approach
@@ -180,7 +197,9 @@ def test_a_crack_is_felt_where_it_is():
 
 
 def test_flank_that_is_gone_bears_nothing():
-    system, faults = case("fault=pitting", "fault.pit_length_mm=0.8", "fault.pit_width_mm=5", "fault.pit_depth_mm=0.3")
+    system, faults = case(
+        "fault=pitting", "fault.pit_length_mm=0.8", "fault.pit_width_mm=5", "fault.pit_depth_mm=0.3"
+    )
     result = system.transmission_error(faults)
     contact, place = result.contact, result.slice_place
     inside = (contact.pair_index == 0)[..., None] & (np.abs(place - 7e-3) < 2.3e-3)
@@ -242,7 +261,12 @@ def test_slices_end_where_a_fault_does():
 
 
 def test_independent_slices_refuse_a_fault_over_part_of_the_face():
-    words = ("mesh.slice_coupling=independent", "fault=crack", "fault.crack_depth_mm=1", "fault.crack_width_mm=5")
+    words = (
+        "mesh.slice_coupling=independent",
+        "fault=crack",
+        "fault.crack_depth_mm=1",
+        "fault.crack_width_mm=5",
+    )
     with pytest.raises(ConfigError, match=r"mesh\.independent_faulty_slices=true"):
         approach_of(*words)
     approach_of(*words, "mesh.independent_faulty_slices=true")

@@ -24,7 +24,13 @@ def table_of(*words, teeth=None):
         places = node_positions(system.pair, system.mesh), slice_places(system.pair, system.slices)
         deviation = system.modification.deviation(system.pair, *places)
     table = sliced_table(
-        system.pair, system.material, system.mesh, system.slices, teeth, force=system.mesh_force, deviation=deviation
+        system.pair,
+        system.material,
+        system.mesh,
+        system.slices,
+        teeth,
+        force=system.mesh_force,
+        deviation=deviation,
     )
     return system, table, system.sliced_mesh()
 
@@ -36,14 +42,20 @@ def at_rest(table, roll, force, errors=None):
     index = np.floor(roll / pitch).astype(int)[:, None] - table.first_pitch
     index = index - np.arange(table.last_pitch - table.first_pitch)
     position = roll[:, None] - index * pitch
-    kinds = table.pinion_kind[index % len(table.pinion_kind)], table.wheel_kind[index % len(table.wheel_kind)]
+    kinds = (
+        table.pinion_kind[index % len(table.pinion_kind)],
+        table.wheel_kind[index % len(table.wheel_kind)],
+    )
     place = (position - table.position[0]) / (table.position[1] - table.position[0])
     cell = np.clip(place.astype(int), 0, len(table.position) - 2)
     part = (place - cell)[:, :, None]
     chords = np.arange(len(table.depth))
 
     def read(values):
-        low, high = (values[kinds[0][..., None], kinds[1][..., None], chords, (cell + k)[..., None]] for k in (0, 1))
+        low, high = (
+            values[kinds[0][..., None], kinds[1][..., None], chords, (cell + k)[..., None]]
+            for k in (0, 1)
+        )
         return (1.0 - part) * low + part * high
 
     own, gap = read(table.compliance) - table.shared_compliance, read(table.gap)
@@ -92,7 +104,9 @@ def test_equilibrium_is_that_of_the_slices(words):
         # newest first in both; the table follows fewer
         behind = load.shape[1] - own.shape[1]
         np.testing.assert_allclose(
-            load[:, behind:] if behind > 0 else load, own[:, : load.shape[1]], atol=0.012 * part * system.mesh_force
+            load[:, behind:] if behind > 0 else load,
+            own[:, : load.shape[1]],
+            atol=0.012 * part * system.mesh_force,
         )
 
 
@@ -102,10 +116,13 @@ def test_few_slices_that_enter_over_their_width_are_many(n_slices, share):
     system, table, _ = table_of(f"mesh.n_slices={n_slices}")
     roll, force = system.phases(64), system.mesh_force
     few, many = (
-        loaded_contact(table_of(f"mesh.n_slices={count}")[2], roll, force).approach for count in (n_slices, 320)
+        loaded_contact(table_of(f"mesh.n_slices={count}")[2], roll, force).approach
+        for count in (n_slices, 320)
     )
     found = at_rest(table, roll, force)[0]
-    error, whole = (np.ptp(approach - approach.mean() - many + many.mean()) for approach in (found, few))
+    error, whole = (
+        np.ptp(approach - approach.mean() - many + many.mean()) for approach in (found, few)
+    )
     assert error < share * np.ptp(many)
     assert error < 0.4 * whole
 
@@ -119,7 +136,9 @@ def test_chords_err_by_less_than_a_hundredth_of_the_set_force(words):
     position = place[:, None] - mesh.lag
     structure = np.interp(position, mesh.position, mesh.structure)
     constant = np.interp(position, mesh.position, mesh.contact_constant)
-    gap = np.array([np.interp(at, mesh.position, row) for at, row in zip(position.T, mesh.gap, strict=True)]).T
+    gap = np.array(
+        [np.interp(at, mesh.position, row) for at, row in zip(position.T, mesh.gap, strict=True)]
+    ).T
     first, exact = np.empty(40), np.empty((40, 60))
     depth = table.depth[-1] * np.arange(1, 61) / 60
     bite_forces(
@@ -131,7 +150,9 @@ def test_chords_err_by_less_than_a_hundredth_of_the_set_force(words):
         np.array([np.interp(place, table.position, row) for row in values[0, 0]])
         for values in (table.compliance - table.shared_compliance, table.gap)
     )
-    found = np.maximum(((first[:, None, None] + depth[:, None] - far.T[:, None]) / own.T[:, None]).max(axis=2), 0.0)
+    found = np.maximum(
+        ((first[:, None, None] + depth[:, None] - far.T[:, None]) / own.T[:, None]).max(axis=2), 0.0
+    )
     assert exact.max() > system.mesh_force
     np.testing.assert_allclose(found, exact, atol=0.01 * system.mesh_force)
 
@@ -187,7 +208,9 @@ def test_teeth_that_all_share_a_form_are_looked_at_once():
     read = read_request(["system=helical_pair", "fault=profile_error"]).config
     form = replace(read_faults(read["fault"])[0], tooth="all")
     crack = read_faults(
-        read_request(["system=helical_pair", "fault=crack", "fault.crack_depth_mm=1", "fault.tooth=3"]).config["fault"]
+        read_request(
+            ["system=helical_pair", "fault=crack", "fault.crack_depth_mm=1", "fault.tooth=3"]
+        ).config["fault"]
     )
     table = system.mesh_table((form, *crack))
     assert table.compliance.shape[:2] == (3, 1)
@@ -202,7 +225,9 @@ def test_teeth_that_all_share_a_form_are_looked_at_once():
 def test_too_many_different_teeth_are_refused():
     system, _, _ = table_of()
     runout = read_faults(read_request(["system=helical_pair", "fault=runout"]).config["fault"])[0]
-    with pytest.raises(FaultError, match="62 different teeth of the pinion and 133 of the wheel make 8246 pairs"):
+    with pytest.raises(
+        FaultError, match="62 different teeth of the pinion and 133 of the wheel make 8246 pairs"
+    ):
         system.mesh_table((runout, replace(runout, gear="wheel")))
 
 
@@ -213,10 +238,15 @@ def test_chords_are_convex_and_meet():
     own, gap = table.compliance[0, 0] - table.shared_compliance, table.gap[0, 0]
     near = gap[0] < 20e-6
     assert (np.diff(own[:, near], axis=0) < 1e-4 * own[1:, near]).all()
-    force = [(gap[0] + table.depth[1:, None] - gap[k : k + N_CHORDS - 1]) / own[k : k + N_CHORDS - 1] for k in (0, 1)]
+    force = [
+        (gap[0] + table.depth[1:, None] - gap[k : k + N_CHORDS - 1]) / own[k : k + N_CHORDS - 1]
+        for k in (0, 1)
+    ]
     np.testing.assert_allclose(force[0][:, near], force[1][:, near], atol=2e-3 * system.mesh_force)
     # deep enough for three times the load, and the set chord holds the mean load
-    deepest = loaded_contact(system.sliced_mesh(), system.phases(64), system.mesh_force).approach.max()
+    deepest = loaded_contact(
+        system.sliced_mesh(), system.phases(64), system.mesh_force
+    ).approach.max()
     assert table.depth[-1] < DEEPEST * (deepest - table.shared_compliance * system.mesh_force)
     assert 0 < table.set_chord < N_CHORDS
 
@@ -235,7 +265,10 @@ def test_ends_are_out_of_reach():
 def test_slopes_are_those_of_the_values():
     _, table, _ = table_of()
     distance = table.position[1] - table.position[0]
-    for values, slopes in ((table.compliance, table.compliance_slope), (table.gap, table.gap_slope)):
+    for values, slopes in (
+        (table.compliance, table.compliance_slope),
+        (table.gap, table.gap_slope),
+    ):
         step = 0.5 * distance * (slopes[..., 1:] + slopes[..., :-1])
         np.testing.assert_allclose(np.diff(values, axis=3), step, atol=1e-9 * np.abs(values).max())
 
@@ -253,7 +286,9 @@ def test_zero_helix_is_the_spur_pair_s_table(contact):
 
 
 def test_the_papers_law_has_one_chord():
-    system, table, mesh = table_of("mesh.law=paper", "mesh.allow_extrapolation=true", "mesh.contact=linear")
+    system, table, mesh = table_of(
+        "mesh.law=paper", "mesh.allow_extrapolation=true", "mesh.contact=linear"
+    )
     assert table.compliance.shape[2] == 1
     inside = np.linspace(0.1, 0.9, 17) * (system.pair.path_of_contact + mesh.lag[-1])
     exact = single_pair_stiffness(mesh, inside, system.mesh_force)

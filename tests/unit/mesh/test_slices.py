@@ -25,7 +25,12 @@ from gensig.options.compose import compose
 from gensig.units import read, to_si
 
 STEEL = Material(youngs_modulus=210e9, poisson_ratio=0.3, density_kg_per_m3=7850.0)
-REFERENCE = {"pair_coupling": "sum", "contact": "linear", "law": "paper", "allow_extrapolation": True}
+REFERENCE = {
+    "pair_coupling": "sum",
+    "contact": "linear",
+    "law": "paper",
+    "allow_extrapolation": True,
+}
 # The reference takes the involute down to the root circle. So does a rack with a sharp tip; a root that a rounded one
 # cuts makes the pair up to 10 % stiffer.
 SHARP = {"cutter_tip_radius_coefficient": 0.02}
@@ -49,7 +54,10 @@ def gears(name, **changes):
         ):  # fmt: skip
             own[key] = config[key]
         own["helix_angle_deg"] = hand * config["helix_angle_deg"]
-        values = own | {key: hand * value if key == "helix_angle_deg" else value for key, value in changes.items()}
+        values = own | {
+            key: hand * value if key == "helix_angle_deg" else value
+            for key, value in changes.items()
+        }
         sides[side] = read(Gear, values, side, name=side)
     return GearPair(**sides, backlash=to_si("backlash_um", config["backlash_um"]))
 
@@ -57,7 +65,9 @@ def gears(name, **changes):
 def solved(pair, torque, keys, *, n_phases=64, deviation=None, **changes):
     """Mesh and contact over one pitch under a pinion torque."""
     values = keys | {"slice_coupling": "independent"} | changes
-    mesh = sliced_mesh(pair, STEEL, read_mesh_options(values), read_slice_options(values), deviation=deviation)
+    mesh = sliced_mesh(
+        pair, STEEL, read_mesh_options(values), read_slice_options(values), deviation=deviation
+    )
     roll = pair.base_pitch * (np.arange(n_phases) + 0.5) / n_phases
     return mesh, loaded_contact(mesh, roll, torque / pair.pinion.base_radius)
 
@@ -84,7 +94,9 @@ def test_figures_of_the_temperature_paper(mesh_keys):
 
 
 @pytest.mark.parametrize("coupling", ["independent", "coupled"])
-@pytest.mark.parametrize("changes", [{"contact": "linear", "pair_coupling": "sum"}, {"contact": "linear"}, {}])
+@pytest.mark.parametrize(
+    "changes", [{"contact": "linear", "pair_coupling": "sum"}, {"contact": "linear"}, {}]
+)
 def test_spur_is_the_same_code_with_zero_helix(mesh_keys, coupling, changes):
     pair = gears("xiamen_23_84")
     options = read_mesh_options(mesh_keys | changes)
@@ -104,7 +116,9 @@ def test_loads_add_up_and_never_pull(mesh_keys):
     for changes in ({}, {"contact": "linear"}, {"slice_coupling": "coupled"}):
         mesh, contact = solved(pair, 178.0, mesh_keys, **changes)
         force = 178.0 / pair.pinion.base_radius
-        np.testing.assert_allclose(contact.line_load.sum(axis=(1, 2)) * mesh.slice_width[0], force, rtol=1e-9)
+        np.testing.assert_allclose(
+            contact.line_load.sum(axis=(1, 2)) * mesh.slice_width[0], force, rtol=1e-9
+        )
         assert contact.line_load.min() >= 0.0
 
 
@@ -112,7 +126,12 @@ def test_loads_add_up_and_never_pull(mesh_keys):
 def test_equilibrium_is_that_of_an_independent_solver(mesh_keys, length):
     """Non-negative least squares on the dense compliance matrix of the same slices."""
     pair = gears("beihang_61_132")
-    changes = {"contact": "linear", "slice_coupling": "coupled", "coupling_modules": length, "n_slices": 12}
+    changes = {
+        "contact": "linear",
+        "slice_coupling": "coupled",
+        "coupling_modules": length,
+        "n_slices": 12,
+    }
     deviation = np.linspace(0.0, 8e-6, 12)[:, None]
     mesh, contact = solved(pair, 60.0, mesh_keys, n_phases=3, deviation=deviation, **changes)
     force, width = 60.0 / pair.pinion.base_radius, mesh.slice_width[0]
@@ -121,14 +140,21 @@ def test_equilibrium_is_that_of_an_independent_solver(mesh_keys, length):
         position = contact.position[k]
         n_pairs, n = position.shape
         softness = np.zeros((n_pairs * n, n_pairs * n))
-        gap = np.array([np.interp(position[:, j], mesh.position, mesh.gap[j], left=1.0, right=1.0) for j in range(n)]).T
+        gap = np.array(
+            [
+                np.interp(position[:, j], mesh.position, mesh.gap[j], left=1.0, right=1.0)
+                for j in range(n)
+            ]
+        ).T
         for i in range(n_pairs):
             own = np.interp(position[i], mesh.position, mesh.structure)
             between = coupling * 2.0 / (own[1:] + own[:-1])
             stiff = np.diag(1.0 / own) + np.diag(np.append(between, 0) + np.append(0, between))
             stiff -= np.diag(between, 1) + np.diag(between, -1)
             block = slice(i * n, (i + 1) * n)
-            local = mesh.contact_factor * np.interp(position[i], mesh.position, mesh.contact_constant)
+            local = mesh.contact_factor * np.interp(
+                position[i], mesh.position, mesh.contact_constant
+            )
             softness[block, block] = np.linalg.inv(stiff) + np.diag(local)
         # min 1/2 p'Cp - (approach - gap)'p over p >= 0, as least squares with the root of C
         root = np.linalg.cholesky(softness).T
@@ -158,12 +184,17 @@ def test_coupling_length_is_that_of_finite_elements(mesh_keys, loaded, finite_el
     whole = structural_compliance(healthy_tooth(pair.pinion), curvature, in_plane, options)[0]
     overlap = np.linspace(0.0, pair.path_of_contact - pair.base_pitch, 9)
     angles = [
-        load_angle(pair.pinion, np.asarray(pair.pinion_curvature(at))) for at in (overlap, overlap + pair.base_pitch)
+        load_angle(pair.pinion, np.asarray(pair.pinion_curvature(at)))
+        for at in (overlap, overlap + pair.base_pitch)
     ]
     shared = float(np.mean(cross_compliance(pair.pinion, in_plane, *angles, pitches=1)))
     n = 200
     place, width = (np.arange(n) + 0.5) / n * 20e-3, np.full((1, n), 20e-3 / n)
-    structure, first, force = np.full((1, n), (whole - shared) * 20e-3), np.empty(1), np.empty((1, 1))
+    structure, first, force = (
+        np.full((1, n), (whole - shared) * 20e-3),
+        np.empty(1),
+        np.empty((1, 1)),
+    )
     gap = np.where(loaded(place), 0.0, 1.0)[None]
     length = slices.coupling_modules * pair.pinion.normal_module
     bite_forces(
@@ -187,8 +218,14 @@ def test_results_settle_with_more_slices(mesh_keys):
     pair = gears("beihang_61_132")
     for keys in (mesh_keys, mesh_keys | REFERENCE):
         coarse, fine, finest = (solved(pair, 178.0, keys, n_slices=n)[1] for n in (10, 40, 160))
-        for of in (lambda c: c.approach.mean(), lambda c: np.ptp(c.approach), lambda c: c.line_load.max()):
-            assert abs(of(fine) - of(finest)) < 0.5 * abs(of(coarse) - of(finest)) + 1e-9 * abs(of(finest))
+        for of in (
+            lambda c: c.approach.mean(),
+            lambda c: np.ptp(c.approach),
+            lambda c: c.line_load.max(),
+        ):
+            assert abs(of(fine) - of(finest)) < 0.5 * abs(of(coarse) - of(finest)) + 1e-9 * abs(
+                of(finest)
+            )
 
 
 def test_a_modification_moves_the_error_by_no_more_than_its_depth(mesh_keys):
@@ -198,7 +235,11 @@ def test_a_modification_moves_the_error_by_no_more_than_its_depth(mesh_keys):
     rng = np.random.default_rng(0)
     for _ in range(20):
         depth = rng.uniform(0.0, 5e-6)
-        shape = depth * rng.uniform(size=(mesh.slices.n_slices, 1)) * rng.uniform(size=mesh.position.size)
+        shape = (
+            depth
+            * rng.uniform(size=(mesh.slices.n_slices, 1))
+            * rng.uniform(size=mesh.position.size)
+        )
         _, changed = solved(pair, 178.0, keys, deviation=shape)
         moved = changed.approach - plain.approach
         assert moved.min() > -1e-15
@@ -220,9 +261,14 @@ def test_contact_pressure_is_that_of_a_cylinder_on_a_cylinder(mesh_keys):
     pressure = contact_pressure(mesh, contact, STEEL)
     k, i, j = np.unravel_index(np.argmax(contact.line_load), contact.line_load.shape)
     position, slant = contact.position[k, i, j], math.cos(pair.base_helix_angle)
-    radii = [float(pair.pinion_curvature(position)) / slant, float(pair.wheel_curvature(position)) / slant]
+    radii = [
+        float(pair.pinion_curvature(position)) / slant,
+        float(pair.wheel_curvature(position)) / slant,
+    ]
     radius = radii[0] * radii[1] / sum(radii)
-    normal_load_per_length = contact.line_load[k, i, j] / slant * slant  # normal force up, contact line longer
+    normal_load_per_length = (
+        contact.line_load[k, i, j] / slant * slant
+    )  # normal force up, contact line longer
     expected = math.sqrt(normal_load_per_length * 210e9 / (1 - 0.3**2) / (2 * math.pi * radius))
     assert pressure[k, i, j] == pytest.approx(expected, rel=1e-12)
 
@@ -235,7 +281,9 @@ def test_no_contact_is_refused(mesh_keys):
         solved(pair, 178.0, mesh_keys, deviation=np.full((40, 1), np.inf))
 
 
-@pytest.mark.parametrize(("key", "value"), [("n_slices", 0), ("coupling_modules", -1.0), ("slice_coupling", "glued")])
+@pytest.mark.parametrize(
+    ("key", "value"), [("n_slices", 0), ("coupling_modules", -1.0), ("slice_coupling", "glued")]
+)
 def test_slices_that_make_no_sense_are_refused(mesh_keys, key, value):
     with pytest.raises(ConfigError, match=f"mesh.{key} = "):
         read_slice_options(mesh_keys | {key: value})

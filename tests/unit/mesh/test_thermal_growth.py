@@ -21,7 +21,9 @@ def pair():
 
 def flank(pair, gear):
     on_path = np.linspace(0.0, pair.path_of_contact, 51)
-    return np.asarray(pair.pinion_curvature(on_path) if gear is pair.pinion else pair.wheel_curvature(on_path))
+    return np.asarray(
+        pair.pinion_curvature(on_path) if gear is pair.pinion else pair.wheel_curvature(on_path)
+    )
 
 
 @pytest.mark.parametrize("name", ["pinion", "wheel"])
@@ -35,7 +37,9 @@ def test_uniform_heat_moves_the_flank_to_the_grown_involute(pair, name):
     x, y = involute_point(gear, curvature)
     x_grown, y_grown = involute_point(grown, curvature * (1.0 + strain))
     angle = load_angle(gear, curvature)
-    np.testing.assert_allclose((x_grown - x) * np.sin(angle) + (y_grown - y) * np.cos(angle), moved, rtol=1e-9)
+    np.testing.assert_allclose(
+        (x_grown - x) * np.sin(angle) + (y_grown - y) * np.cos(angle), moved, rtol=1e-9
+    )
 
 
 @pytest.mark.parametrize(("tooth", "body"), [(1e-3, 4e-4), (0.0, 1e-3), (1e-3, 0.0)])
@@ -99,6 +103,8 @@ def test_a_hotter_pinion_makes_the_entering_pair_late(pair):
 
 def test_hot_teeth_on_a_cold_body_hardly_lengthen_the_base_pitch(pair):
     """Pitches are angles times the body's radius: the teeth's own growth makes them thicker, not farther apart."""
-    growth = PairGrowth(pinion=GearGrowth(tooth=1e-3, body=0.0), wheel=GearGrowth(tooth=0.0, body=0.0))
+    growth = PairGrowth(
+        pinion=GearGrowth(tooth=1e-3, body=0.0), wheel=GearGrowth(tooth=0.0, body=0.0)
+    )
     assert abs(growth.pitch_strains(pair)[0]) < 2e-4
     assert 0.1e-3 * pair.base_pitch < growth.teeth_alone(pair) < pair.base_pitch * 1e-3

@@ -31,7 +31,9 @@ class TestDefaults:
     def test_plain_and_resolved(self, composed_config):
         assert plain(composed_config.plain())
         assert "${" not in json.dumps(composed_config.plain())
-        assert composed_config["operating"]["speed_rpm"] == composed_config["gear"]["rated_speed_rpm"]
+        assert (
+            composed_config["operating"]["speed_rpm"] == composed_config["gear"]["rated_speed_rpm"]
+        )
 
     def test_the_selected_fault_is_the_only_class(self, composed_config):
         assert composed_config["plan"]["classes"] == ["healthy"]
@@ -57,11 +59,17 @@ class TestMistakes:
             (["faul=crack"], ["faul", "fault"]),
             (["fault=crak"], ["crak", "did you mean 'crack'"]),
             (["gear=foo"], ["foo", "xiamen_23_84"]),
-            (["excitation=null"], ["excitation=null: a group takes one of its options", "engine_v20"]),
+            (
+                ["excitation=null"],
+                ["excitation=null: a group takes one of its options", "engine_v20"],
+            ),
             (["gear=3"], ["gear=3: a group", "xiamen_23_84"]),
             (["experiment=quik"], ["quik", "quickstart", "paper"]),
             (["plan.classes=[healthy,crak]"], ["crak", "crack"]),
-            (["fault=crack", "fault.crack_dept_mm=1"], ["fault.crack_dept_mm", "fault.crack_depth_mm"]),
+            (
+                ["fault=crack", "fault.crack_dept_mm=1"],
+                ["fault.crack_dept_mm", "fault.crack_depth_mm"],
+            ),
             (
                 ["fault=crack", "fault.pit_width_mm=1"],
                 ["fault.pit_width_mm", "fault=crack", "crack_depth_mm", "pitting"],
@@ -124,9 +132,16 @@ def test_own_options_are_found(tmp_path):
 
 class TestFaultKeys:
     def test_they_go_to_the_classes_that_have_them(self):
-        classes = read_request([FOUR, "fault.crack_depth_mm=1.5", "fault.gear=wheel"]).config["classes"]
+        classes = read_request([FOUR, "fault.crack_depth_mm=1.5", "fault.gear=wheel"]).config[
+            "classes"
+        ]
         assert classes["crack"]["crack_depth_mm"] == pytest.approx(1.5)
-        assert [fault.get("gear") for fault in classes.values()] == [None, "wheel", "wheel", "wheel"]
+        assert [fault.get("gear") for fault in classes.values()] == [
+            None,
+            "wheel",
+            "wheel",
+            "wheel",
+        ]
         assert "crack_depth_mm" not in classes["pitting"]
         assert classes["healthy"] == {"kind": "healthy", "vary": {}}
 
@@ -173,10 +188,13 @@ class TestEveryFaultOption:
             for end in ("low", "high"):
                 faults = read_faults(at_end(with_keys(classes[name], gear=gear), end))
                 assert 0 <= severity(faults, xiamen.pair) <= 1
-                xiamen.mesh_table([fault for fault in faults if fault.alike or fault.kind == "runout"])
+                xiamen.mesh_table(
+                    [fault for fault in faults if fault.alike or fault.kind == "runout"]
+                )
 
     @pytest.mark.parametrize(
-        ("name", "word", "teeth"), [("crack", "all", "all"), ("crack", "[1,2]", (1, 2)), ("misalignment", "7", 7)]
+        ("name", "word", "teeth"),
+        [("crack", "all", "all"), ("crack", "[1,2]", (1, 2)), ("misalignment", "7", 7)],
     )
     def test_tooth_takes_all_and_lists(self, name, word, teeth):
         fault = read_request([f"fault={name}", f"fault.tooth={word}"]).config["fault"]
@@ -210,9 +228,15 @@ class TestCompound:
 
     def test_what_is_not_typed_is_varied_and_a_part_can_say_what(self):
         own = "{kind: wear, vary: {limit_um: {distribution: uniform, low: 90, high: 99}}}"
-        parts = f"fault.parts=[{{kind: crack, tooth: 3}}, {{kind: spalling, spall_width_mm: 4}}, {own}]"
+        parts = (
+            f"fault.parts=[{{kind: crack, tooth: 3}}, {{kind: spalling, spall_width_mm: 4}}, {own}]"
+        )
         parts = read_request(["fault=compound", parts]).config["fault"]["parts"]
-        assert [set(part["vary"]) for part in parts] == [{"crack_depth_mm"}, {"tooth", "spall_length_mm"}, {"limit_um"}]
+        assert [set(part["vary"]) for part in parts] == [
+            {"crack_depth_mm"},
+            {"tooth", "spall_length_mm"},
+            {"limit_um"},
+        ]
         assert parts[1]["spall_width_mm"] == 4
 
     def test_one_key_of_one_part(self):
@@ -220,7 +244,9 @@ class TestCompound:
         assert [part["tooth"] for part in parts] == [0, 4]
 
     def test_typed_keys_of_single_faults_leave_it_alone(self):
-        classes = read_request(["plan.classes=[crack,compound]", "fault.crack_depth_mm=1.5"]).config["classes"]
+        classes = read_request(
+            ["plan.classes=[crack,compound]", "fault.crack_depth_mm=1.5"]
+        ).config["classes"]
         assert classes["crack"]["crack_depth_mm"] == pytest.approx(1.5)
         assert classes["compound"]["parts"][0]["crack_depth_mm"] == pytest.approx(1.0)
 
@@ -245,10 +271,14 @@ class TestCompound:
     def test_an_unknown_key_in_a_part_is_named_with_its_place(self):
         parts = "fault.parts=[{kind: pitting}, {kind: crack, crack_dept_mm: 1}]"
         fault = read_request(["fault=compound", parts]).config["fault"]
-        with pytest.raises(ConfigError, match=re.escape("fault.parts.1: unknown key 'crack_dept_mm'; did you mean")):
+        with pytest.raises(
+            ConfigError, match=re.escape("fault.parts.1: unknown key 'crack_dept_mm'; did you mean")
+        ):
             read_faults(fault)
 
-    @pytest.mark.parametrize("word", ["fault.gear=wheel", "fault.vary={tooth: {distribution: tooth}}"])
+    @pytest.mark.parametrize(
+        "word", ["fault.gear=wheel", "fault.vary={tooth: {distribution: tooth}}"]
+    )
     def test_it_has_no_keys_of_its_own(self, word):
         with pytest.raises(ConfigError, match="for fault=compound, it has parts"):
             read_request(["fault=compound", word])
@@ -257,7 +287,8 @@ class TestCompound:
 class TestPinnedKeys:
     def test_a_typed_key_leaves_vary(self):
         free, pinned = (
-            read_request(["experiment=quickstart", *words]).config for words in ((), ("operating.speed_rpm=1500",))
+            read_request(["experiment=quickstart", *words]).config
+            for words in ((), ("operating.speed_rpm=1500",))
         )
         assert "operating.speed_rpm" in free["plan"]["vary"]
         assert set(free["plan"]["vary"]) - set(pinned["plan"]["vary"]) == {"operating.speed_rpm"}
@@ -281,11 +312,15 @@ class TestMassAndInertia:
         with pytest.warns(DerivedValueWarning, match=re.escape(word.partition("=")[0])):
             gear = read_request([word]).config["gear"]
         for side in ("pinion", "wheel"):
-            assert [gear[side][key] is None for key in ("mass_kg", "inertia_kg_m2")] == [side in sides] * 2
+            assert [gear[side][key] is None for key in ("mass_kg", "inertia_kg_m2")] == [
+                side in sides
+            ] * 2
 
     def test_a_typed_mass_stays(self):
         with pytest.warns(DerivedValueWarning, match="inertia_kg_m2"):
-            gear = read_request(["gear.pinion.n_teeth=30", "gear.pinion.mass_kg=0.3"]).config["gear"]
+            gear = read_request(["gear.pinion.n_teeth=30", "gear.pinion.mass_kg=0.3"]).config[
+                "gear"
+            ]
         assert gear["pinion"]["mass_kg"] == pytest.approx(0.3)
         assert gear["pinion"]["inertia_kg_m2"] is None
 
@@ -299,7 +334,9 @@ class TestMassAndInertia:
     def test_nothing_changes_silently_otherwise(self):
         with warnings.catch_warnings():
             warnings.simplefilter("error")
-            gear = read_request(["operating.speed_rpm=1500", "gear.pinion.profile_shift=0.1"]).config["gear"]
+            gear = read_request(
+                ["operating.speed_rpm=1500", "gear.pinion.profile_shift=0.1"]
+            ).config["gear"]
         assert gear["pinion"]["mass_kg"] == pytest.approx(0.22)
 
 
@@ -344,14 +381,17 @@ class TestSweeps:
     def test_what_was_perhaps_meant_by_several_values(self, word, instead):
         with pytest.raises(ConfigError) as caught:
             override_keys([word])
-        assert str(caught.value).endswith(instead or "several values need -m (one data set for each)")
+        assert str(caught.value).endswith(
+            instead or "several values need -m (one data set for each)"
+        )
 
     def test_an_option_of_a_forgotten_folder_is_found(self, tmp_path, monkeypatch):
         monkeypatch.chdir(tmp_path)
         (tmp_path / "configs" / "gear").mkdir(parents=True)
         (tmp_path / "configs" / "gear" / "mine.yaml").write_text("{}")
         with pytest.raises(
-            ConfigError, match=r"no option 'mine' of gear; it is in \./configs: add --config-dir configs"
+            ConfigError,
+            match=r"no option 'mine' of gear; it is in \./configs: add --config-dir configs",
         ):
             read_request(["gear=mine"])
         with pytest.raises(ConfigError, match="no option 'other' of gear; there is"):
@@ -368,7 +408,9 @@ def test_paper_experiment_means_every_convention_of_the_paper():
 
 def test_three_keys_mean_the_papers_conventions_for_ever():
     words = ["mesh.law=paper", "mesh.pair_coupling=sum", "mesh.contact=linear"]
-    by_keys, by_experiment = (read_system(read_request(own).config).mesh for own in (words, ["experiment=paper"]))
+    by_keys, by_experiment = (
+        read_system(read_request(own).config).mesh for own in (words, ["experiment=paper"])
+    )
     assert by_keys == by_experiment
     assert read_system(read_request([]).config).mesh.elasticity == "plane_strain"
 

@@ -81,7 +81,11 @@ class TestTurns:
 
 class TestWalks:
     def test_each_condition_has_its_own_and_all_its_classes_share_it(self):
-        plan = make_plan(config(WALK, "plan.classes=[healthy,crack,pitting]", "plan.n_records=18", "plan.n_units=3"))
+        plan = make_plan(
+            config(
+                WALK, "plan.classes=[healthy,crack,pitting]", "plan.n_records=18", "plan.n_units=3"
+            )
+        )
         seeds = {}
         for row in (plan.record(place) for place in range(plan.n_records)):
             seeds.setdefault(row["condition_id"], set()).add(row[f"params/{SEED_KEY}"])
@@ -91,13 +95,18 @@ class TestWalks:
 
     def test_also_in_a_grid(self):
         speeds = "plan.vary={operating.speed_rpm: {distribution: choice, values: [1200, 1800]}}"
-        plan = make_plan(config(WALK, "plan.design=grid", "plan.n_records=null", "plan.n_units=3", speeds))
+        plan = make_plan(
+            config(WALK, "plan.design=grid", "plan.n_records=null", "plan.n_units=3", speeds)
+        )
         assert len(set(plan.columns[f"params/{SEED_KEY}"])) == 6
 
     def test_a_typed_seed_or_distribution_stays(self):
         assert SEED_KEY not in config(WALK, f"{SEED_KEY}=3")["plan"]["vary"]
         own = f"plan.vary={{{SEED_KEY}: {{distribution: choice, values: [1, 2]}}}}"
-        assert config(WALK, own)["plan"]["vary"][SEED_KEY] == {"distribution": "choice", "values": [1, 2]}
+        assert config(WALK, own)["plan"]["vary"][SEED_KEY] == {
+            "distribution": "choice",
+            "values": [1, 2],
+        }
 
     def test_without_a_walk_there_is_none(self):
         assert SEED_KEY not in config("operating=ramp")["plan"]["vary"]

@@ -54,7 +54,9 @@ def test_shapes():
     assert_allclose(np.median(log_uniform), 1.0, rtol=1e-3, atol=0)
     assert_allclose(normal.mean(), 1.0 + 2 * 0.0853, rtol=0.01, atol=0)  # cut at -1.5 and +2 sigma
     assert np.unique(integers, return_counts=True)[1].tolist() == [1000] * 4
-    assert_allclose([np.mean(choice == value) for value in SPECS["choice"]["values"]], 1 / 3, rtol=0, atol=1e-3)
+    assert_allclose(
+        [np.mean(choice == value) for value in SPECS["choice"]["values"]], 1 / 3, rtol=0, atol=1e-3
+    )
 
 
 NORMALS = (
@@ -78,7 +80,9 @@ def cut_normal_share(value, *, mean, std, low, high):
 @pytest.mark.parametrize("numbers", NORMALS)
 def test_a_cut_normal_has_the_normal_density_between_its_ends(numbers):
     values = read_distribution("key", {"distribution": "normal", **numbers}).values_at(POINTS)
-    assert_allclose([cut_normal_share(value, **numbers) for value in values], POINTS, rtol=0, atol=1e-8)
+    assert_allclose(
+        [cut_normal_share(value, **numbers) for value in values], POINTS, rtol=0, atol=1e-8
+    )
 
 
 @pytest.mark.parametrize("design", ["latin_hypercube", "sobol"])
@@ -86,7 +90,9 @@ def test_a_cut_normal_stays_space_filling(design):
     """One value in each of 64 parts of equal probability: nothing is drawn and thrown away."""
     for numbers in NORMALS[:2]:
         points = design_points(design, 64, 1, np.random.default_rng(3))
-        values = read_distribution("key", {"distribution": "normal", **numbers}).values_at(points[:, 0])
+        values = read_distribution("key", {"distribution": "normal", **numbers}).values_at(
+            points[:, 0]
+        )
         parts = [int(64 * cut_normal_share(value, **numbers)) for value in values]
         assert sorted(parts) == list(range(64))
 
@@ -111,7 +117,9 @@ class TestLevels:
     )  # fmt: skip
     def test_values(self, spec, levels):
         assert read_distribution("key", spec).n_levels == len(levels)
-        assert_allclose(read_distribution("key", spec).level_values(), levels, rtol=1e-7, atol=1e-12)
+        assert_allclose(
+            read_distribution("key", spec).level_values(), levels, rtol=1e-7, atol=1e-12
+        )
 
     @pytest.mark.parametrize("kind", sorted(SPECS))
     def test_null_has_none(self, kind):
@@ -131,22 +139,43 @@ class TestLevels:
         ({"low": 1, "high": 2}, "give a distribution"),
         ({"distribution": "unform", "low": 1, "high": 2}, "give a distribution"),
         ({"distribution": "uniform", "low": 1}, "uniform needs exactly low, high"),
-        ({"distribution": "uniform", "low": 1, "high": 2, "mean": 3}, "uniform needs exactly low, high"),
-        ({"distribution": "uniform", "low": 2, "high": 1}, "low = 2 and high = 1 are no range for uniform"),
-        ({"distribution": "uniform", "low": 2, "high": 2}, "low = 2 and high = 2 are no range for uniform"),
-        ({"distribution": "integers", "low": 3, "high": 3}, "are no range for integers; low must be below"),
-        ({**SPECS["normal"], "low": 5.0}, "low = 5 and high = 5 are no range for normal; low must be below"),
+        (
+            {"distribution": "uniform", "low": 1, "high": 2, "mean": 3},
+            "uniform needs exactly low, high",
+        ),
+        (
+            {"distribution": "uniform", "low": 2, "high": 1},
+            "low = 2 and high = 1 are no range for uniform",
+        ),
+        (
+            {"distribution": "uniform", "low": 2, "high": 2},
+            "low = 2 and high = 2 are no range for uniform",
+        ),
+        (
+            {"distribution": "integers", "low": 3, "high": 3},
+            "are no range for integers; low must be below",
+        ),
+        (
+            {**SPECS["normal"], "low": 5.0},
+            "low = 5 and high = 5 are no range for normal; low must be below",
+        ),
         (
             {"distribution": "log_uniform", "low": 0, "high": 1},
             "no range for log_uniform; low must be below and above 0",
         ),
         ({"distribution": "uniform", "low": "a", "high": 1}, "low = 'a' is not a finite number"),
-        ({"distribution": "uniform", "low": 0, "high": float("inf")}, "high = inf is not a finite number"),
+        (
+            {"distribution": "uniform", "low": 0, "high": float("inf")},
+            "high = inf is not a finite number",
+        ),
         ({"distribution": "uniform", "low": True, "high": 2}, "low = True is not a finite number"),
         ({**SPECS["normal"], "std": 0}, "std = 0 must be positive"),
         ({**SPECS["normal"], "std": -1.5}, "std = -1.5 must be positive"),
         ({**SPECS["normal"], "mean": float("nan")}, "mean = nan is not a finite number"),
-        ({"distribution": "normal", "mean": 1, "std": 2}, "normal needs exactly mean, std, low, high"),
+        (
+            {"distribution": "normal", "mean": 1, "std": 2},
+            "normal needs exactly mean, std, low, high",
+        ),
         ({**SPECS["uniform"], "levels": 1}, "levels = 1 must be a whole number of at least 2"),
         ({**SPECS["uniform"], "levels": 2.5}, "levels = 2.5 must be a whole number of at least 2"),
         ({**SPECS["integers"], "levels": 5}, "levels = 5, but there are 4 whole numbers"),
@@ -170,7 +199,9 @@ def test_whole_numbers_need_whole_ends():
 @pytest.mark.parametrize("n_points", [1, 7, 64])
 class TestDesigns:
     def test_shape_range_and_seed(self, design, n_points):
-        one, two, other = (design_points(design, n_points, 3, np.random.default_rng(seed)) for seed in (1, 1, 2))
+        one, two, other = (
+            design_points(design, n_points, 3, np.random.default_rng(seed)) for seed in (1, 1, 2)
+        )
         assert one.shape == (n_points, 3)
         assert one.min() >= 0
         assert one.max() < 1
@@ -179,7 +210,9 @@ class TestDesigns:
 
     def test_every_axis_is_filled_evenly(self, design, n_points):
         points = design_points(design, n_points, 3, np.random.default_rng(1))
-        counts = np.array([np.bincount((axis * n_points).astype(int), minlength=n_points) for axis in points.T])
+        counts = np.array(
+            [np.bincount((axis * n_points).astype(int), minlength=n_points) for axis in points.T]
+        )
         assert counts.max() <= (1 if design == "latin_hypercube" else 2)
 
 
@@ -202,7 +235,9 @@ def test_no_dimension_draws_nothing():
 
 @pytest.mark.parametrize("n_dimensions", [0, 2])
 def test_unknown_designs_list_the_known(n_dimensions):
-    with pytest.raises(ConfigError, match=r"plan.design = 'factorial'; allowed: latin_hypercube, sobol, grid"):
+    with pytest.raises(
+        ConfigError, match=r"plan.design = 'factorial'; allowed: latin_hypercube, sobol, grid"
+    ):
         design_points("factorial", 4, n_dimensions, np.random.default_rng(0))
 
 

@@ -9,18 +9,31 @@ from gensig.plan.request import _fault_option, _typed_words, read_request
 
 
 class TestFaultOptionAlone:
-    OTHERS = ("experiment=quickstart", "gear.normal_module_mm=3", "operating.torque_nm=7", "seed=4", "out=x.y")
+    OTHERS = (
+        "experiment=quickstart",
+        "gear.normal_module_mm=3",
+        "operating.torque_nm=7",
+        "seed=4",
+        "out=x.y",
+    )
 
     def test_no_option_of_the_package_refers_to_another_group(self):
         folder = resources.files("gensig.configs").joinpath("fault")
-        texts = [path.read_text(encoding="utf-8") for path in folder.iterdir() if path.name.endswith(".yaml")]
+        texts = [
+            path.read_text(encoding="utf-8")
+            for path in folder.iterdir()
+            if path.name.endswith(".yaml")
+        ]
         assert len(texts) == len(options("fault"))
         assert not any("${" in text for text in texts)
 
     @pytest.mark.parametrize("fault", options("fault"))
     def test_it_is_that_of_the_whole_configuration(self, fault):
         words = [*self.OTHERS, f"fault={fault}"]
-        assert _fault_option(_typed_words(words), fault, (), None) == compose("generate", words)["fault"]
+        assert (
+            _fault_option(_typed_words(words), fault, (), None)
+            == compose("generate", words)["fault"]
+        )
 
     def test_a_reference_to_another_group_is_followed(self):
         words = ["operating.torque_nm=3", "fault.crack_depth_mm=${operating.torque_nm}"]

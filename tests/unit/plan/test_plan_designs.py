@@ -80,12 +80,16 @@ class TestGrid:
     def test_every_unit_runs_every_combination_with_every_class_once(self, plan):
         found = Counter(rows(plan, "unit_id", *SET_POINT, "label_name"))
         units = [f"unit-{number:04d}" for number in range(5)]
-        expected = set(itertools.product(units, (1200.0, 1800.0, 2400.0), (10.0, 20.0, 30.0, 40.0), CLASSES))
+        expected = set(
+            itertools.product(units, (1200.0, 1800.0, 2400.0), (10.0, 20.0, 30.0, 40.0), CLASSES)
+        )
         assert set(found) == expected
         assert set(found.values()) == {1}
 
     def test_levels_of_the_key_are_those_of_the_machine(self, plan):
-        assert_allclose(plan.columns["speed_set_rpm"], plan.columns[SET_POINT[0]], rtol=1e-12, atol=0)
+        assert_allclose(
+            plan.columns["speed_set_rpm"], plan.columns[SET_POINT[0]], rtol=1e-12, atol=0
+        )
         assert_array_equal(plan.columns["torque_nm"], plan.columns[SET_POINT[1]])
 
     def test_what_has_no_levels_is_drawn(self, plan):
@@ -103,12 +107,16 @@ class TestGrid:
         assert max(found.values()) > 28
 
     def test_faults_with_levels_are_crossed_with_all_else(self, crossed):
-        found = Counter(rows(crossed, "unit_id", "params/operating.speed_rpm", "params/fault.crack_depth_mm"))
+        found = Counter(
+            rows(crossed, "unit_id", "params/operating.speed_rpm", "params/fault.crack_depth_mm")
+        )
         depths = {key: n for key, n in found.items() if key[2] == key[2]}
         assert {key[2] for key in depths} == {1.0, 2.0, 3.0}
         assert len(depths) == 3 * 3 * 3
         assert set(depths.values()) == {2}
-        lengths = Counter(rows(crossed, "unit_id", "params/operating.speed_rpm", "params/fault.pit_length_mm"))
+        lengths = Counter(
+            rows(crossed, "unit_id", "params/operating.speed_rpm", "params/fault.pit_length_mm")
+        )
         assert {n for key, n in lengths.items() if key[2] == key[2]} == {3}
 
     def test_all_classes_have_as_many_records(self, plan, crossed):
@@ -137,7 +145,9 @@ class TestGrid:
 
     def test_levels_change_no_other_design(self, planned):
         plain = {key: value for key, value in TORQUE.items() if key != "levels"}
-        one, two = (planned(n_records=24, vary={"operating.torque_nm": spec}) for spec in (TORQUE, plain))
+        one, two = (
+            planned(n_records=24, vary={"operating.torque_nm": spec}) for spec in (TORQUE, plain)
+        )
         assert plan_text(one) == plan_text(two)
 
     def test_it_can_be_told_in_words(self, configured):
@@ -181,7 +191,9 @@ class TestGrid:
 
     def test_too_large_a_grid_over_faults(self, planned):
         seeds = {"distribution": "uniform", "low": 1, "high": 3, "levels": 10**6}
-        with pytest.raises(ConfigError, match=r"20,000,000 records \(5 units x 1,000,000 faults x 4 classes\)"):
+        with pytest.raises(
+            ConfigError, match=r"20,000,000 records \(5 units x 1,000,000 faults x 4 classes\)"
+        ):
             planned({"crack": {"crack_depth_mm": seeds}}, **GRID, vary={})
 
 
@@ -209,7 +221,15 @@ class TestRepeats:
             assert [record["repeat"] for record in records] == list(range(self.N))
 
     def test_they_share_all_but_their_start(self, families):
-        own = {"record_id", "shard", "row", "repeat", "start_tooth_pinion", "start_tooth_wheel", "start_phase"}
+        own = {
+            "record_id",
+            "shard",
+            "row",
+            "repeat",
+            "start_tooth_pinion",
+            "start_tooth_wheel",
+            "start_phase",
+        }
         for one, *others in families.values():
             for other in others:
                 assert {key for key in one if str(one[key]) != str(other[key])} <= own
@@ -225,7 +245,9 @@ class TestRepeats:
     @pytest.mark.parametrize("n_records", [4, 11, 13, 50])
     @pytest.mark.parametrize("design", ["latin_hypercube", "sobol"])
     def test_classes_are_balanced_to_one(self, planned, design, n_records):
-        counts = Counter(planned(n_records=n_records, n_repeats=2, design=design).columns["label_name"].tolist())
+        counts = Counter(
+            planned(n_records=n_records, n_repeats=2, design=design).columns["label_name"].tolist()
+        )
         assert set(counts) == set(CLASSES)
         assert max(counts.values()) - min(counts.values()) <= 1
 
@@ -247,17 +269,34 @@ class TestRepeats:
             for name, *family in rows(plan, "record_id", "condition_id", "label_name"):
                 side[tuple(family)].add(subset[name])
             assert {len(subsets) for subsets in side.values()} == {1}
-            assert {subset for subsets in side.values() for subset in subsets} == {"train", "validation", "test"}
+            assert {subset for subsets in side.values() for subset in subsets} == {
+                "train",
+                "validation",
+                "test",
+            }
 
     def test_they_are_told_apart_by_start_and_noise_alone(self, quickstart):
-        config = quickstart.with_keys("plan", n_records=4, n_repeats=2, classes=["healthy", "crack"])
-        config = config.with_entries(classes={name: config["classes"][name] for name in ("healthy", "crack")})
-        config = config.with_keys("operating", duration_s=0.02).with_keys("dataset", store_clean=True)
+        config = quickstart.with_keys(
+            "plan", n_records=4, n_repeats=2, classes=["healthy", "crack"]
+        )
+        config = config.with_entries(
+            classes={name: config["classes"][name] for name in ("healthy", "crack")}
+        )
+        config = config.with_keys("operating", duration_s=0.02).with_keys(
+            "dataset", store_clean=True
+        )
         plan = make_plan(config)
         records = simulate_records(config, [plan.record(index) for index in range(4)])
-        one, two = (r.signals for r, name in zip(records, plan.columns["label_name"], strict=True) if name == "crack")
+        one, two = (
+            r.signals
+            for r, name in zip(records, plan.columns["label_name"], strict=True)
+            if name == "crack"
+        )
         assert_array_equal(one["noise_power"], two["noise_power"])
-        noise = [(signals["acceleration"] - signals["acceleration_clean"]).ravel() for signals in (one, two)]
+        noise = [
+            (signals["acceleration"] - signals["acceleration_clean"]).ravel()
+            for signals in (one, two)
+        ]
         assert abs(np.corrcoef(*noise)[0, 1]) < 0.1
         clean = [signals["acceleration_clean"][0] for signals in (one, two)]
         assert np.std(clean[0] - clean[1]) > 0.1 * np.std(clean[0])
@@ -281,19 +320,27 @@ class TestStartOfTheSound:
             record = plan.record(index)
             group = int(record["condition_id"].rpartition("-")[2])
             is_twin = record["label_name"] == "healthy" and record.get("repeat", 0) == 0
-            expected = self.drawn(Stream.TWIN, group) if is_twin else self.drawn(Stream.START, index)
+            expected = (
+                self.drawn(Stream.TWIN, group) if is_twin else self.drawn(Stream.START, index)
+            )
             assert tuple(record[name] for name in self.START) == expected
 
     def test_of_two_sound_classes_one_is_the_twin(self, configured):
         config = configured(n_records=24, classes=["healthy", "again", "crack"])
         config = config.with_keys("classes", again=config["classes"]["healthy"])
         plan = make_plan(config)
-        starts = [row[2:] for row in rows(plan, "label_name", "condition_id", *self.START) if row[0] != "crack"]
+        starts = [
+            row[2:]
+            for row in rows(plan, "label_name", "condition_id", *self.START)
+            if row[0] != "crack"
+        ]
         assert len(set(starts)) == len(starts) == 16
 
     def test_without_a_sound_class_nothing_changes(self, configured):
         config = configured(n_records=12, classes=["crack", "pitting"])
-        config = config.with_entries(classes={name: config["classes"][name] for name in ("crack", "pitting")})
+        config = config.with_entries(
+            classes={name: config["classes"][name] for name in ("crack", "pitting")}
+        )
         plan = make_plan(config)
         for index, start in enumerate(rows(plan, *self.START)):
             assert start == self.drawn(Stream.START, index)
@@ -309,7 +356,10 @@ class TestConditionsPerUnit:
         assert [len(conditions) for conditions in per_unit.values()] == [3] * 5
 
     def test_the_same_number_of_records_is_the_same_plan(self, planned):
-        one, two = planned(n_records=80, n_units=5, conditions_per_unit=4), planned(n_records=80, n_units=5)
+        one, two = (
+            planned(n_records=80, n_units=5, conditions_per_unit=4),
+            planned(n_records=80, n_units=5),
+        )
         assert plan_text(one) == plan_text(two)
 
 
@@ -328,9 +378,13 @@ class TestSobol:
 
     def test_speed_does_not_tell_the_size_of_the_fault(self, plan):
         cracks = plan.columns["label_name"] == "crack"
-        depth, torque = (plan.columns[f"params/{key}"] for key in ("fault.crack_depth_mm", "operating.torque_nm"))
+        depth, torque = (
+            plan.columns[f"params/{key}"] for key in ("fault.crack_depth_mm", "operating.torque_nm")
+        )
         assert self.n_cells(depth[cracks], torque[cracks]) > 130  # of 256 cells about 163 by chance
-        raw = [qmc.Sobol(3, rng=np.random.default_rng(seed)).random_base2(8)[:, 1] for seed in (1, 2)]
+        raw = [
+            qmc.Sobol(3, rng=np.random.default_rng(seed)).random_base2(8)[:, 1] for seed in (1, 2)
+        ]
         assert self.n_cells(*raw) == 16
 
     def test_the_unit_does_not_tell_the_speed(self, plan):
@@ -376,10 +430,16 @@ def test_whatever_can_be_drawn_carries_its_unit():
     ]
     assert len(keys) > 15
     assert {key.rpartition(".")[2] for key in keys if not has_unit(key)} <= NUMBERS
-    options = [file for file in (files("gensig.configs") / "fault").iterdir() if file.name.endswith(".yaml")]
+    options = [
+        file
+        for file in (files("gensig.configs") / "fault").iterdir()
+        if file.name.endswith(".yaml")
+    ]
     assert len(options) > 10
     for file in options:
-        fault = {key: value for key, value in yaml.safe_load(file.read_text()).items() if key != "vary"}
+        fault = {
+            key: value for key, value in yaml.safe_load(file.read_text()).items() if key != "vary"
+        }
         assert {key for key in numbers_in(fault) if not has_unit(key)} <= NUMBERS
 
 

@@ -17,7 +17,9 @@ def said(*words: str) -> list[str]:
 
 
 def test_units_without_a_record_are_told() -> None:
-    (line,) = said(THREE, "plan.n_units=4", "plan.n_gearboxes=2", "plan.n_records=12", "plan.n_repeats=2")
+    (line,) = said(
+        THREE, "plan.n_units=4", "plan.n_gearboxes=2", "plan.n_records=12", "plan.n_repeats=2"
+    )
     assert line == (
         "12 records are 2 conditions of 3 classes and 2 repeats: 2 of 4 units are used; no split by unit is possible "
         "(2 unit_id in the plan, and at least 3 are needed)"
@@ -26,7 +28,10 @@ def test_units_without_a_record_are_told() -> None:
 
 def test_a_split_by_machine_that_cannot_be_made_is_told() -> None:
     (line,) = said(FOUR, "plan.n_records=80", "plan.n_units=8", "plan.n_gearboxes=2")
-    assert line == "no split by gearbox is possible (2 gearbox_id in the plan, and at least 3 are needed)"
+    assert (
+        line
+        == "no split by gearbox is possible (2 gearbox_id in the plan, and at least 3 are needed)"
+    )
 
 
 @pytest.mark.parametrize("words", [("experiment=quickstart",), ("experiment=run_to_failure",)])
@@ -35,7 +40,12 @@ def test_a_plan_with_all_of_it_has_no_note(words: tuple[str, ...]) -> None:
 
 
 def test_what_overrides_undo_is_told() -> None:
-    words = ["experiment=quickstart", "fault=crack", "operating.torque_nm=20", "fault.crack_depth_mm=1"]
+    words = [
+        "experiment=quickstart",
+        "fault=crack",
+        "operating.torque_nm=20",
+        "fault.crack_depth_mm=1",
+    ]
     assert read_request(words).notes == (
         "fault=crack replaces plan.classes [healthy, crack, pitting, missing_tooth]",
         "pinned, no longer varied: fault.crack_depth_mm = 1, operating.torque_nm = 20",

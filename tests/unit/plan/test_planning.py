@@ -15,7 +15,15 @@ from gensig.plan.request import read_request
 from gensig.record.streams import stream
 
 CLASSES = ("healthy", "crack", "pitting", "missing_tooth")
-SHARED = ("unit_id", "gearbox_id", "specimen_id", "condition_id", "speed_set_rpm", "torque_nm", "snr_db")
+SHARED = (
+    "unit_id",
+    "gearbox_id",
+    "specimen_id",
+    "condition_id",
+    "speed_set_rpm",
+    "torque_nm",
+    "snr_db",
+)
 
 
 @pytest.fixture(scope="module")
@@ -64,7 +72,9 @@ def test_a_group_holds_every_class_once(plan):
     assert (np.sort(groups(plan, "label"), axis=1) == np.arange(4)).all()
     assert all(
         CLASSES[label] == name
-        for label, name in zip(*(plan.columns[k].tolist() for k in ("label", "label_name")), strict=True)
+        for label, name in zip(
+            *(plan.columns[k].tolist() for k in ("label", "label_name")), strict=True
+        )
     )
 
 
@@ -106,7 +116,12 @@ def test_drawn_values_lie_in_their_ranges(plan, quickstart):
         assert values.min() >= spec["low"]
         assert values.max() <= spec["high"]
         assert np.ptp(values) > 0.8 * (spec["high"] - spec["low"])
-    assert_allclose(plan.columns["speed_set_rpm"], plan.columns["params/operating.speed_rpm"], rtol=1e-12, atol=0)
+    assert_allclose(
+        plan.columns["speed_set_rpm"],
+        plan.columns["params/operating.speed_rpm"],
+        rtol=1e-12,
+        atol=0,
+    )
     cracks = plan.columns["params/fault.crack_depth_mm"][plan.columns["label_name"] == "crack"]
     spec = quickstart["classes"]["crack"]["vary"]["crack_depth_mm"]
     low, high = (2.0 * spec[end] for end in ("low", "high"))  # of the module
@@ -120,7 +135,11 @@ def test_faults_are_recorded_whole(plan):
         faults = json.loads(record["faults_json"])
         if record["label_name"] == "healthy":
             assert faults == []
-            assert (record["fault_tooth"], record["fault_gear"], record["severity"]) == (-1, "", pytest.approx(0.0))
+            assert (record["fault_tooth"], record["fault_gear"], record["severity"]) == (
+                -1,
+                "",
+                pytest.approx(0.0),
+            )
         else:
             assert [fault["kind"] for fault in faults] == [record["label_name"]]
             assert faults[0]["tooth"] == record["fault_tooth"]
@@ -140,11 +159,18 @@ def test_a_sham_has_severity_zero_and_keeps_its_labels(planned, plan):
 
 
 def test_units_are_specimens_in_gearboxes(plan, quickstart):
-    units = set(zip(*(plan.columns[key].tolist() for key in ("unit_id", "gearbox_id", "specimen_id")), strict=True))
+    units = set(
+        zip(
+            *(plan.columns[key].tolist() for key in ("unit_id", "gearbox_id", "specimen_id")),
+            strict=True,
+        )
+    )
     assert len(units) == quickstart["plan"]["n_units"] == len({unit for unit, _, _ in units})
     assert len({gearbox for _, gearbox, _ in units}) == quickstart["plan"]["n_gearboxes"]
     assert len({(gearbox, specimen) for _, gearbox, specimen in units}) == len(units)
-    assert len({specimen for _, _, specimen in units}) * quickstart["plan"]["n_gearboxes"] == len(units)
+    assert len({specimen for _, _, specimen in units}) * quickstart["plan"]["n_gearboxes"] == len(
+        units
+    )
 
 
 class TestRefusals:
@@ -153,7 +179,9 @@ class TestRefusals:
                                      "operating.turns"])  # fmt: skip
     def test_keys_of_the_whole_data_set(self, planned, key):
         vary = {key: {"distribution": "uniform", "low": 1, "high": 2}}
-        with pytest.raises(ConfigError, match=re.escape(f"plan.vary: '{key}' is one value for a whole data set")):
+        with pytest.raises(
+            ConfigError, match=re.escape(f"plan.vary: '{key}' is one value for a whole data set")
+        ):
             planned(plan={"vary": vary})
 
     @pytest.mark.parametrize(
@@ -173,7 +201,10 @@ class TestRefusals:
             ({"n_units": 0}, "plan.n_units = 0"),
             ({"n_gearboxes": -1}, "plan.n_gearboxes = -1"),
             ({"n_gearboxes": 0}, "plan.n_gearboxes = 0"),
-            ({"design": "factorial"}, "plan.design = 'factorial'; allowed: latin_hypercube, sobol, grid"),
+            (
+                {"design": "factorial"},
+                "plan.design = 'factorial'; allowed: latin_hypercube, sobol, grid",
+            ),
             ({"n_repeats": 0}, "plan.n_repeats = 0 must be a whole number of at least 1"),
             ({"n_repeats": 1.5}, "plan.n_repeats = 1.5"),
             (
@@ -196,7 +227,9 @@ class TestRefusals:
 
     def test_an_option_of_ones_own_that_lacks_a_key(self, quickstart):
         plan = quickstart["plan"].without("n_repeats")
-        with pytest.raises(ConfigError, match="plan: missing key 'n_repeats'; it has n_records, n_units"):
+        with pytest.raises(
+            ConfigError, match="plan: missing key 'n_repeats'; it has n_records, n_units"
+        ):
             make_plan(quickstart.with_entries(plan=plan))
 
     def test_values_are_checked_before_anything_runs(self, planned):
@@ -235,6 +268,8 @@ def test_shards_hold_about_64_mb(config_with):
 
 
 def test_streams_depend_on_cause_and_index_alone():
-    draws = {(cause, index): stream(1, cause, index).random() for cause in (0, 1) for index in (0, 1)}
+    draws = {
+        (cause, index): stream(1, cause, index).random() for cause in (0, 1) for index in (0, 1)
+    }
     assert len(set(draws.values())) == 4
     assert stream(1, 0, 1).random() == pytest.approx(draws[0, 1], abs=0.0)

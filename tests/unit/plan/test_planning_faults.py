@@ -33,7 +33,9 @@ class TestManyKindsOfFaults:
     @classmethod
     def config(cls):
         parts = "[{kind: crack, gear: wheel, crack_depth_mm: 1.0}, {kind: pitting, tooth: 2}]"
-        return read_request([f"plan.classes=[{','.join(MIXED)}]", f"fault.parts={parts}", "plan.n_records=60"]).config
+        return read_request(
+            [f"plan.classes=[{','.join(MIXED)}]", f"fault.parts={parts}", "plan.n_records=60"]
+        ).config
 
     @pytest.fixture(scope="class")
     @classmethod
@@ -43,7 +45,11 @@ class TestManyKindsOfFaults:
     @staticmethod
     def of(plan, name):
         """Records of one class."""
-        return [record for k in range(plan.n_records) if (record := plan.record(k))["label_name"] == name]
+        return [
+            record
+            for k in range(plan.n_records)
+            if (record := plan.record(k))["label_name"] == name
+        ]
 
     def test_columns(self, mixed):
         params = {key for key in mixed.columns if key.startswith("params/")}
@@ -56,7 +62,9 @@ class TestManyKindsOfFaults:
             "params/fault.parts.0.crack_angle_deg",
             "params/fault.parts.1.pit_length_mm",
         } <= params
-        assert not {key for key in params if key.endswith((".tooth", ".kind", ".parts", ".wear_profile"))}
+        assert not {
+            key for key in params if key.endswith((".tooth", ".kind", ".parts", ".wear_profile"))
+        }
         for name, prefix in (("compound", "params/fault.parts."), ("wear", "params/fault.wear_")):
             own = mixed.columns["label_name"] == name
             for key in (key for key in params if key.startswith(prefix)):
@@ -67,14 +75,21 @@ class TestManyKindsOfFaults:
         drawn = []
         for record in self.of(mixed, "compound"):
             crack, pit = json.loads(record["faults_json"])
-            assert (crack["kind"], crack["gear"], pit["kind"], pit["gear"]) == ("crack", "wheel", "pitting", "pinion")
+            assert (crack["kind"], crack["gear"], pit["kind"], pit["gear"]) == (
+                "crack",
+                "wheel",
+                "pitting",
+                "pinion",
+            )
             assert "vary" not in crack | pit
             assert_allclose(crack["crack_depth_mm"], 1.0, rtol=1e-12, atol=0)
             assert pit["tooth"] == 2
             for place, part in enumerate((crack, pit)):
                 for key, value in part.items():
                     if isinstance(value, float):
-                        assert_allclose(record[f"params/fault.parts.{place}.{key}"], value, rtol=1e-12, atol=0)
+                        assert_allclose(
+                            record[f"params/fault.parts.{place}.{key}"], value, rtol=1e-12, atol=0
+                        )
             assert (record["fault_gear"], record["fault_tooth"]) == ("wheel", crack["tooth"])
             drawn.append((crack["tooth"], pit["pit_length_mm"], pit["pit_width_mm"]))
         teeth, *sizes = zip(*drawn, strict=True)
@@ -91,12 +106,17 @@ class TestManyKindsOfFaults:
         for name in ("wear", "distributed_pitting"):
             assert {record["fault_tooth"] for record in self.of(mixed, name)} == {-1}
             assert {record["fault_gear"] for record in self.of(mixed, name)} == {"pinion"}
-            assert {json.loads(record["faults_json"])[0]["tooth"] for record in self.of(mixed, name)} == {"all"}
+            assert {
+                json.loads(record["faults_json"])[0]["tooth"] for record in self.of(mixed, name)
+            } == {"all"}
         assert len({record["fault_tooth"] for record in self.of(mixed, "runout")}) > 5
         assert all(record["fault_tooth"] >= 0 for record in self.of(mixed, "runout"))
 
     def test_whole_numbers_are_drawn_whole(self, mixed):
-        seeds = [json.loads(record["faults_json"])[0]["pit_seed"] for record in self.of(mixed, "distributed_pitting")]
+        seeds = [
+            json.loads(record["faults_json"])[0]["pit_seed"]
+            for record in self.of(mixed, "distributed_pitting")
+        ]
         assert all(isinstance(seed, int) for seed in seeds)
         assert len(set(seeds)) == len(seeds)
 
@@ -104,7 +124,9 @@ class TestManyKindsOfFaults:
         for record in self.of(mixed, "compound"):
             parts = [severity([fault], xiamen.pair) for fault in row_faults(record)]
             assert_allclose(record["severity"], max(parts), rtol=1e-12, atol=0)
-        assert all(0 < record["severity"] <= 1 for name in MIXED[1:] for record in self.of(mixed, name))
+        assert all(
+            0 < record["severity"] <= 1 for name in MIXED[1:] for record in self.of(mixed, name)
+        )
 
     def test_a_sham_keeps_the_faults_on_paper(self, config, mixed):
         sham = make_plan(config.with_keys("plan", sham=True))
@@ -127,7 +149,12 @@ class TestManyKindsOfFaults:
 
     @pytest.mark.parametrize(
         ("name", "expected"),
-        [("compound", {"compound", "crack"}), ("crack", {"crack"}), ("wear", {"wear"}), ("healthy", {"healthy"})],
+        [
+            ("compound", {"compound", "crack"}),
+            ("crack", {"crack"}),
+            ("wear", {"wear"}),
+            ("healthy", {"healthy"}),
+        ],
     )
     def test_every_class_of_a_compound_is_hot(self, mixed, hot, name, expected):
         """The classes that are present: the compound one and those of its parts; a single fault brings one."""
@@ -146,10 +173,16 @@ class TestManyKindsOfFaults:
     @pytest.mark.parametrize(
         ("fault", "text"),
         [
-            ({"kind": "crack", "gear": "wheel", "tooth": 84}, "fault.tooth = 84 is not on the wheel"),
+            (
+                {"kind": "crack", "gear": "wheel", "tooth": 84},
+                "fault.tooth = 84 is not on the wheel",
+            ),
             ({"kind": "crack", "crack_depth_mm": 5}, "reaches through the root chord"),
             ({"kind": "wear", "wear_depth_um": 200}, "above 1"),
-            ({"kind": "crack", "vary": {"crack_dept_mm": {}}}, "fault.vary: 'crack_dept_mm' is no key of fault=crack"),
+            (
+                {"kind": "crack", "vary": {"crack_dept_mm": {}}},
+                "fault.vary: 'crack_dept_mm' is no key of fault=crack",
+            ),
             ({"kind": "crack", "crack_dept_mm": 1}, "fault.parts.0: unknown key 'crack_dept_mm'"),
         ],
     )

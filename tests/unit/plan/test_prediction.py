@@ -50,12 +50,22 @@ def test_what_a_grid_holds_is_told() -> None:
     assert told["classes"].count(" 6") == 4
     assert (told["units"], told["conditions"], told["repeats"]) == ("2", "6", "1")
     assert (told["specimens"], told["gearboxes"]) == ("2 (sets of gears)", "1")
-    assert told["design"].startswith("grid of operating.speed_rpm 3; drawn: crack.tooth, crack.crack_depth_mm")
+    assert told["design"].startswith(
+        "grid of operating.speed_rpm 3; drawn: crack.tooth, crack.crack_depth_mm"
+    )
 
 
 def test_records_that_fail_while_they_are_timed_are_told(monkeypatch: pytest.MonkeyPatch) -> None:
     whole = records.simulate_with_lead_in
-    monkeypatch.setattr(records, "simulate_with_lead_in", lambda runs: [*whole(runs)[:-1], SimulationError("it grew")])
-    config = read_request(["operating.duration_s=0.02", "plan.n_records=2", "executor.n_workers=1"]).config
-    with pytest.warns(FailedRecordsWarning, match="^1 of 2 records made to time the plan failed: it grew$"):
+    monkeypatch.setattr(
+        records,
+        "simulate_with_lead_in",
+        lambda runs: [*whole(runs)[:-1], SimulationError("it grew")],
+    )
+    config = read_request(
+        ["operating.duration_s=0.02", "plan.n_records=2", "executor.n_workers=1"]
+    ).config
+    with pytest.warns(
+        FailedRecordsWarning, match="^1 of 2 records made to time the plan failed: it grew$"
+    ):
         predict(config)

@@ -30,13 +30,18 @@ def test_a_larger_gear_has_as_much_larger_faults():
     ):
         mine = plain["label_name"] == name
         assert_allclose(
-            larger[f"params/fault.{size}"][mine], factor * plain[f"params/fault.{size}"][mine], rtol=1e-12, atol=0
+            larger[f"params/fault.{size}"][mine],
+            factor * plain[f"params/fault.{size}"][mine],
+            rtol=1e-12,
+            atol=0,
         )
 
 
 def test_a_length_in_millimetres_is_taken_as_it_is():
     spec = "{crack_depth_mm: {distribution: uniform, low: 1, high: 2}}"
-    plan = make_plan(read_request(["fault=crack", f"fault.vary={spec}", "gear.normal_module_mm=4"]).config)
+    plan = make_plan(
+        read_request(["fault=crack", f"fault.vary={spec}", "gear.normal_module_mm=4"]).config
+    )
     depth = np.asarray(plan.columns["params/fault.crack_depth_mm"])
     assert 1.0 <= depth.min() <= depth.max() <= 2.0
 
@@ -64,7 +69,9 @@ def test_what_is_no_share_is_refused(vary, complaint):
 
 
 def test_cracks_of_teeth_that_are_thin_at_the_root_stay_in_the_checked_range():
-    config = read_request(["gear.pinion.n_teeth=18", "plan.classes=[crack]", "plan.n_records=96"]).config
+    config = read_request(
+        ["gear.pinion.n_teeth=18", "plan.classes=[crack]", "plan.n_records=96"]
+    ).config
     gear = read_pair(config).pinion
     chord = 2e3 * root_curve_point(gear, "arc_mid")[1]
     depth = np.asarray(make_plan(config).columns["params/fault.crack_depth_mm"])

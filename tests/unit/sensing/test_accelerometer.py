@@ -62,7 +62,9 @@ def test_converter_steps_and_range(bits):
 
 
 def test_scatter_stays_within_the_data_sheet():
-    sensor = replace(IDEAL, sensitivity_tolerance=0.1, transverse_sensitivity=0.05, dc_offset_m_per_s2=0.3)
+    sensor = replace(
+        IDEAL, sensitivity_tolerance=0.1, transverse_sensitivity=0.05, dc_offset_m_per_s2=0.3
+    )
     drawn = [draw_sensors(np.random.default_rng(seed), sensor, 3) for seed in range(300)]
     for name, middle, most in (("gain", 1.0, 0.1), ("transverse", 0.0, 0.05), ("offset", 0.0, 0.3)):
         values = np.concatenate([getattr(one, name) for one in drawn]) - middle
@@ -73,15 +75,24 @@ def test_scatter_stays_within_the_data_sheet():
 @pytest.mark.parametrize(
     ("changes", "text"),
     [
-        ({"sensitivity_tolerance": 0.6}, "sensing.sensor.sensitivity_tolerance = 0.6 must lie in 0..0.5"),
+        (
+            {"sensitivity_tolerance": 0.6},
+            "sensing.sensor.sensitivity_tolerance = 0.6 must lie in 0..0.5",
+        ),
         ({"transverse_sensitivity": -0.1}, "sensing.sensor.transverse_sensitivity = -0.1"),
         ({"mounted_resonance": 10.0}, "sensing.sensor.mounted_resonance_hz = 10"),
         ({"resonance_damping_ratio": 0.0}, "sensing.sensor.resonance_damping_ratio = 0"),
         ({"low_cutoff": 0.0}, "sensing.sensor.low_cutoff_hz = 0"),
         ({"dc_offset_m_per_s2": -1.0}, "sensing.sensor.dc_offset_m_per_s2 = -1"),
         ({"adc_bits": 12}, "give both adc_range_m_per_s2 and adc_bits"),
-        ({"adc_bits": 30, "adc_range_m_per_s2": 1.0}, "sensing.sensor.adc_bits = 30 must lie in 4..24"),
-        ({"adc_bits": 12, "adc_range_m_per_s2": 0.0}, "sensing.sensor.adc_range_m_per_s2 = 0 must be positive"),
+        (
+            {"adc_bits": 30, "adc_range_m_per_s2": 1.0},
+            "sensing.sensor.adc_bits = 30 must lie in 4..24",
+        ),
+        (
+            {"adc_bits": 12, "adc_range_m_per_s2": 0.0},
+            "sensing.sensor.adc_range_m_per_s2 = 0 must be positive",
+        ),
         ({"max_clipped_fraction": 2.0}, "sensing.sensor.max_clipped_fraction = 2"),
     ],
 )

@@ -49,7 +49,9 @@ class TestBands:
         assert_allclose(lower[1:], upper[:-1], rtol=1e-12, atol=0)
         assert_allclose(upper[-1], 20_000, rtol=1e-12, atol=0)
 
-    @pytest.mark.parametrize(("n_samples", "lowest"), [(51_200, 20), (10_240, 100), (2560, 400), (512, 2000)])
+    @pytest.mark.parametrize(
+        ("n_samples", "lowest"), [(51_200, 20), (10_240, 100), (2560, 400), (512, 2000)]
+    )
     def test_short_signals_resolve_the_upper_ones(self, n_samples, lowest):
         lower, upper = third_octave_bands(n_samples, RATE)
         assert_allclose(np.sqrt(lower[0] * upper[0]), lowest, rtol=0.01, atol=0)
@@ -102,7 +104,9 @@ class TestThirdOctaves:
         exact = np.array([[others, tone(MIDDLES[17]) + others]] * 2)
         found = exact.copy()
         found[1, 1] = tone(MIDDLES[17], moved) + others
-        assert_allclose(third_octave_difference(found, exact, RATE), [0.0, abs(moved)], rtol=0, atol=2e-3)
+        assert_allclose(
+            third_octave_difference(found, exact, RATE), [0.0, abs(moved)], rtol=0, atol=2e-3
+        )
 
     @pytest.mark.parametrize("factor", [0.5, 1.02, 3.0])
     def test_a_scaled_signal(self, factor):
@@ -113,7 +117,10 @@ class TestThirdOctaves:
     @pytest.mark.parametrize(("level", "heard"), [(-HEARD_DB + 3, True), (-HEARD_DB - 3, False)])
     def test_what_is_far_below_the_loudest_is_not_heard(self, level, heard):
         loud = tone(MIDDLES[17])
-        exact, found = one_lane(loud + tone(MIDDLES[24], level)), one_lane(loud + tone(MIDDLES[24], level + 2))
+        exact, found = (
+            one_lane(loud + tone(MIDDLES[24], level)),
+            one_lane(loud + tone(MIDDLES[24], level + 2)),
+        )
         assert (third_octave_difference(found, exact, RATE)[0] > 1) == heard
 
     def test_the_loudest_is_that_of_the_channel(self):
@@ -144,7 +151,9 @@ class TestIndicators:
         """A sine of kurtosis 1.5 against one with the same RMS whose power comes in bursts, of twice that."""
         exact = tone(1000.0)
         found = exact * np.where(np.arange(N_SAMPLES) < N_SAMPLES // 2, np.sqrt(2), 0)
-        assert_allclose(indicator_difference(one_lane(found), one_lane(exact)), 1.0, rtol=1e-3, atol=0)
+        assert_allclose(
+            indicator_difference(one_lane(found), one_lane(exact)), 1.0, rtol=1e-3, atol=0
+        )
 
     def test_the_worst_channel_of_each_lane(self):
         exact = noise(2, 2)
@@ -162,7 +171,10 @@ class TestAgreement:
 
     def test_a_delay_of_a_microsecond_agrees_where_values_do_not(self):
         """10 kHz a sixteenth of a period late: a relative error of 0.4, and the same levels."""
-        exact, late = one_lane(tone(10_000)), one_lane(np.sin(2 * np.pi * 10_000 * (TIME - 6.25e-6) + 0.7))
+        exact, late = (
+            one_lane(tone(10_000)),
+            one_lane(np.sin(2 * np.pi * 10_000 * (TIME - 6.25e-6) + 0.7)),
+        )
         assert np.linalg.norm(late - exact) > 0.3 * np.linalg.norm(exact)
         found = agreement(late, exact, RATE)
         assert found.third_octave_db[0] < 1e-3

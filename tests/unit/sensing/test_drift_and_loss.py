@@ -17,7 +17,9 @@ N = 10_000
 
 def logarithms(seeds, *, scatter=0.1, time=0.5, n_samples=501, rate=500.0):
     """(record and sensor, sample)"""
-    drawn = [draw_drift(np.random.default_rng(seed), scatter, time, 2, n_samples, rate) for seed in seeds]
+    drawn = [
+        draw_drift(np.random.default_rng(seed), scatter, time, 2, n_samples, rate) for seed in seeds
+    ]
     return np.log(np.concatenate(drawn))
 
 
@@ -68,7 +70,12 @@ def test_filling():
     dropped = np.array([1, 0, 0, 1, 1, 0, 1, 0], dtype=bool)
     assert_allclose(filled(signal, dropped, "zero")[0], [0, 2, 3, 0, 0, 6, 0, 8], rtol=0, atol=0)
     assert_allclose(filled(signal, dropped, "hold")[0], [2, 2, 3, 3, 3, 6, 6, 8], rtol=0, atol=0)
-    assert_allclose(filled(signal, dropped, "hold")[1], 10.0 * filled(signal, dropped, "hold")[0], rtol=0, atol=0)
+    assert_allclose(
+        filled(signal, dropped, "hold")[1],
+        10.0 * filled(signal, dropped, "hold")[0],
+        rtol=0,
+        atol=0,
+    )
     for fill in ("hold", "zero"):
         assert not filled(signal, np.ones(8, dtype=bool), fill).any()
 
@@ -98,13 +105,31 @@ def test_an_instrument_that_has_them():
     ("changes", "text"),
     [
         ({"sensor__drift_scatter": 0.6}, "sensing.sensor.drift_scatter = 0.6 must lie in 0..0.5"),
-        ({"sensor__drift_time_s": 0.01}, "sensing.sensor.drift_time_s = 0.01 must lie in 0.1..1e+06"),
-        ({"sensor__dropped_fraction": -0.1}, "sensing.sensor.dropped_fraction = -0.1 must lie in 0..0.5"),
-        ({"sensor__dropped_run_samples": 0}, "sensing.sensor.dropped_run_samples = 0 must lie in 1..1e+06"),
-        ({"sensor__dropped_run_samples": 2.5}, "sensing.sensor.dropped_run_samples = 2.5 is not a whole number"),
-        ({"sensor__dropped_fill": "nan"}, "sensing.sensor.dropped_fill = 'nan'; allowed: hold, zero"),
+        (
+            {"sensor__drift_time_s": 0.01},
+            "sensing.sensor.drift_time_s = 0.01 must lie in 0.1..1e+06",
+        ),
+        (
+            {"sensor__dropped_fraction": -0.1},
+            "sensing.sensor.dropped_fraction = -0.1 must lie in 0..0.5",
+        ),
+        (
+            {"sensor__dropped_run_samples": 0},
+            "sensing.sensor.dropped_run_samples = 0 must lie in 1..1e+06",
+        ),
+        (
+            {"sensor__dropped_run_samples": 2.5},
+            "sensing.sensor.dropped_run_samples = 2.5 is not a whole number",
+        ),
+        (
+            {"sensor__dropped_fill": "nan"},
+            "sensing.sensor.dropped_fill = 'nan'; allowed: hold, zero",
+        ),
         ({"tacho": None}, "sensing.tacho = None must be a group of keys"),
-        ({"tacho": {"shaft": "pinion"}}, "sensing.tacho: missing pulses_per_turn, pulse_width_share, jitter_deg"),
+        (
+            {"tacho": {"shaft": "pinion"}},
+            "sensing.tacho: missing pulses_per_turn, pulse_width_share, jitter_deg",
+        ),
         ({"encoder__shaft": "x"}, "sensing.encoder.shaft = 'x'; allowed: pinion, wheel"),
         ({"encoder": {"lines": 3}}, "sensing.encoder: unknown key 'lines'"),
     ],

@@ -10,7 +10,9 @@ from numpy.testing import assert_allclose
 from gensig.errors import ConfigError
 from gensig.sensing.encoder import Disc, Encoder, draw_disc
 
-PERFECT = Encoder(shaft="pinion", lines_per_turn=1000, eccentricity_error=0.0, line_error=0.0, quantised=True)
+PERFECT = Encoder(
+    shaft="pinion", lines_per_turn=1000, eccentricity_error=0.0, line_error=0.0, quantised=True
+)
 ANGLE = np.linspace(-1.0, 40.0, 200_001)
 
 
@@ -41,7 +43,12 @@ def test_without_quantisation_a_perfect_one_is_exact():
 
 @pytest.mark.parametrize("quantised", [True, False])
 def test_errors_are_bounded_by_line_and_errors(quantised):
-    encoder = replace(PERFECT, eccentricity_error=np.radians(1.0), line_error=np.radians(0.03), quantised=quantised)
+    encoder = replace(
+        PERFECT,
+        eccentricity_error=np.radians(1.0),
+        line_error=np.radians(0.03),
+        quantised=quantised,
+    )
     for seed in range(20):
         off = error(encoder, seed)
         most = np.radians(1.0) + 4.0 * np.radians(0.03)
@@ -58,7 +65,9 @@ def test_eccentricity_errs_once_a_turn():
         spectrum = 2.0 * np.abs(np.fft.rfft(error(encoder, seed, turn))) / len(turn)
         order = np.argmax(spectrum)
         assert order == 3
-        assert np.delete(spectrum, [3]).max() < 0.02 * spectrum[3]  # (e/R)^2: reading and place are not the same
+        assert (
+            np.delete(spectrum, [3]).max() < 0.02 * spectrum[3]
+        )  # (e/R)^2: reading and place are not the same
         largest.append(spectrum[3])
     assert np.max(largest) <= np.radians(1.0) * 1.001
     assert np.max(largest) > 0.9 * np.radians(1.0)
@@ -71,7 +80,11 @@ def test_the_pattern_repeats_every_turn_and_is_each_discs_own():
     first, second = error(encoder, 3, turn), error(encoder, 3, turn + 6.0 * np.pi)
     assert_allclose(first, second, rtol=0, atol=1e-9)
     assert abs(np.corrcoef(first, error(encoder, 4, turn))[0, 1]) < 0.1
-    assert_allclose(np.std(disc_of(encoder).places - encoder.spacing * np.arange(1000)), np.radians(0.02), rtol=0.1)
+    assert_allclose(
+        np.std(disc_of(encoder).places - encoder.spacing * np.arange(1000)),
+        np.radians(0.02),
+        rtol=0.1,
+    )
 
 
 def test_lines_pass_in_order_at_the_largest_errors():
@@ -83,7 +96,9 @@ def test_lines_pass_in_order_at_the_largest_errors():
 
 def test_a_line_is_read_where_it_passes():
     disc = Disc(index=0.5, places=np.array([0.1, np.pi / 2, np.pi, 3 * np.pi / 2]))
-    angle = 0.5 + np.array([0.0, 0.05, 0.11, np.pi - 0.01, np.pi + 0.01, 2 * np.pi + 0.05, 2 * np.pi + 0.11])
+    angle = 0.5 + np.array(
+        [0.0, 0.05, 0.11, np.pi - 0.01, np.pi + 0.01, 2 * np.pi + 0.05, 2 * np.pi + 0.11]
+    )
     expected = np.pi / 2 * np.array([-1, -1, 0, 1, 2, 3, 4])
     assert_allclose(disc.read(angle, quantised=True), expected, rtol=0, atol=1e-12)
 

@@ -15,7 +15,13 @@ from gensig.sensing.gear_tolerances import (
 )
 
 UM = 1e-6
-LIMITS = (single_pitch_limit, cumulative_pitch_limit, profile_slope_limit, profile_form_limit, runout_limit)
+LIMITS = (
+    single_pitch_limit,
+    cumulative_pitch_limit,
+    profile_slope_limit,
+    profile_form_limit,
+    runout_limit,
+)
 # grade 5, module 2 mm, 23 teeth (d = 46 mm, root 6.78233) and 84 teeth (d = 168 mm, root 12.96148)
 BY_HAND = {
     single_pitch_limit: (0.046 + 0.8 + 5, 0.168 + 0.8 + 5),
@@ -41,7 +47,9 @@ def test_two_grades_are_a_factor_of_two(xiamen, limit):
 
 def test_runout_is_nine_tenths_of_the_cumulative_pitch(xiamen):
     for grade in (1, 6.3, 11):
-        ratio = runout_limit(xiamen.pair.wheel, grade) / cumulative_pitch_limit(xiamen.pair.wheel, grade)
+        ratio = runout_limit(xiamen.pair.wheel, grade) / cumulative_pitch_limit(
+            xiamen.pair.wheel, grade
+        )
         assert_allclose(ratio, 0.9, rtol=1e-12, atol=0)
 
 
@@ -55,9 +63,15 @@ def test_grades_that_there_are_not(xiamen, limit, grade):
 @pytest.mark.parametrize(
     ("changes", "text"),
     [
-        ({"n_teeth": 1001}, "covers 5 to 1000 teeth, the pinion has 1001; set quality.iso1328_grade=null"),
+        (
+            {"n_teeth": 1001},
+            "covers 5 to 1000 teeth, the pinion has 1001; set quality.iso1328_grade=null",
+        ),
         ({"normal_module": 0.4e-3}, "covers 0.5 to 70 mm module, the pinion has 0.4;"),
-        ({"normal_module": 20e-3, "n_teeth": 800}, "covers 5 to 15000 mm reference diameter, the pinion has 16000;"),
+        (
+            {"normal_module": 20e-3, "n_teeth": 800},
+            "covers 5 to 15000 mm reference diameter, the pinion has 16000;",
+        ),
     ],
 )
 def test_gears_that_are_not_covered(gear_with, changes, text):

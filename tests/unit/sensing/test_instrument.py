@@ -29,11 +29,15 @@ def changed(values, **changes):
 
 
 def instrument(values, seed=0):
-    return draw_instrument(read_sensing(values), *(np.random.default_rng(seed + place) for place in range(2)))
+    return draw_instrument(
+        read_sensing(values), *(np.random.default_rng(seed + place) for place in range(2))
+    )
 
 
 def source(sensing, n_samples=51_200):
-    return np.random.default_rng(9).standard_normal((len(sensing.channels), sensing.n_lead + n_samples))
+    return np.random.default_rng(9).standard_normal(
+        (len(sensing.channels), sensing.n_lead + n_samples)
+    )
 
 
 def test_on_the_bearing_nothing_changes():
@@ -73,7 +77,9 @@ def test_filters_have_settled_at_the_first_sample(n_lead, monkeypatch):
 def test_achieved_signal_to_noise_ratio_in_the_band(snr_db, n_samples):
     one = instrument(changed(HOUSING, sensor__adc_bits=None, sensor__adc_range_m_per_s2=None))
     clean = one.measure(source(one.sensing, n_samples))
-    noisy, clipped = one.record(clean, one.power(clean) * 10 ** (-snr_db / 10), np.random.default_rng(3))
+    noisy, clipped = one.record(
+        clean, one.power(clean) * 10 ** (-snr_db / 10), np.random.default_rng(3)
+    )
     found = 10 * np.log10(one.power(clean) / one.power(noisy - clean))
     assert_allclose(found, snr_db, rtol=0, atol=0.1)
     assert clipped == 0.0
@@ -83,7 +89,12 @@ def test_achieved_signal_to_noise_ratio_in_the_band(snr_db, n_samples):
 def test_noise_of_the_path_has_the_resonances_of_the_path():
     parts = [{"kind": "path", "share": 1.0}]
     one = instrument(
-        changed(HOUSING, noise__parts=parts, path__n_modes=[1, 1], path__natural_frequency_hz=[2000, 2000])
+        changed(
+            HOUSING,
+            noise__parts=parts,
+            path__n_modes=[1, 1],
+            path__natural_frequency_hz=[2000, 2000],
+        )
     )
     noise = one.record(np.zeros((3, 51_200)), np.ones(3), np.random.default_rng(4))[0]
     lines = np.abs(np.fft.rfft(noise, axis=1)) ** 2
@@ -127,7 +138,11 @@ def test_gearboxes_differ_and_path_and_sensor_have_their_own_numbers():
         (HOUSING, {"sensors": ["a", "a"]}, "must name at least one sensor, each once"),
         (HOUSING, {"sensors": ["a b"]}, "sensing.sensors: 'a b'"),
         (HOUSING, {"sensors": ["my_rotation"]}, "not ending in 'rotation'"),
-        (HOUSING, {"channels": ["pinion_rotation"]}, "sensing.channels: pinion_rotation is no bearing"),
+        (
+            HOUSING,
+            {"channels": ["pinion_rotation"]},
+            "sensing.channels: pinion_rotation is no bearing",
+        ),
         (HOUSING, {"sampling_rate_hz": 20_000}, "above the usable band of 7812.5 Hz"),
         (
             HOUSING,
@@ -135,14 +150,30 @@ def test_gearboxes_differ_and_path_and_sensor_have_their_own_numbers():
             "give 'sensing.path.natural_frequency_hz=[300,10000]' or a rate of at least 30720 Hz",
         ),
         (HOUSING, {"noise__band_hz": [10, 30_000]}, "above half of sensing.sampling_rate_hz"),
-        (BEARING, {"noise__parts": [{"kind": "path", "share": 1}]}, "kind path needs a transfer path"),
+        (
+            BEARING,
+            {"noise__parts": [{"kind": "path", "share": 1}]},
+            "kind path needs a transfer path",
+        ),
         (BEARING, {"path": {"kind": "modal"}}, "sensing.path: missing n_modes"),
-        (BEARING, {"path": {"kind": "short"}}, "sensing.path.kind = 'short'; allowed: identity, modal, measured"),
+        (
+            BEARING,
+            {"path": {"kind": "short"}},
+            "sensing.path.kind = 'short'; allowed: identity, modal, measured",
+        ),
         (BEARING, {"path": None}, "sensing.path.kind = None"),
         (BEARING, {"path": {"kind": "identity", "file": "x"}}, "unknown key 'file'"),
         (BEARING, {"sensor": None}, "sensing.sensor = None must be a group of keys"),
-        (BEARING, {"noise": {"parts": []}}, "sensing.noise must be a group of the keys parts and band_hz"),
-        (BEARING, {"channels": ["pinion_y"], "sensor__transverse_sensitivity": 0.1}, "without the other axis"),
+        (
+            BEARING,
+            {"noise": {"parts": []}},
+            "sensing.noise must be a group of the keys parts and band_hz",
+        ),
+        (
+            BEARING,
+            {"channels": ["pinion_y"], "sensor__transverse_sensitivity": 0.1},
+            "without the other axis",
+        ),
     ],
 )
 def test_mistakes(values, changes, text):
@@ -158,5 +189,8 @@ def test_a_measured_path_tells_no_transverse_motion():
 
 
 def test_a_group_without_the_new_keys_is_named():
-    with pytest.raises(ConfigError, match=re.escape("sensing: missing path, sensor, noise, nuisances, tacho, encoder")):
+    with pytest.raises(
+        ConfigError,
+        match=re.escape("sensing: missing path, sensor, noise, nuisances, tacho, encoder"),
+    ):
         read_sensing({key: value for key, value in BEARING.items() if key not in NESTED})

@@ -56,7 +56,11 @@ def once_per_turn(error):
 def eccentric_tilt(gear, error):
     """How the offsets of an eccentric gear grow along the path, from those at the pitch point, (tooth,) m/m."""
     eccentricity, most = once_per_turn(error)
-    return -eccentricity / gear.base_radius * np.sin(2.0 * np.pi / gear.n_teeth * (np.arange(gear.n_teeth) - most))
+    return (
+        -eccentricity
+        / gear.base_radius
+        * np.sin(2.0 * np.pi / gear.n_teeth * (np.arange(gear.n_teeth) - most))
+    )
 
 
 def profile_of(pair, specimen, name):
@@ -69,7 +73,9 @@ def profile_of(pair, specimen, name):
     even = np.linspace(at[0], at[-1], 4001)
     trace = np.interp(even, at, back)
     rate, mean = np.polyfit(even - even.mean(), trace, 1)
-    own = getattr(specimen, f"{name}_tilt") - eccentric_tilt(gear, getattr(specimen, f"{name}_error"))
+    own = getattr(specimen, f"{name}_tilt") - eccentric_tilt(
+        gear, getattr(specimen, f"{name}_error")
+    )
     towards_tip = 1.0 if name == "pinion" else -1.0
     slopes = (rate + towards_tip * own) * (at[-1] - at[0])
     return slopes, np.ptp(trace - mean - rate * (even - even.mean()))
@@ -98,7 +104,9 @@ def pairs(xiamen, gear_with):
     """Pairs of gears from small to large, by name; what is drawn asks for no mesh."""
 
     def pair(pinion, wheel):
-        return SimpleNamespace(pinion=gear_with(**pinion), wheel=replace(gear_with(**wheel), name="wheel"))
+        return SimpleNamespace(
+            pinion=gear_with(**pinion), wheel=replace(gear_with(**wheel), name="wheel")
+        )
 
     small, large = {"normal_module": 0.5e-3}, {"normal_module": 20e-3}
     return {
@@ -114,7 +122,9 @@ def pairs(xiamen, gear_with):
 @pytest.mark.parametrize("grade", [1, 5, 6.5, 9, 11])
 class TestLimits:
     def test_every_gear_keeps_to_its_grade(self, pairs, quality, name, grade):
-        own = quality(iso1328_grade=grade, used_share_low=0.8, used_share_high=1.0, undulation_share=0.3)
+        own = quality(
+            iso1328_grade=grade, used_share_low=0.8, used_share_high=1.0, undulation_share=0.3
+        )
         for seed in range(25):
             for shares in used(pairs[name], draw(pairs[name], own, seed), grade).values():
                 assert (shares <= 1.0 + 1e-6).all(), (seed, shares)
@@ -138,7 +148,10 @@ class TestWhatIsDrawn:
             assert (shares > 1.0).sum() >= 2
 
     def test_the_used_share_lies_in_its_range(self, xiamen, quality):
-        found = [used(xiamen.pair, draw(xiamen.pair, quality(), seed), 5)["pinion"][0] for seed in range(60)]
+        found = [
+            used(xiamen.pair, draw(xiamen.pair, quality(), seed), 5)["pinion"][0]
+            for seed in range(60)
+        ]
         assert min(found) >= 0.3
         assert max(found) <= 0.9
         assert np.ptp(found) > 0.4
@@ -164,10 +177,14 @@ class TestWhatIsDrawn:
             for name in GEARS:
                 gear, error = getattr(xiamen.pair, name), getattr(specimen, f"{name}_error")
                 tilt = getattr(specimen, f"{name}_tilt")
-                assert_allclose(tilt, eccentric_tilt(gear, error), rtol=0, atol=1e-9 * np.abs(tilt).max())
+                assert_allclose(
+                    tilt, eccentric_tilt(gear, error), rtol=0, atol=1e-9 * np.abs(tilt).max()
+                )
 
     def test_eccentricities_and_phases_scatter(self, xiamen, quality):
-        drawn = [once_per_turn(draw(xiamen.pair, quality(), seed).wheel_error) for seed in range(80)]
+        drawn = [
+            once_per_turn(draw(xiamen.pair, quality(), seed).wheel_error) for seed in range(80)
+        ]
         size, most = np.array(drawn).T
         assert size.min() < 1.0 * UM
         assert 5.0 * UM < size.max() <= 0.5 * 0.9 * runout_limit(xiamen.pair.wheel, 5)
@@ -189,14 +206,19 @@ class TestWhatIsDrawn:
             forms = draw(xiamen.pair, quality(undulation_share=part, undulation_waves=11), 2).forms
             own = [form for form in forms if form.gear == "pinion"]
             waves = sum(form.profile_form for form in own if form.profile_waves == 11)
-            assert_allclose(waves / sum(form.profile_form for form in own), part, rtol=1e-12, atol=1e-15)
+            assert_allclose(
+                waves / sum(form.profile_form for form in own), part, rtol=1e-12, atol=1e-15
+            )
 
     def test_misalignment_and_backlash_keep_to_their_range(self, xiamen, quality):
         own = quality(misalignment=8 * UM, backlash_scatter=0.3)
         specimens = [draw(xiamen.pair, own, seed) for seed in range(60)]
         tilted = np.array([one.forms[-1].misalignment for one in specimens])
         assert all(isinstance(one.forms[-1], Misalignment) for one in specimens)
-        for values, reach in ((tilted, 8 * UM), (np.array([one.backlash_factor - 1 for one in specimens]), 0.3)):
+        for values, reach in (
+            (tilted, 8 * UM),
+            (np.array([one.backlash_factor - 1 for one in specimens]), 0.3),
+        ):
             assert 0.85 * reach < np.abs(values).max() <= reach
             assert values.min() < 0.0 < values.max()
 
@@ -209,7 +231,10 @@ class TestWhatIsDrawn:
         one, other = draw(xiamen.pair, quality(), 7), draw(xiamen.pair, quality(**changes), 7)
         for key in ("pinion_error", "wheel_error"):
             assert_allclose(getattr(one, key), getattr(other, key), rtol=0, atol=0)
-        assert any(repr(getattr(one, field.name)) != repr(getattr(other, field.name)) for field in fields(one))
+        assert any(
+            repr(getattr(one, field.name)) != repr(getattr(other, field.name))
+            for field in fields(one)
+        )
 
     def test_without_profile_errors(self, xiamen, quality):
         specimen = draw(xiamen.pair, quality(profile_errors=False), 1)
@@ -217,15 +242,26 @@ class TestWhatIsDrawn:
         assert_allclose(profile_of(xiamen.pair, specimen, "pinion")[0], 0.0, rtol=0, atol=1e-15)
 
     def test_no_grade_is_perfect(self, xiamen, quality):
-        nothing = quality(iso1328_grade=None, misalignment=9 * UM, backlash_scatter=0.9, undulation_share=0.5)
-        specimen, perfect = draw(xiamen.pair, nothing), perfect_specimen(xiamen.pair.pinion, xiamen.pair.wheel)
+        nothing = quality(
+            iso1328_grade=None, misalignment=9 * UM, backlash_scatter=0.9, undulation_share=0.5
+        )
+        specimen, perfect = (
+            draw(xiamen.pair, nothing),
+            perfect_specimen(xiamen.pair.pinion, xiamen.pair.wheel),
+        )
         for field in fields(perfect):
-            assert_allclose(getattr(specimen, field.name), getattr(perfect, field.name), rtol=0, atol=0)
+            assert_allclose(
+                getattr(specimen, field.name), getattr(perfect, field.name), rtol=0, atol=0
+            )
         assert not any(np.any(getattr(specimen, field.name)) for field in fields(perfect)[:-1])
         assert specimen.backlash_factor == 1.0
 
     def test_a_gear_outside_the_standard_needs_no_grade(self, machine):
-        tiny = {"gear.normal_module_mm": 0.4, "gear.pinion.bore_radius_mm": 1.5, "gear.wheel.bore_radius_mm": 5}
+        tiny = {
+            "gear.normal_module_mm": 0.4,
+            "gear.pinion.bore_radius_mm": 1.5,
+            "gear.wheel.bore_radius_mm": 5,
+        }
         with pytest.raises(ConfigError, match=r"covers 0\.5 to 70 mm module, the pinion has 0\.4"):
             machine(tiny).check()
         machine({**tiny, "quality.iso1328_grade": None}).check()
@@ -252,7 +288,10 @@ def test_no_scatter_is_nominal(xiamen):
     [
         ({"iso1328_grade": 12}, "quality.iso1328_grade = 12 must lie in 1..11, or be null"),
         ({"used_share_low": 0.95}, "quality.used_share_low and used_share_high must be ordered"),
-        ({"support_damping_scatter": -0.1}, "quality.support_damping_scatter = -0.1 must lie in 0..1"),
+        (
+            {"support_damping_scatter": -0.1},
+            "quality.support_damping_scatter = -0.1 must lie in 0..1",
+        ),
         ({"tooth_share": 1.1}, "quality.tooth_share = 1.1 must lie in 0..1"),
         ({"undulation_share": -0.1}, "quality.undulation_share = -0.1 must lie in 0..1"),
         ({"undulation_waves": 0}, "quality.undulation_waves = 0 must lie in 1..50"),

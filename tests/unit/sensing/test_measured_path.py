@@ -53,7 +53,9 @@ def test_linear_and_causal(tmp_path):
     path = read(frequency_file(tmp_path / "f.csv", mode))
     one, other = np.random.default_rng(2).standard_normal((2, 2, 3000))
     together = path.apply(one + 2.0 * other, RATE)
-    assert_allclose(together, path.apply(one, RATE) + 2.0 * path.apply(other, RATE), rtol=0, atol=1e-9)
+    assert_allclose(
+        together, path.apply(one, RATE) + 2.0 * path.apply(other, RATE), rtol=0, atol=1e-9
+    )
     late = one.copy()
     late[:, 1500:] = 0.0
     difference = np.abs(path.apply(one, RATE) - path.apply(late, RATE))

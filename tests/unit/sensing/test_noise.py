@@ -19,7 +19,13 @@ KINDS = {
     "pink": {"kind": "pink", "share": 1.0, "lowest_hz": 5.0},
     "path": {"kind": "path", "share": 1.0},
     "hum": {"kind": "hum", "share": 1.0, "mains_hz": 50.0, "n_harmonics": 3},
-    "impulsive": {"kind": "impulsive", "share": 1.0, "knocks_hz": 5.0, "ring_hz": 3000.0, "damping_ratio": 0.05},
+    "impulsive": {
+        "kind": "impulsive",
+        "share": 1.0,
+        "knocks_hz": 5.0,
+        "ring_hz": 3000.0,
+        "damping_ratio": 0.05,
+    },
     "machine": MACHINE,
 }
 
@@ -28,7 +34,9 @@ def place(n_samples=51200):
     def through_path(rng):
         return np.cumsum(rng.standard_normal((2, n_samples)), axis=1)
 
-    return Place(sensors=("a", "b"), n_samples=n_samples, sampling_rate=RATE, through_path=through_path)
+    return Place(
+        sensors=("a", "b"), n_samples=n_samples, sampling_rate=RATE, through_path=through_path
+    )
 
 
 def noise(*kinds, band=None):
@@ -62,7 +70,9 @@ def test_power_is_exact(kinds, n_samples):
 def test_power_in_a_band(kinds):
     from scipy.signal import butter, sosfilt
 
-    made = noise(*kinds, band=[300.0, 8000.0]).make(np.array([2.0, 0.3]), np.random.default_rng(1), place())
+    made = noise(*kinds, band=[300.0, 8000.0]).make(
+        np.array([2.0, 0.3]), np.random.default_rng(1), place()
+    )
     within = sosfilt(butter(8, [300.0, 8000.0], "bandpass", fs=RATE, output="sos"), made, axis=1)
     assert_allclose(np.var(within, axis=1), [2.0, 0.3], rtol=0.04, atol=0)
     assert np.all(np.var(made, axis=1) > 1.02 * np.array([2.0, 0.3]))
@@ -71,13 +81,17 @@ def test_power_in_a_band(kinds):
 def test_band_power_of_a_tone():
     tone = 3.0 * np.sin(2 * np.pi * 1000.0 * np.arange(51200) / RATE)[None] + 5.0
     assert_allclose(band_power(tone, RATE, (900.0, 1100.0)), 4.5, rtol=1e-9, atol=0)
-    assert_allclose(band_power(tone, RATE, (0.0, 25_600.0)), band_power(tone, RATE, None), rtol=1e-9, atol=0)
+    assert_allclose(
+        band_power(tone, RATE, (0.0, 25_600.0)), band_power(tone, RATE, None), rtol=1e-9, atol=0
+    )
     assert_allclose(band_power(tone, RATE, (1200.0, 2000.0)), 0.0, rtol=0, atol=1e-9)
 
 
 def test_shares_are_of_the_power():
     parts = [{**KINDS["white"], "share": 3.0}, {**KINDS["hum"], "share": 1.0}]
-    made = read_noise({"parts": parts, "band_hz": None}).make(np.ones(2), np.random.default_rng(2), place())
+    made = read_noise({"parts": parts, "band_hz": None}).make(
+        np.ones(2), np.random.default_rng(2), place()
+    )
     lines = 2.0 * density(made)[:, [50, 100, 150]] / 51200**2
     assert_allclose(lines.sum(axis=1), 0.25, rtol=0.02, atol=0)
     assert_allclose(lines[:, 1] / lines[:, 0], 0.25, rtol=0.1, atol=0)
@@ -108,7 +122,9 @@ def test_another_machine_has_its_orders_and_nothing_else():
 def test_background_takes_a_stretch(tmp_path):
     recording = np.random.default_rng(6).standard_normal((2, 5000))
     part = background(tmp_path / "two.csv", recording, names=("a", "b"))
-    made = read_noise({"parts": [part], "band_hz": None}).make(np.ones(2), np.random.default_rng(7), place(1000))
+    made = read_noise({"parts": [part], "band_hz": None}).make(
+        np.ones(2), np.random.default_rng(7), place(1000)
+    )
     starts = [int(np.argmax(np.correlate(recording[k], made[k], "valid"))) for k in range(2)]
     assert starts[0] == starts[1]
     for k in range(2):
@@ -116,18 +132,31 @@ def test_background_takes_a_stretch(tmp_path):
 
 
 def spectrum(path, columns, *, names=("background",)):
-    np.savetxt(path, np.column_stack(columns), "%.9g", ",", header=",".join(["frequency_hz", *names]), comments="")
+    np.savetxt(
+        path,
+        np.column_stack(columns),
+        "%.9g",
+        ",",
+        header=",".join(["frequency_hz", *names]),
+        comments="",
+    )
     return {"kind": "spectrum", "share": 1.0, "file": str(path)}
 
 
 def test_spectrum_has_the_density_of_its_file(tmp_path):
-    part = spectrum(tmp_path / "s.csv", [[100.0, 1000.0, 2000.0], [1.0, 1.0, 9.0], [4.0, 1.0, 1.0]], names=("a", "b"))
+    part = spectrum(
+        tmp_path / "s.csv",
+        [[100.0, 1000.0, 2000.0], [1.0, 1.0, 9.0], [4.0, 1.0, 1.0]],
+        names=("a", "b"),
+    )
     noise = read_noise({"parts": [part], "band_hz": None})
     made = noise.make(np.array([2.0, 0.3]), np.random.default_rng(3), place())
     assert_allclose(np.var(made, axis=1), [2.0, 0.3], rtol=1e-9, atol=0)
     found = density(made)
     flat, high = found[:, 200:900].mean(axis=1), found[:, 3000:9000].mean(axis=1)
-    assert_allclose(high[0] / flat[0], 9.0, rtol=0.15)  # straight between the lines, held beyond the last
+    assert_allclose(
+        high[0] / flat[0], 9.0, rtol=0.15
+    )  # straight between the lines, held beyond the last
     assert_allclose(found[0, 1400:1600].mean() / flat[0], 5.0, rtol=0.25)
     other = noise.make(np.array([2.0, 0.3]), np.random.default_rng(4), place())
     assert abs(np.corrcoef(made[0], other[0])[0, 1]) < 0.05
@@ -147,18 +176,26 @@ def test_refused_spectra(tmp_path):
     for number, (text, (columns, names)) in enumerate(cases.items()):
         part = spectrum(tmp_path / f"{number}.csv", columns, names=names)
         with pytest.raises(ConfigError, match=re.escape(text)) as caught:
-            read_noise({"parts": [part], "band_hz": None}).make(np.ones(2), np.random.default_rng(1), place())
+            read_noise({"parts": [part], "band_hz": None}).make(
+                np.ones(2), np.random.default_rng(1), place()
+            )
         assert "\n" not in str(caught.value)
 
 
 def test_refused_backgrounds(tmp_path):
     rng = np.random.default_rng(8)
     cases = {
-        "too short: 900 rows, at least 1000": background(tmp_path / "a.csv", rng.standard_normal((1, 900))),
+        "too short: 900 rows, at least 1000": background(
+            tmp_path / "a.csv", rng.standard_normal((1, 900))
+        ),
         "no column a": background(tmp_path / "b.csv", rng.standard_normal((1, 2000)), names=("c",)),
-        "samples a second": background(tmp_path / "c.csv", rng.standard_normal((1, 2000)), rate=8000),
+        "samples a second": background(
+            tmp_path / "c.csv", rng.standard_normal((1, 2000)), rate=8000
+        ),
         "one value throughout": background(tmp_path / "d.csv", np.ones((1, 2000))),
-        "row 2, column background is no finite number": background(tmp_path / "e.csv", np.full((1, 2000), np.nan)),
+        "row 2, column background is no finite number": background(
+            tmp_path / "e.csv", np.full((1, 2000), np.nan)
+        ),
     }
     for text, part in cases.items():
         found = read_noise({"parts": [part], "band_hz": None})
@@ -171,12 +208,32 @@ def test_refused_backgrounds(tmp_path):
     [
         ([], None, "sensing.noise.parts = [] has no part"),
         ("white", None, "must be a list"),
-        ([{"kind": "brown", "share": 1}], None, "sensing.noise.parts[0]: kind = 'brown'; allowed: white, pink"),
-        ([{"kind": "white", "share": 0.0}], None, "sensing.noise.parts[0].share = 0 must be positive"),
+        (
+            [{"kind": "brown", "share": 1}],
+            None,
+            "sensing.noise.parts[0]: kind = 'brown'; allowed: white, pink",
+        ),
+        (
+            [{"kind": "white", "share": 0.0}],
+            None,
+            "sensing.noise.parts[0].share = 0 must be positive",
+        ),
         ([{"kind": "white"}], None, "sensing.noise.parts[0]: missing share"),
-        ([KINDS["white"], {"kind": "pink", "share": 1, "lowest": 2}], None, "write it as 'lowest_hz'"),
-        ([{**KINDS["impulsive"], "damping_ratio": 2.0}], None, "damping_ratio = 2 must lie in 0.001..1"),
-        ([{**MACHINE, "frequency_scatter": 0.9}], None, "frequency_scatter = 0.9 must lie in 0..0.5"),
+        (
+            [KINDS["white"], {"kind": "pink", "share": 1, "lowest": 2}],
+            None,
+            "write it as 'lowest_hz'",
+        ),
+        (
+            [{**KINDS["impulsive"], "damping_ratio": 2.0}],
+            None,
+            "damping_ratio = 2 must lie in 0.001..1",
+        ),
+        (
+            [{**MACHINE, "frequency_scatter": 0.9}],
+            None,
+            "frequency_scatter = 0.9 must lie in 0..0.5",
+        ),
         ([KINDS["white"]], [100.0], "sensing.noise.band_hz = [100.0] must be [low, high]"),
         ([KINDS["white"]], [200.0, 100.0], "must be [low, high], ordered"),
         ([KINDS["white"]], "all", "must be [low, high] in Hz, or null"),

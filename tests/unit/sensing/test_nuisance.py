@@ -29,8 +29,13 @@ PARTS = {
 
 
 def draw(dynamics, *parts, unit=1, specimen=1, record=1):
-    units = {"gearbox": np.random.default_rng([0, unit]), "specimen": np.random.default_rng([1, specimen])}
-    return draw_tones(read_nuisances(list(parts)), dynamics, units, np.random.default_rng([2, record]))
+    units = {
+        "gearbox": np.random.default_rng([0, unit]),
+        "specimen": np.random.default_rng([1, specimen]),
+    }
+    return draw_tones(
+        read_nuisances(list(parts)), dynamics, units, np.random.default_rng([2, record])
+    )
 
 
 @pytest.fixture(scope="module")
@@ -70,7 +75,9 @@ def test_an_unbalance_turns_by_the_sense_of_its_gear(dynamics, gear, sense):
     (tones,) = draw(dynamics, {**PARTS["unbalance"], "gear": gear})
     turning = np.real(tones.force[0, :2] * np.exp(1j * np.array([0.0, 0.1]))[:, None])
     angles = np.arctan2(turning[:, 1], turning[:, 0])
-    assert_allclose((angles[1] - angles[0] + np.pi) % (2 * np.pi) - np.pi, 0.1 * sense, rtol=1e-9, atol=0)
+    assert_allclose(
+        (angles[1] - angles[0] + np.pi) % (2 * np.pi) - np.pi, 0.1 * sense, rtol=1e-9, atol=0
+    )
 
 
 def test_the_senses_are_those_of_the_equations_of_motion():
@@ -80,7 +87,9 @@ def test_the_senses_are_those_of_the_equations_of_motion():
     """
     radius, rho, along, friction = 0.02, 0.005, 100.0, 7.0
     from_x_to_y = radius * along + rho * friction
-    assert_allclose(SENSE["pinion"] * from_x_to_y, -along * radius - rho * friction, rtol=1e-12, atol=0)
+    assert_allclose(
+        SENSE["pinion"] * from_x_to_y, -along * radius - rho * friction, rtol=1e-12, atol=0
+    )
     assert SENSE["wheel"] == -SENSE["pinion"]
 
 
@@ -89,7 +98,9 @@ def test_orders_and_sizes_of_a_coupling(dynamics):
     assert_allclose(tones.order, [2, 1, 2, 3], rtol=0, atol=0)
     assert_allclose(np.abs(tones.force[0]), [0.0, 0.0, 1e-3 * 20.0], rtol=1e-12, atol=0)
     radial = np.linalg.norm(tones.force[1:, :2], axis=1)
-    assert_allclose(radial, 0.01 * dynamics.mesh_force * np.array([0.5, 1.0, 0.3]), rtol=1e-12, atol=0)
+    assert_allclose(
+        radial, 0.01 * dynamics.mesh_force * np.array([0.5, 1.0, 0.3]), rtol=1e-12, atol=0
+    )
     direction = tones.force[1:, 1] / tones.force[1:, 0]
     assert_allclose(direction, direction[0].real, rtol=1e-9, atol=0)
 
@@ -111,7 +122,12 @@ def test_orders_and_sizes_of_a_bearing(dynamics):
     assert_allclose(sorted(tones.order), sorted(wanted), rtol=1e-12, atol=0)
     support, waviness = dynamics.pinion.support, 1e-7
     forward = np.abs(tones.force[0])
-    assert_allclose(forward, [waviness * support.stiffness_x, waviness * support.stiffness_y, 0.0], rtol=1e-9, atol=0)
+    assert_allclose(
+        forward,
+        [waviness * support.stiffness_x, waviness * support.stiffness_y, 0.0],
+        rtol=1e-9,
+        atol=0,
+    )
     assert_allclose(np.abs(tones.force[6:]), 0.5 * np.abs(tones.force[1:6]), rtol=1e-9, atol=0)
     assert np.all(tones.force[:, 2] == 0.0)
 
@@ -119,12 +135,18 @@ def test_orders_and_sizes_of_a_bearing(dynamics):
 def test_orders_and_sizes_of_a_neighbour(dynamics):
     (tones,) = draw(dynamics, PARTS["neighbour_mesh"])
     side = [0.0, 1.0, -1.0, 25 / 72, -25 / 72]
-    assert_allclose(sorted(tones.order), sorted([25 + one for one in side] + [50 + one for one in side]), atol=1e-12)
+    assert_allclose(
+        sorted(tones.order),
+        sorted([25 + one for one in side] + [50 + one for one in side]),
+        atol=1e-12,
+    )
     level = 0.01 * 20.0 * 84 / 23 / 29.4e-3
     wanted = {25.0: level, 26.0: 0.2 * level, 50.0: level / 2, 51.0: 0.1 * level}
     for order, size in wanted.items():
         (force,) = tones.force[np.isclose(tones.order, order)]
-        assert_allclose(np.abs(force), size * np.array([0.5, math.sqrt(0.75), 29.4e-3]), rtol=1e-9, atol=0)
+        assert_allclose(
+            np.abs(force), size * np.array([0.5, math.sqrt(0.75), 29.4e-3]), rtol=1e-9, atol=0
+        )
 
 
 @pytest.mark.parametrize("kind", KINDS)
@@ -139,7 +161,10 @@ def test_a_unit_keeps_its_sizes_from_record_to_record(dynamics, kind):
 @pytest.mark.parametrize("kind", KINDS)
 def test_it_belongs_to_the_gearbox_or_to_the_specimen(dynamics, kind):
     (one,) = draw(dynamics, PARTS[kind])
-    (gearbox,), (specimen,) = draw(dynamics, PARTS[kind], unit=2), draw(dynamics, PARTS[kind], specimen=2)
+    (gearbox,), (specimen,) = (
+        draw(dynamics, PARTS[kind], unit=2),
+        draw(dynamics, PARTS[kind], specimen=2),
+    )
     changed = {"gearbox": gearbox, "specimen": specimen}
     level = KINDS[kind].level
     assert not np.array_equal(changed.pop(level).force, one.force)

@@ -39,7 +39,9 @@ def test_high_for_its_share_of_the_turn(share):
     assert_allclose(pulses.mean(), share, rtol=0, atol=1e-4)
     assert pulses.min() >= 0.0
     assert pulses.max() <= 1.0 + 1e-9
-    assert np.isin(np.round(pulses, 9), [0.0, 1.0]).sum() >= len(pulses) - 22  # but for the two edges of each
+    assert (
+        np.isin(np.round(pulses, 9), [0.0, 1.0]).sum() >= len(pulses) - 22
+    )  # but for the two edges of each
 
 
 def test_a_record_may_begin_and_end_in_a_pulse():
@@ -87,7 +89,10 @@ def test_the_mark_is_anywhere():
             {"pulses_per_turn": 0},
             "sensing.tacho.pulses_per_turn = 0 must lie in 1..1000; sensing.encoder has more lines",
         ),
-        ({"pulse_width_share": 1.0}, "sensing.tacho.pulse_width_share = 1 must lie in 0.001..0.999"),
+        (
+            {"pulse_width_share": 1.0},
+            "sensing.tacho.pulse_width_share = 1 must lie in 0.001..0.999",
+        ),
         ({"jitter": -0.1}, "sensing.tacho.jitter_deg = -5.7"),
         ({"jitter": 0.1}, "must lie in 0..2.25, an eighth of the narrower of pulse and gap"),
         ({"jitter": 0.01, "pulse_width_share": 0.99}, "must lie in 0..0.45"),

@@ -9,9 +9,16 @@ from numpy.testing import assert_allclose
 
 from gensig.errors import ConfigError, SimulationError
 from gensig.sensing.encoder import Disc
-from gensig.sensing.toothed_wheel import ToothedWheel, draw_wheel, instantaneous_speed, passage_times
+from gensig.sensing.toothed_wheel import (
+    ToothedWheel,
+    draw_wheel,
+    instantaneous_speed,
+    passage_times,
+)
 
-PERFECT = ToothedWheel(node=14, n_teeth=160, eccentricity_error=0.0, tooth_error=0.0, clock_frequency=1e9)
+PERFECT = ToothedWheel(
+    node=14, n_teeth=160, eccentricity_error=0.0, tooth_error=0.0, clock_frequency=1e9
+)
 RATE, MEAN, SHARE, ORDER = 51_200.0, 1688 * np.pi / 30, 0.01, 2.0
 TIME = np.arange(25_600) / RATE
 
@@ -33,7 +40,11 @@ def amplitude(signal, order):
     window = np.hanning(n)
     return (
         2
-        * abs(np.sum(window * (signal[:n] - signal[:n].mean()) * np.exp(-1j * order * MEAN * TIME[:n])))
+        * abs(
+            np.sum(
+                window * (signal[:n] - signal[:n].mean()) * np.exp(-1j * order * MEAN * TIME[:n])
+            )
+        )
         / window.sum()
     )
 
@@ -56,7 +67,9 @@ def test_few_teeth_hold_low_orders_only():
         wheel = replace(PERFECT, n_teeth=n_teeth)
         speed = instantaneous_speed(wheel, disc_of(wheel), angle_of(order), RATE)
         # once by the mean over a spacing, once more by the straight lines between
-        assert_allclose(amplitude(speed, order), SHARE * MEAN * np.sinc(order / n_teeth) ** 3, rtol=0.02)
+        assert_allclose(
+            amplitude(speed, order), SHARE * MEAN * np.sinc(order / n_teeth) ** 3, rtol=0.02
+        )
 
 
 def test_a_slow_clock_makes_steps_of_one_tick():
@@ -75,7 +88,9 @@ def test_teeth_out_of_place_show_orders_that_the_shaft_has_not():
         speed = instantaneous_speed(wheel, disc_of(wheel, seed), MEAN * TIME, RATE)
         by_seed.append(amplitude(speed, 1.0))
         assert amplitude(speed, 7.0) < 0.02 * max(by_seed[-1], 1e-3 * MEAN)
-    assert max(by_seed) <= np.radians(0.2) * MEAN * 1.01  # a place that errs by e sin(a) errs by e cos(a) of the speed
+    assert (
+        max(by_seed) <= np.radians(0.2) * MEAN * 1.01
+    )  # a place that errs by e sin(a) errs by e cos(a) of the speed
     assert max(by_seed) > 0.5 * np.radians(0.2) * MEAN
 
 
@@ -108,10 +123,16 @@ def test_a_shaft_that_turns_back_or_too_few_teeth_are_refused():
     ("change", "message"),
     [
         ({"n_teeth": 3}, "toothed_wheel.n_teeth = 3 must lie in 4..1000"),
-        ({"eccentricity_error": 0.1}, "toothed_wheel.eccentricity_error_deg = 5.72958 must lie in 0..5"),
+        (
+            {"eccentricity_error": 0.1},
+            "toothed_wheel.eccentricity_error_deg = 5.72958 must lie in 0..5",
+        ),
         ({"tooth_error": 0.01}, "toothed_wheel.tooth_error_deg = 0.572958 must lie in 0..0.225"),
         ({"tooth_error": -0.01}, "toothed_wheel.tooth_error_deg = -0.572958 must lie in"),
-        ({"clock_frequency": 100.0}, "toothed_wheel.clock_frequency_hz = 100 must be at least 10000"),
+        (
+            {"clock_frequency": 100.0},
+            "toothed_wheel.clock_frequency_hz = 100 must be at least 10000",
+        ),
     ],
 )
 def test_wheels_that_cannot_be_are_refused(change, message):

@@ -63,7 +63,10 @@ def test_ranges_are_kept_and_used():
     drawn = [housing(seed) for seed in range(200)]
     counts = [len(path.natural_frequency) for path in drawn]
     assert (min(counts), max(counts)) == (8, 20)
-    for name, (low, high) in (("natural_frequency", (300.0, 12e3)), ("damping_ratio", (0.01, 0.05))):
+    for name, (low, high) in (
+        ("natural_frequency", (300.0, 12e3)),
+        ("damping_ratio", (0.01, 0.05)),
+    ):
         values = np.concatenate([getattr(path, name) for path in drawn])
         assert low <= values.min() < 1.02 * low
         assert 0.98 * high < values.max() <= high

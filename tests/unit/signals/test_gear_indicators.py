@@ -4,7 +4,12 @@ import numpy as np
 import pytest
 from numpy.testing import assert_allclose
 
-from gensig.signals.averaging import average_turn, difference_signal, regular_signal, residual_signal
+from gensig.signals.averaging import (
+    average_turn,
+    difference_signal,
+    regular_signal,
+    residual_signal,
+)
 from gensig.signals.averaging import time_synchronous_average as averaged
 from gensig.signals.envelope import mesh_envelope
 from gensig.signals.history import na4, nb4
@@ -27,7 +32,12 @@ every = pytest.mark.parametrize("name", OF_ONE_TURN)
 
 def gear(turn=TURN):
     """A mesh with sidebands, unbalance, and orders that do not belong to it; all below a sixteenth of the samples."""
-    mesh = 5 * np.cos(TEETH * turn + 1) + 2 * np.cos(2 * TEETH * turn) + np.cos((TEETH + 1) * turn) + np.cos(turn)
+    mesh = (
+        5 * np.cos(TEETH * turn + 1)
+        + 2 * np.cos(2 * TEETH * turn)
+        + np.cos((TEETH + 1) * turn)
+        + np.cos(turn)
+    )
     return mesh + sum(0.3 * np.cos(order * turn + order) for order in (7, 31, 40, 41, 55))
 
 
@@ -45,7 +55,9 @@ def test_gain_sign_and_start_tooth_change_nothing(name):
     assert np.isfinite(known)
     assert_allclose(indicator(-1e-3 * turn, TEETH), known, rtol=1e-9)
     for tooth in (1, 9, 22):
-        assert_allclose(indicator(np.roll(turn, tooth * PER_TURN // TEETH), TEETH), known, rtol=1e-9)
+        assert_allclose(
+            indicator(np.roll(turn, tooth * PER_TURN // TEETH), TEETH), known, rtol=1e-9
+        )
 
 
 @every
@@ -76,8 +88,14 @@ def test_average_of_few_turns_is_nan_unless_asked_for():
 def test_a_turn_is_its_regular_part_what_is_left_and_the_shaft():
     turn = gear() + 0.7
     shaft = 0.7 + np.cos(TURN)
-    assert_allclose(regular_signal(turn, TEETH) + difference_signal(turn, TEETH) + shaft, turn, atol=1e-9)
-    assert_allclose(regular_signal(turn, TEETH, n_sidebands=0) + residual_signal(turn, TEETH) + shaft, turn, atol=1e-9)
+    assert_allclose(
+        regular_signal(turn, TEETH) + difference_signal(turn, TEETH) + shaft, turn, atol=1e-9
+    )
+    assert_allclose(
+        regular_signal(turn, TEETH, n_sidebands=0) + residual_signal(turn, TEETH) + shaft,
+        turn,
+        atol=1e-9,
+    )
     alone = 5 * np.cos(TEETH * TURN + 1) + 2 * np.cos(2 * TEETH * TURN)
     assert_allclose(regular_signal(turn, TEETH, n_sidebands=0), alone, atol=1e-9)
 
@@ -100,7 +118,9 @@ def test_fm0_and_nb4_of_amplitude_modulation():
     depth = 0.4
     turn = (1 + depth * np.cos(TURN)) * np.cos(TEETH * TURN)
     assert_allclose(mesh_envelope(turn, TEETH), 1 + depth * np.cos(TURN), atol=1e-12)
-    assert_allclose(fm0(turn, TEETH), 2 * (1 + depth), rtol=5e-3)  # the lowest value lies half a tooth away
+    assert_allclose(
+        fm0(turn, TEETH), 2 * (1 + depth), rtol=5e-3
+    )  # the lowest value lies half a tooth away
     assert_allclose(OF_ONE_TURN["nb4"](turn, TEETH), 1.5, rtol=1e-9)
 
 
@@ -113,7 +133,9 @@ def test_fm0_counts_the_harmonics_it_is_told():
 
 def test_moments_of_one_order_outside_the_mesh():
     turn = 10 * np.cos(TEETH * TURN) + 0.1 * np.cos(30 * TURN)
-    assert_allclose([fm4(turn, TEETH), m6a(turn, TEETH), m8a(turn, TEETH)], [1.5, 2.5, 4.375], rtol=1e-6)
+    assert_allclose(
+        [fm4(turn, TEETH), m6a(turn, TEETH), m8a(turn, TEETH)], [1.5, 2.5, 4.375], rtol=1e-6
+    )
 
 
 def test_moments_of_gaussian_noise():
@@ -122,7 +144,11 @@ def test_moments_of_gaussian_noise():
     n_samples = turn.size
     for indicator, half, expected in ((fm4, 2, 3), (m6a, 3, 15), (m8a, 4, 105)):
         raw = np.prod(np.arange(1, 4 * half, 2)) - expected**2  # variance of the moment itself
-        assert_allclose(indicator(turn, TEETH).mean(), expected, atol=5 * np.sqrt(raw / n_samples) + 0.01 * expected)
+        assert_allclose(
+            indicator(turn, TEETH).mean(),
+            expected,
+            atol=5 * np.sqrt(raw / n_samples) + 0.01 * expected,
+        )
 
 
 def test_moments_of_one_impact():
@@ -137,7 +163,12 @@ def test_moments_of_one_impact():
 
 
 def test_energy_ratio_of_known_amplitudes():
-    turn = 5 * np.cos(TEETH * TURN) + 3 * np.cos((TEETH - 1) * TURN) + 2 * np.cos(30 * TURN) + 9 * np.cos(TURN)
+    turn = (
+        5 * np.cos(TEETH * TURN)
+        + 3 * np.cos((TEETH - 1) * TURN)
+        + 2 * np.cos(30 * TURN)
+        + 9 * np.cos(TURN)
+    )
     assert_allclose(energy_ratio(turn, TEETH), 2 / np.hypot(5, 3), rtol=1e-9)
     assert np.isnan(energy_ratio(np.cos(30 * TURN), TEETH))
 

@@ -18,7 +18,9 @@ def rings(decay, places=(100,), size=20.0, noise=1.0, seed=0):
         for place in places:
             late = time - place / RATE
             phase = rng.uniform(0, 2 * np.pi)
-            turn += size * np.where(late >= 0, np.exp(-late / decay) * np.cos(2 * np.pi * 1200 * late + phase), 0.0)
+            turn += size * np.where(
+                late >= 0, np.exp(-late / decay) * np.cos(2 * np.pi * 1200 * late + phase), 0.0
+            )
     return turns
 
 
@@ -56,6 +58,10 @@ def test_peak_over_rms_is_the_usual_peak_not_the_rarest():
 
 def test_leading_axes_are_kept():
     turns = np.stack([rings(1e-3), rings(2e-3, (50, 300))])
-    for indicator in (lambda x: impacts_per_turn(x, TEETH), peak_over_rms, lambda x: impact_decay(x, DURATION)):
+    for indicator in (
+        lambda x: impacts_per_turn(x, TEETH),
+        peak_over_rms,
+        lambda x: impact_decay(x, DURATION),
+    ):
         assert indicator(turns).shape == (2,)
         assert indicator(turns)[1] == pytest.approx(float(indicator(turns[1])))

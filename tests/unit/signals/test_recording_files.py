@@ -50,7 +50,9 @@ def files(tmp_path_factory):
     return folder
 
 
-@pytest.mark.parametrize("name", ["r.csv", "r.wav", "r.npz", "r.h5", "r.hdf5", "r.mat", "tall.mat", "r73.mat"])
+@pytest.mark.parametrize(
+    "name", ["r.csv", "r.wav", "r.npz", "r.h5", "r.hdf5", "r.mat", "tall.mat", "r73.mat"]
+)
 def test_all_formats_say_the_same(files, name):
     source = read_file(str(files / name))
     assert source.sampling_rate == RATE

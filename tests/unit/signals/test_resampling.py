@@ -30,8 +30,15 @@ def test_tones_above_half_the_new_rate_do_not_fold(found, wanted):
     for share in (0.5, 0.6, 0.9):
         frequency = share * wanted
         if frequency < 0.5 * found:
-            assert np.abs(change.apply(tone(frequency, found, found))[wanted // 10 : -wanted // 10]).max() < 1e-5
-    assert np.abs(tone(0.6 * wanted, found, found)[:: max(found // wanted, 1)]).max() > 0.9  # without a low-pass
+            assert (
+                np.abs(
+                    change.apply(tone(frequency, found, found))[wanted // 10 : -wanted // 10]
+                ).max()
+                < 1e-5
+            )
+    assert (
+        np.abs(tone(0.6 * wanted, found, found)[:: max(found // wanted, 1)]).max() > 0.9
+    )  # without a low-pass
 
 
 @pytest.mark.parametrize(("found", "wanted"), PAIRS)

@@ -10,7 +10,9 @@ from gensig.signals.spectrum import spectrum_of_turns
 
 RATE, TEETH = 10_000.0, 23
 TIME = np.arange(40_000) / RATE
-TURNS = 20.0 * TIME + 0.16 / (2 * np.pi * 0.4) * np.sin(2 * np.pi * 0.4 * TIME)  # 20 Hz, 0.8 % up and down
+TURNS = 20.0 * TIME + 0.16 / (2 * np.pi * 0.4) * np.sin(
+    2 * np.pi * 0.4 * TIME
+)  # 20 Hz, 0.8 % up and down
 
 
 def mesh(turns, *harmonics):
@@ -41,7 +43,9 @@ def test_a_turn_gets_the_samples_of_the_slowest_by_itself_and_orders_stay_sharp(
     assert amplitude[~np.isin(order, [TEETH, 2 * TEETH])].max() < 2e-3
 
 
-@pytest.mark.parametrize("angle", [np.zeros(100), -np.arange(100.0), np.arange(99.0), np.full(100, np.nan)])
+@pytest.mark.parametrize(
+    "angle", [np.zeros(100), -np.arange(100.0), np.arange(99.0), np.full(100, np.nan)]
+)
 def test_an_angle_that_does_not_rise_is_refused(angle):
     with pytest.raises(ValueError, match="must rise"):
         resample_by_angle(np.ones(100), angle, 10)
@@ -64,7 +68,9 @@ def test_a_foreign_tone_near_one_harmonic_is_not_taken_for_the_mesh():
     x = mesh(20.1 * TIME, 0.2, 0.1, 0.2, 0.1) + 2.0 * np.cos(2 * np.pi * TEETH * 19.8 * TIME)
     x += 0.5 * np.random.default_rng(4).standard_normal(TIME.size)
     assert find_mesh_frequency(x, RATE, TEETH, 20.0) == pytest.approx(TEETH * 20.1, rel=1e-4)
-    assert find_mesh_frequency(x, RATE, TEETH, 20.0, n_harmonics=1) == pytest.approx(TEETH * 19.8, rel=1e-4)
+    assert find_mesh_frequency(x, RATE, TEETH, 20.0, n_harmonics=1) == pytest.approx(
+        TEETH * 19.8, rel=1e-4
+    )
 
 
 def test_channels_are_searched_together():

@@ -27,13 +27,19 @@ def a_pair(n_passages, *, teeth=TEETH, noise=0.0, seed=0):
     size = mesh + sizes[0][passage % teeth[0]] + sizes[1][passage % teeth[1]]
     signal = np.einsum("pco,os->cps", size, shape(64)).reshape(2, -1)
     signal = signal + noise * rng.standard_normal(signal.shape)
-    parts = [np.einsum("pco,os->cps", part, shape(SAMPLES)).reshape(2, -1) for part in (*sizes, mesh[None])]
+    parts = [
+        np.einsum("pco,os->cps", part, shape(SAMPLES)).reshape(2, -1)
+        for part in (*sizes, mesh[None])
+    ]
     return signal, parts
 
 
 def separate(signal, **changes):
     return separate_gears(
-        signal, RATE, **{"mesh_frequency": MESH_HZ, "n_teeth": TEETH, **changes}, samples_per_tooth=32
+        signal,
+        RATE,
+        **{"mesh_frequency": MESH_HZ, "n_teeth": TEETH, **changes},
+        samples_per_tooth=32,
     )
 
 
@@ -50,7 +56,9 @@ def test_neither_gear_leaks_into_the_other_as_it_does_into_an_average():
     signal, (driving, _, _) = a_pair(44)
     own = separate(signal).driving
     averaged = time_synchronous_average(signal, RATE, MESH_HZ / TEETH[0], TEETH[0] * SAMPLES)
-    averaged = averaged - np.tile(averaged.reshape(2, TEETH[0], SAMPLES).mean(axis=1), (1, TEETH[0]))
+    averaged = averaged - np.tile(
+        averaged.reshape(2, TEETH[0], SAMPLES).mean(axis=1), (1, TEETH[0])
+    )
     scale = np.abs(driving).max()
     assert np.abs(own - driving).max() < 0.03 * scale
     assert np.abs(averaged - driving).max() > 0.1 * scale

@@ -55,7 +55,13 @@ class TestIndicators:
 
     def test_leading_axes_are_kept(self):
         x = np.random.default_rng(3).standard_normal((2, 3, 512))
-        for indicator in (rms, kurtosis, crest_factor, lambda s: fm4(s, 23), lambda s: sideband_ratio(s, 23)):
+        for indicator in (
+            rms,
+            kurtosis,
+            crest_factor,
+            lambda s: fm4(s, 23),
+            lambda s: sideband_ratio(s, 23),
+        ):
             assert indicator(x).shape == (2, 3)
             assert_allclose(indicator(x)[1, 2], indicator(x[1, 2]), rtol=1e-12)
 

@@ -52,7 +52,11 @@ def test_rings_are_found_in_their_band():
 
 def test_gain_does_not_matter_and_silence_is_nan():
     x = noise(3)
-    assert_allclose(spectral_kurtosis(1e-4 * x, RATE, WINDOW)[1], spectral_kurtosis(x, RATE, WINDOW)[1], atol=1e-9)
+    assert_allclose(
+        spectral_kurtosis(1e-4 * x, RATE, WINDOW)[1],
+        spectral_kurtosis(x, RATE, WINDOW)[1],
+        atol=1e-9,
+    )
     assert np.isnan(spectral_kurtosis(0 * x, RATE, WINDOW)[1]).all()
 
 

@@ -31,7 +31,9 @@ def recording(depth, *, noise=1.0, duration=3.0, seed=0):
 
 
 def followed(made, speed_rpm=SPEED):
-    return wandering_mesh_cycles(made, TEETH, speed_rpm, highest=10_000.0, options="the speed", longer="record longer")
+    return wandering_mesh_cycles(
+        made, TEETH, speed_rpm, highest=10_000.0, options="the speed", longer="record longer"
+    )
 
 
 @pytest.mark.parametrize("depth", [0.0, 0.003, 0.01, 0.02])
@@ -52,7 +54,9 @@ def test_a_steady_line_would_miss_it():
 
 @pytest.mark.parametrize("seed", range(8))
 def test_noise_is_not_followed(seed):
-    noise = np.random.default_rng(seed).standard_normal((1 + seed % 3, round((0.6 + seed % 4) * RATE)))
+    noise = np.random.default_rng(seed).standard_normal(
+        (1 + seed % 3, round((0.6 + seed % 4) * RATE))
+    )
     made = Recording(sensors=("a",), acceleration=noise, sampling_rate=RATE)
     with pytest.raises(ConfigError, match="sign of the mesh"):
         followed(made)
@@ -66,12 +70,18 @@ def test_a_speed_beyond_the_search_is_refused():
 def test_the_course_is_the_frequency_over_time():
     made, cycles = recording(0.02)
     mesh = SPEED / 60 * TEETH.driving
-    time, found = mesh_frequency_course(made.acceleration, RATE, TEETH.driving, mesh, search=0.03, highest=10_000.0)
+    time, found = mesh_frequency_course(
+        made.acceleration, RATE, TEETH.driving, mesh, search=0.03, highest=10_000.0
+    )
     true = np.interp(time, np.arange(cycles.size) / RATE, np.gradient(cycles) * RATE)
     assert np.abs(found / true - 1).max() < 6e-3
     assert np.std(found / true - 1) < 2e-3
     for wrong in ({"search": 0.05}, {"highest": 500.0}):
         with pytest.raises(ValueError, match="no course"):
             mesh_frequency_course(
-                made.acceleration, RATE, TEETH.driving, mesh, **{"search": 0.03, "highest": 10_000.0, **wrong}
+                made.acceleration,
+                RATE,
+                TEETH.driving,
+                mesh,
+                **{"search": 0.03, "highest": 10_000.0, **wrong},
             )

@@ -32,7 +32,9 @@ def test_no_pulse_no_time():
 def test_speed_between_pulses():
     _, _, instants = ramp()
     time, speed = speed_of_pulses(instants)
-    assert_allclose(speed, 18.0 + 12.0 * time, rtol=1e-9, atol=0)  # under steady acceleration the mean is that midway
+    assert_allclose(
+        speed, 18.0 + 12.0 * time, rtol=1e-9, atol=0
+    )  # under steady acceleration the mean is that midway
     _, twice = speed_of_pulses(instants, 2)
     assert_allclose(twice, speed / 2.0, rtol=1e-12, atol=0)
 
@@ -58,7 +60,9 @@ def test_several_pulses_a_turn_and_several_channels():
     signals = np.stack([np.cos(2.0 * np.pi * 3.0 * turns), np.sin(2.0 * np.pi * 3.0 * turns)])
     found = resample_by_pulses(signals, RATE, marks, pulses_per_turn=4, samples_per_turn=64)
     assert found.shape == (2, (len(marks) - 1) // 4, 64)
-    angle = 2.0 * np.pi * 3.0 * (0.25 + np.arange(64) / 64.0)  # the first pulse is a quarter turn after the start
+    angle = (
+        2.0 * np.pi * 3.0 * (0.25 + np.arange(64) / 64.0)
+    )  # the first pulse is a quarter turn after the start
     expected = np.broadcast_to([[np.cos(angle)], [np.sin(angle)]], found.shape)
     assert_allclose(found, expected, rtol=0, atol=2e-3)
 

@@ -33,12 +33,16 @@ def test_a_tooth_twice_as_loud_is_six_decibels_up_under_its_own_number(start):
 
 def test_channels_side_by_side_are_each_their_own():
     both = np.stack([rattle(seed=1), rattle(seed=2)])
-    np.testing.assert_allclose(levels(both), np.stack([levels(both[0]), levels(both[1])]), rtol=1e-12)
+    np.testing.assert_allclose(
+        levels(both), np.stack([levels(both[0]), levels(both[1])]), rtol=1e-12
+    )
 
 
 def test_changes_do_not_see_gain_and_are_none_where_nothing_changed():
     quiet, other = levels(rattle(seed=3)), levels(rattle(seed=4))
-    np.testing.assert_allclose(changed_teeth(quiet + 12.0, other), changed_teeth(quiet, other), atol=1e-9)
+    np.testing.assert_allclose(
+        changed_teeth(quiet + 12.0, other), changed_teeth(quiet, other), atol=1e-9
+    )
     np.testing.assert_array_equal(changed_teeth(quiet, quiet), np.zeros(TEETH))
 
 

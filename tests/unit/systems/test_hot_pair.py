@@ -23,7 +23,11 @@ MESH = [
     "system=helical_pair", "gear=chongqing_40_162", "mesh.law=paper", "mesh.pair_coupling=sum", "mesh.contact=linear",
     "mesh.slice_coupling=independent", "mesh.allow_extrapolation=true", "mesh.n_slices=20",
 ]  # fmt: skip
-EVEN = ["heat.pinion_temperature_degc=70", "heat.wheel_temperature_degc=70", "heat.housing_temperature_degc=70"]
+EVEN = [
+    "heat.pinion_temperature_degc=70",
+    "heat.wheel_temperature_degc=70",
+    "heat.housing_temperature_degc=70",
+]
 
 
 def duty_of(*words, heat="chongqing_rated"):
@@ -39,7 +43,9 @@ def test_no_heat_is_the_same_pair_to_the_bit():
     assert as_configured(duty) is duty.system
     cold = read_sliced_pair(compose("generate", MESH))
     assert cold == duty.system
-    np.testing.assert_array_equal(cold.transmission_error().error, duty.system.transmission_error().error)
+    np.testing.assert_array_equal(
+        cold.transmission_error().error, duty.system.transmission_error().error
+    )
 
 
 def test_gears_and_housing_equally_hot_are_as_stiff_per_width():
@@ -50,7 +56,9 @@ def test_gears_and_housing_equally_hot_are_as_stiff_per_width():
     for name in ("true", "contact_ratio"):
         ratio = variants[name].mesh / variants["cold"].mesh
         np.testing.assert_allclose(ratio, 1.0 + strain, rtol=1e-7)
-        np.testing.assert_allclose(variants[name].single, variants["cold"].single * (1.0 + strain), rtol=1e-7)
+        np.testing.assert_allclose(
+            variants[name].single, variants["cold"].single * (1.0 + strain), rtol=1e-7
+        )
 
 
 def test_gears_at_the_reference_temperature_are_the_cold_pair():
@@ -80,7 +88,10 @@ def test_gears_hotter_than_the_housing_reach_farther_into_each_other(pinion, whe
     )  # fmt: skip
     state, cold = hot_state(duty), duty.system.pair
     pair = heated(duty, state, **effects(growth=True, center_distance=True)).pair
-    strain = {"pinion": (pinion - 20) * duty.heat.expansion, "wheel": (wheel - 20) * duty.heat.expansion}
+    strain = {
+        "pinion": (pinion - 20) * duty.heat.expansion,
+        "wheel": (wheel - 20) * duty.heat.expansion,
+    }
     base = {name: getattr(cold, name).base_radius * (1 + strain[name]) for name in strain}
     tip = {name: getattr(cold, name).tip_radius * (1 + strain[name]) for name in strain}
     distance = cold.center_distance * (1 + 10 * duty.heat.expansion)
@@ -113,9 +124,13 @@ def test_apparent_stiffness_is_force_over_what_growth_leaves_of_the_approach():
     variants, thermal = stiffness_variants(duty, state), state.growth.teeth_alone(duty.system.pair)
     cold, apparent = variants["cold"], variants["apparent"]
     assert thermal == pytest.approx(10 * 0.345e-6, rel=0.02)
-    np.testing.assert_allclose(apparent.mesh, duty.system.mesh_force / (cold.approach - thermal), rtol=1e-12)
+    np.testing.assert_allclose(
+        apparent.mesh, duty.system.mesh_force / (cold.approach - thermal), rtol=1e-12
+    )
     raised = apparent.single.max() / cold.single.max()
-    assert raised == pytest.approx(cold.approach.mean() / (cold.approach.mean() - thermal), rel=1e-12)
+    assert raised == pytest.approx(
+        cold.approach.mean() / (cold.approach.mean() - thermal), rel=1e-12
+    )
     hotter = duty_of("heat.pinion_temperature_degc=120", "heat.wheel_temperature_degc=120", "gear.backlash_um=3000",
                      "heat.center_distance=false")  # fmt: skip
     assert "apparent" not in stiffness_variants(hotter, hot_state(hotter))
@@ -125,11 +140,16 @@ def test_more_friction_makes_hotter_gears_and_no_other_load():
     duty = duty_of("heat.softening=false")
     cool, hot = sweep(duty, "friction", [0.03, 0.07])
     np.testing.assert_array_equal(cool["cold"].mesh, hot["cold"].mesh)
-    assert hot["contact_ratio"].transverse_contact_ratio > cool["contact_ratio"].transverse_contact_ratio
+    assert (
+        hot["contact_ratio"].transverse_contact_ratio
+        > cool["contact_ratio"].transverse_contact_ratio
+    )
     states = [hot_state(replace(duty, speed=speed)) for speed in (60.0, 120.0)]
     assert states[1].friction_heat == pytest.approx(2.0 * states[0].friction_heat, rel=1e-12)
     slow, fast = sweep(duty, "torque", [12e3, 24e3])
-    assert slow["cold"].approach.mean() == pytest.approx(0.5 * fast["cold"].approach.mean(), rel=1e-9)
+    assert slow["cold"].approach.mean() == pytest.approx(
+        0.5 * fast["cold"].approach.mean(), rel=1e-9
+    )
     with pytest.raises(ConfigError, match="a sweep over 'oil'; allowed: friction, torque, speed"):
         sweep(duty, "oil", [1.0])
 
@@ -162,12 +182,22 @@ def test_flash_lifts_the_flank_by_less_than_a_tenth_of_a_micrometre():
 
 
 def test_a_modification_of_hot_flanks_adds_to_their_growth():
-    words = ["heat.center_distance=false", "heat.pinion_temperature_degc=90", "heat.wheel_temperature_degc=50"]
+    words = [
+        "heat.center_distance=false",
+        "heat.pinion_temperature_degc=90",
+        "heat.wheel_temperature_degc=50",
+    ]
     hot = read_sliced_pair(compose("generate", [*MESH, "heat=chongqing_rated", *words]))
     relieved = replace(
-        hot, modification=replace(hot.modification, pinion=FlankModification(tip_relief=20e-6, tip_relief_height=6e-3))
+        hot,
+        modification=replace(
+            hot.modification, pinion=FlankModification(tip_relief=20e-6, tip_relief_height=6e-3)
+        ),
     )
-    meshes = [one.sliced_mesh() for one in (replace(hot, growth=None), hot, replace(relieved, growth=None), relieved)]
+    meshes = [
+        one.sliced_mesh()
+        for one in (replace(hot, growth=None), hot, replace(relieved, growth=None), relieved)
+    ]
     plain, grown, ground, both = (np.where(np.isfinite(mesh.gap), mesh.gap, 0.0) for mesh in meshes)
     assert np.ptp(grown - plain) > 1e-6
     assert np.ptp(ground - plain) > 1e-6
@@ -189,7 +219,11 @@ def test_a_modification_of_hot_flanks_adds_to_their_growth():
             "pinion: nothing cools it",
         ),
         (
-            ["heat.pinion_temperature_degc=150", "heat.wheel_temperature_degc=150", "gear.backlash_um=9000"],
+            [
+                "heat.pinion_temperature_degc=150",
+                "heat.wheel_temperature_degc=150",
+                "gear.backlash_um=9000",
+            ],
             GeometryError,
             "gears grown against the housing by heat: pinion: contact would reach",
         ),

@@ -57,7 +57,12 @@ def overridden(kind):
         for base in kind.__mro__[number + 1 :]:
             for name in vars(lower).keys() & vars(base).keys():
                 concrete = not is_abstract(vars(base)[name])
-                if issubclass(base, Machine) and concrete and not name.startswith("__") and name != "_abc_impl":
+                if (
+                    issubclass(base, Machine)
+                    and concrete
+                    and not name.startswith("__")
+                    and name != "_abc_impl"
+                ):
                     found.append(f"{lower.__name__}.{name} of {base.__name__}")
     return found
 
@@ -217,9 +222,14 @@ def test_set_points_have_finite_loads(any_machine):
 
 def test_loads_of_teeth_are_recorded_where_they_are_known(any_machine):
     if any_machine.most_pairs:
-        assert mesh_signals(None, 5, any_machine.most_pairs)["mesh_load_share"].shape == (any_machine.most_pairs, 5)
+        assert mesh_signals(None, 5, any_machine.most_pairs)["mesh_load_share"].shape == (
+            any_machine.most_pairs,
+            5,
+        )
     else:
-        with pytest.raises(ConfigError, match=r"dataset\.store_mesh_state: a drive line does not tell"):
+        with pytest.raises(
+            ConfigError, match=r"dataset\.store_mesh_state: a drive line does not tell"
+        ):
             mesh_signals(None, 5, any_machine.most_pairs)
 
 

@@ -25,7 +25,8 @@ def schemes():
     """The paper's three modifications."""
     names = ("beihang_least_ripple", "beihang_even_load", "beihang_both")
     return {
-        name: read_sliced_pair(read_request(["system=helical_pair", f"modification={name}"]).config) for name in names
+        name: read_sliced_pair(read_request(["system=helical_pair", f"modification={name}"]).config)
+        for name in names
     }
 
 
@@ -39,15 +40,24 @@ def test_harmonics_and_shares_are_of_the_curve(helical):
 
 
 def test_a_relief_deeper_than_the_deflection_loses_contact(helical):
-    deep = replace(helical.modification, pinion=FlankModification(tip_relief=100e-6, tip_relief_height=1e-3))
+    deep = replace(
+        helical.modification, pinion=FlankModification(tip_relief=100e-6, tip_relief_height=1e-3)
+    )
     assert replace(helical, modification=deep).transmission_error().bearing < 0.85
 
 
 def test_the_paper_s_modifications_lower_the_ripple(schemes):
     """Independent model of the reference, aligned: 182.5, 171.2, 172.1 N/mm; ripple down by 48, 11 and 16 %."""
-    keys = ["mesh.law=paper", "mesh.pair_coupling=sum", "mesh.contact=linear", "mesh.slice_coupling=independent"]
+    keys = [
+        "mesh.law=paper",
+        "mesh.pair_coupling=sum",
+        "mesh.contact=linear",
+        "mesh.slice_coupling=independent",
+    ]
     system = read_sliced_pair(
-        read_request(["system=helical_pair", *keys, "mesh.allow_extrapolation=true", "mesh.n_slices=84"]).config
+        read_request(
+            ["system=helical_pair", *keys, "mesh.allow_extrapolation=true", "mesh.n_slices=84"]
+        ).config
     )
     plain = judge(system, system.modification, ALIGNED)
     expected = {
@@ -103,7 +113,11 @@ def test_points_of_the_box_are_modifications(helical):
     [
         (["gear.helix_angle_deg=10"], "system=spur_pair takes spur gears"),
         (
-            ["modification.wheel.tip_relief_um=3", "operating.torque_nm=0", "gear.helix_angle_deg=10"],
+            [
+                "modification.wheel.tip_relief_um=3",
+                "operating.torque_nm=0",
+                "gear.helix_angle_deg=10",
+            ],
             r"^modification.wheel.tip_relief_height_mm = 0: a relief of 3 um needs a length",
         ),
         (

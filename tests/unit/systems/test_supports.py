@@ -36,13 +36,17 @@ def supports(dynamics):
     """Stiffness and damping of pinion x, y and wheel x, y, (support,) each."""
     held = [getattr(dynamics, side).support for side in SIDES]
     stiffness = [value for one in held for value in (one.stiffness_x, one.stiffness_y)]
-    return np.array(stiffness), np.array([value for one in held for value in (one.damping_x, one.damping_y)])
+    return np.array(stiffness), np.array(
+        [value for one in held for value in (one.damping_x, one.damping_y)]
+    )
 
 
 def ratios(dynamics):
     """Damping ratios of the gears on their supports, (support,)."""
     stiffness, damping = supports(dynamics)
-    return damping / (2 * np.sqrt(stiffness * np.repeat([dynamics.pinion.mass, dynamics.wheel.mass], 2)))
+    return damping / (
+        2 * np.sqrt(stiffness * np.repeat([dynamics.pinion.mass, dynamics.wheel.mass], 2))
+    )
 
 
 @pytest.fixture(scope="module")
@@ -67,26 +71,39 @@ class TestStiffness:
         system = machine({**BEARINGS, "operating.torque_nm": torque})
         for side in SIDES:
             held = read_holding(getattr(system.pair, side), config_with()["gear"][side])
-            expected = support_stiffness(held.bearing, held.shaft, system.material, system.mesh_force)
+            expected = support_stiffness(
+                held.bearing, held.shaft, system.material, system.mesh_force
+            )
             support = getattr(system, side).support
-            assert_allclose((support.stiffness_x, support.stiffness_y), expected, rtol=1e-12, atol=0)
+            assert_allclose(
+                (support.stiffness_x, support.stiffness_y), expected, rtol=1e-12, atol=0
+            )
 
     def test_a_shaft_without_a_diameter_fills_the_bore(self, machine):
         thin, given = (
-            machine({**BEARINGS, "gear.pinion.shaft": {"diameter_mm": value, "span_mm": 80}}) for value in (None, 18.0)
+            machine({**BEARINGS, "gear.pinion.shaft": {"diameter_mm": value, "span_mm": 80}})
+            for value in (None, 18.0)
         )
-        assert_allclose(thin.pinion.support.stiffness_y, given.pinion.support.stiffness_y, rtol=1e-12, atol=0)
+        assert_allclose(
+            thin.pinion.support.stiffness_y, given.pinion.support.stiffness_y, rtol=1e-12, atol=0
+        )
 
     def test_more_torque_is_stiffer(self, machine):
         low, high = (machine({**BEARINGS, "operating.torque_nm": torque}) for torque in (2.0, 40.0))
         for side in SIDES:
             for key in ("stiffness_x", "stiffness_y"):
-                assert getattr(getattr(high, side).support, key) > 1.3 * getattr(getattr(low, side).support, key)
+                assert getattr(getattr(high, side).support, key) > 1.3 * getattr(
+                    getattr(low, side).support, key
+                )
 
     def test_the_table_of_the_docs(self, machine):
         """docs/theory/supports.md prints stiffness in N/um and frequencies in Hz."""
         lines = DOCS.read_text().splitlines()
-        rows = [line.strip("| ").split(" | ") for line in lines if " | pinion | " in line or " | wheel | " in line]
+        rows = [
+            line.strip("| ").split(" | ")
+            for line in lines
+            if " | pinion | " in line or " | wheel | " in line
+        ]
         assert len(rows) == 8
         for torque, side, *printed in rows:
             system = machine({**BEARINGS, "operating.torque_nm": float(torque)})
@@ -106,7 +123,9 @@ class TestDamping:
         box = draw_gearbox(stream(0, Stream.GEARBOX), 4, system.quality, 0.0)
         box = with_damping_ratio(box, stream(0, Stream.SUPPORT), system.quality)
         dynamics = pair_dynamics(Run(system=system, faults=(), gearbox=box))
-        nominal, _ = supports(pair_dynamics(Run(system=system, faults=(), gearbox=nominal_gearbox(4))))
+        nominal, _ = supports(
+            pair_dynamics(Run(system=system, faults=(), gearbox=nominal_gearbox(4)))
+        )
         assert_allclose(supports(dynamics)[0], nominal * box.stiffness_factor, rtol=1e-12, atol=0)
         assert_allclose(ratios(dynamics), box.damping_ratio, rtol=1e-12, atol=0)
         assert len(set(box.damping_ratio)) == 4
@@ -115,13 +134,20 @@ class TestDamping:
         quality = machine(BEARINGS).quality
         drawn = np.array(
             [
-                with_damping_ratio(nominal_gearbox(1), stream(0, Stream.SUPPORT, box), quality).damping_ratio
+                with_damping_ratio(
+                    nominal_gearbox(1), stream(0, Stream.SUPPORT, box), quality
+                ).damping_ratio
                 for box in range(1000)
             ]
         )
         assert drawn.min() >= 0.01
         assert drawn.max() <= 0.1
-        assert_allclose(np.quantile(drawn, [0.25, 0.5, 0.75]), 10 ** np.array([-1.75, -1.5, -1.25]), rtol=0.05, atol=0)
+        assert_allclose(
+            np.quantile(drawn, [0.25, 0.5, 0.75]),
+            10 ** np.array([-1.75, -1.5, -1.25]),
+            rtol=0.05,
+            atol=0,
+        )
 
     def test_given_supports_take_a_ratio_too(self, machine):
         ratio = {key: value for key, value in BEARINGS.items() if key != "system.supports"}
@@ -145,7 +171,9 @@ def test_as_given_supports_are_those_of_the_option(machine, config_with):
             (stiffness, "stiffness_{}_n_per_m", box.stiffness_factor),
             (damping, "damping_{}_ns_per_m", box.damping_factor),
         ):
-            expected = np.array([given[side]["support"][kind.format(axis)] for side in SIDES for axis in "xy"])
+            expected = np.array(
+                [given[side]["support"][kind.format(axis)] for side in SIDES for axis in "xy"]
+            )
             assert np.array_equal(found, expected * factor)
 
 
@@ -154,7 +182,9 @@ class TestRecords:
         """Every class and condition; two gearboxes differ."""
         drawn, classes = {}, {}
         for row in rows:
-            drawn.setdefault(row["gearbox_id"], []).append(run_of(realistic, row).gearbox.damping_ratio)
+            drawn.setdefault(row["gearbox_id"], []).append(
+                run_of(realistic, row).gearbox.damping_ratio
+            )
             classes.setdefault(row["gearbox_id"], set()).add(row["label_name"])
         assert len(drawn) == 2
         assert all(found == set(realistic["plan"]["classes"]) for found in classes.values())
@@ -185,25 +215,53 @@ class TestRecords:
         """Whatever supports a gearbox has, the start is as long as it was with overdamped ones."""
         for row in rows:
             run = run_of(realistic, row)
-            drive = 2 * math.pi * run.system.operating.drive_frequency * run.system.operating.drive_damping_ratio
-            assert_allclose(settling_time(pair_dynamics(run)), math.log(1e4) / drive, rtol=1e-3, atol=0)
+            drive = (
+                2
+                * math.pi
+                * run.system.operating.drive_frequency
+                * run.system.operating.drive_damping_ratio
+            )
+            assert_allclose(
+                settling_time(pair_dynamics(run)), math.log(1e4) / drive, rtol=1e-3, atol=0
+            )
 
 
 class TestBadInput:
     @pytest.mark.parametrize(
         ("changes", "text"),
         [
-            ({"system.supports": "springs"}, "system.supports = 'springs'; allowed: as_given, bearings"),
-            ({"system.supports": "bearings"}, "system.supports = bearings says nothing of damping; give quality."),
+            (
+                {"system.supports": "springs"},
+                "system.supports = 'springs'; allowed: as_given, bearings",
+            ),
+            (
+                {"system.supports": "bearings"},
+                "system.supports = bearings says nothing of damping; give quality.",
+            ),
             (
                 {**BEARINGS, "quality.support_damping_ratio_low": 0.2},
                 "quality.support_damping_ratio_low = 0.2 and support_damping_ratio_high = 0.1 must be ordered, above 0",
             ),
-            ({"quality.support_damping_ratio_low": 0.1}, "must be ordered, above 0 and at most 1, or both null"),
-            ({**BEARINGS, "gear.wheel.bearing": None}, "gear.wheel.bearing = null: system.supports = bearings needs"),
-            ({**BEARINGS, "gear.pinion.shaft": None}, "gear.pinion.shaft = null: system.supports = bearings needs"),
-            ({"gear.pinion.bearing.n_balls": 8.5}, "gear.pinion.bearing.n_balls = 8.5 is not a whole number"),
-            ({"gear.pinion.bearing.n_balls": 2}, "gear.pinion.bearing.n_balls = 2 must lie in 5..60"),
+            (
+                {"quality.support_damping_ratio_low": 0.1},
+                "must be ordered, above 0 and at most 1, or both null",
+            ),
+            (
+                {**BEARINGS, "gear.wheel.bearing": None},
+                "gear.wheel.bearing = null: system.supports = bearings needs",
+            ),
+            (
+                {**BEARINGS, "gear.pinion.shaft": None},
+                "gear.pinion.shaft = null: system.supports = bearings needs",
+            ),
+            (
+                {"gear.pinion.bearing.n_balls": 8.5},
+                "gear.pinion.bearing.n_balls = 8.5 is not a whole number",
+            ),
+            (
+                {"gear.pinion.bearing.n_balls": 2},
+                "gear.pinion.bearing.n_balls = 2 must lie in 5..60",
+            ),
             ({"gear.wheel.bearing": 6205}, "gear.wheel.bearing = 6205 must be a group of keys"),
             ({"gear.wheel.shaft": {"span_mm": 80}}, "gear.wheel.shaft: missing diameter_mm"),
             ({"gear.wheel.shaft.span_mm": -1}, "gear.wheel.shaft.span_mm = -1 must be positive"),

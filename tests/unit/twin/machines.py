@@ -31,7 +31,9 @@ def drifting(scatter, correlation_time, duration, seed):
     walk, keep = [rng.standard_normal()], np.exp(-0.25)
     while len(walk) * step < duration:
         walk.append(keep * walk[-1] + np.sqrt(1.0 - keep**2) * rng.standard_normal())
-    return [[round(place * step, 6), 1.0 + scatter * float(value)] for place, value in enumerate(walk)]
+    return [
+        [round(place * step, 6), 1.0 + scatter * float(value)] for place, value in enumerate(walk)
+    ]
 
 
 def measured(*, duration=2.4, seed=5, profile=None, snr=SNR, grade=GRADE, path=True):
@@ -58,8 +60,14 @@ def measured(*, duration=2.4, seed=5, profile=None, snr=SNR, grade=GRADE, path=T
     angle = record.signals["shaft_angle"]
     speed = (angle[-1] - angle[0]) * RATE / (len(angle) - 1) * 60.0 / (2.0 * np.pi)
     snr_db = float(
-        10.0 * np.log10(record.signals["signal_power"] / np.maximum(record.signals["noise_power"], 1e-300)).mean()
+        10.0
+        * np.log10(
+            record.signals["signal_power"] / np.maximum(record.signals["noise_power"], 1e-300)
+        ).mean()
     )
     return Known(
-        signal=record.signals["acceleration"].astype(float), speed_rpm=float(speed), shaft_angle=angle, snr_db=snr_db
+        signal=record.signals["acceleration"].astype(float),
+        speed_rpm=float(speed),
+        shaft_angle=angle,
+        snr_db=snr_db,
     )

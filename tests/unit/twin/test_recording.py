@@ -30,9 +30,16 @@ class TestRead:
     def test_all_formats_say_the_same(self, tmp_path):
         np.save(tmp_path / "r.npy", SIGNAL)
         np.savez(tmp_path / "r.npz", acceleration=SIGNAL)
-        files = [str(tmp_path / "r.npy"), str(tmp_path / "r.npz"), csv(tmp_path / "r.csv", SIGNAL, "ab")]
+        files = [
+            str(tmp_path / "r.npy"),
+            str(tmp_path / "r.npz"),
+            csv(tmp_path / "r.csv", SIGNAL, "ab"),
+        ]
         centred = SIGNAL - SIGNAL.mean(axis=1, keepdims=True)
-        for found in [*(read_recording(file, rate=RATE) for file in files), read_recording(timed(tmp_path / "t.csv"))]:
+        for found in [
+            *(read_recording(file, rate=RATE) for file in files),
+            read_recording(timed(tmp_path / "t.csv")),
+        ]:
             assert found.sampling_rate == pytest.approx(RATE, rel=1e-9)
             assert_allclose(found.acceleration, centred, rtol=0, atol=1e-7)
 
@@ -55,7 +62,9 @@ class TestRead:
         file = timed(tmp_path / "u.csv", names=("case_g", "lid_m_per_s2"))
         found = read_recording(file)
         assert found.sensors == ("case", "lid")
-        assert_allclose(found.acceleration.std(axis=1), SIGNAL.std(axis=1) * [STANDARD_GRAVITY, 1.0], rtol=1e-6)
+        assert_allclose(
+            found.acceleration.std(axis=1), SIGNAL.std(axis=1) * [STANDARD_GRAVITY, 1.0], rtol=1e-6
+        )
         plain = timed(tmp_path / "p.csv")
         size = read_recording(plain, unit="g").acceleration.std(axis=1)
         assert_allclose(size, STANDARD_GRAVITY * SIGNAL.std(axis=1), rtol=1e-6)
@@ -114,7 +123,11 @@ def refused(tmp_path):
         ("no channel c; it has a, b", timed(tmp_path / "c.csv"), {"channels": ["c"]}),
         ("each once", timed(tmp_path / "d.csv"), {"channels": ["a", "a"]}),
         ("time_s must rise in even steps", jumping, {}),
-        ("time_s has 5120 samples a second, --rate says 6000", timed(tmp_path / "e.csv"), {"rate": 6000.0}),
+        (
+            "time_s has 5120 samples a second, --rate says 6000",
+            timed(tmp_path / "e.csv"),
+            {"rate": 6000.0},
+        ),
         ("--rate 3 must lie in 1000..1000000", timed(tmp_path / "f.csv"), {"rate": 3.0}),
         ("--unit mm: allowed: m/s2, g", timed(tmp_path / "g.csv"), {"unit": "mm"}),
         ("a_mm_per_s ends in _mm_per_s", timed(tmp_path / "h.csv", names=("a_mm_per_s", "b")), {}),
@@ -174,7 +187,17 @@ def test_the_command_refuses_in_one_line(tmp_path, monkeypatch, capsys, words, t
     }
     (tmp_path / "used").mkdir()
     (tmp_path / "used" / "file").write_text("x")
-    common = ["twin", timed(tmp_path / "r.csv"), "--teeth", "23", "46", "--speed", "1200", "--out", "mine"]
+    common = [
+        "twin",
+        timed(tmp_path / "r.csv"),
+        "--teeth",
+        "23",
+        "46",
+        "--speed",
+        "1200",
+        "--out",
+        "mine",
+    ]
     assert main([*common, *(files.get(word, word) for word in words)]) == 2
     error = [line for line in capsys.readouterr().err.splitlines() if line.startswith("gensig: ")]
     assert text in error[-1]

@@ -52,7 +52,9 @@ def test_grade(config):
 
 def test_signal_to_noise_ratio(known, config):
     offsets = np.array(config["sensing"]["noise"]["offsets_db"])
-    np.testing.assert_allclose(config["sensing"]["snr_db"] - offsets, known.snr_db, rtol=0.0, atol=2.0)
+    np.testing.assert_allclose(
+        config["sensing"]["snr_db"] - offsets, known.snr_db, rtol=0.0, atol=2.0
+    )
 
 
 def test_no_drift_is_made_up(config):
@@ -61,7 +63,11 @@ def test_no_drift_is_made_up(config):
 
 def test_held_out_levels(twin):
     report = (twin / "report.md").read_text()
-    rows = [[cell.strip() for cell in line.split("|")[1:-1]] for line in report.splitlines() if line.startswith("| ch")]
+    rows = [
+        [cell.strip() for cell in line.split("|")[1:-1]]
+        for line in report.splitlines()
+        if line.startswith("| ch")
+    ]
     assert [row[0] for row in rows] == ["channel_0", "channel_1"]
     for row in rows:
         assert float(row[2].removesuffix(" dB")) < 3.0  # median difference of third-octave levels
@@ -76,20 +82,43 @@ def test_assumed_values_are_called_so(twin):
     assert "normal_module_mm: 2.0   # assumed" in text
     gear = yaml.safe_load(text)
     assert [gear[side]["n_teeth"] for side in ("pinion", "wheel")] == list(TEETH)
-    lines = [line for line in text.splitlines() if ": " in line and not line.startswith(("#", "name"))]
+    lines = [
+        line for line in text.splitlines() if ": " in line and not line.startswith(("#", "name"))
+    ]
     assert all("   # " in line for line in lines)
 
 
 def test_nothing_measured_is_copied(known, twin):
     """Path and noise are smooth tables: a few numbers, not samples."""
-    n_numbers = sum(np.loadtxt(twin / name, delimiter=",", skiprows=1).size for name in ("path.csv", "noise.csv"))
+    n_numbers = sum(
+        np.loadtxt(twin / name, delimiter=",", skiprows=1).size
+        for name in ("path.csv", "noise.csv")
+    )
     assert n_numbers < 0.1 * known.signal.size
 
 
 def test_faults_are_generated_for_it(twin, tmp_path):
     out = tmp_path / "set"
-    words = ["plan.n_records=4", "plan.n_units=1", "operating.duration_s=0.2", "executor.n_workers=1"]
-    assert main(["generate", "--quiet", "--config-dir", str(twin), "experiment=mine", *words, f"out={out}"]) == 0
+    words = [
+        "plan.n_records=4",
+        "plan.n_units=1",
+        "operating.duration_s=0.2",
+        "executor.n_workers=1",
+    ]
+    assert (
+        main(
+            [
+                "generate",
+                "--quiet",
+                "--config-dir",
+                str(twin),
+                "experiment=mine",
+                *words,
+                f"out={out}",
+            ]
+        )
+        == 0
+    )
     data = open_dataset(out)
     names = [str(name) for name in data.column("label_name")]
     assert sorted(names) == ["crack", "healthy", "missing_tooth", "pitting"]

@@ -7,13 +7,31 @@ import pytest
 
 from gensig.errors import ConfigError
 from gensig.validation import realism
-from gensig.validation.realism import Comparison, Range, compare, judge, read_ranges, read_results, write_results
+from gensig.validation.realism import (
+    Comparison,
+    Range,
+    compare,
+    judge,
+    read_ranges,
+    read_results,
+    write_results,
+)
 
 NAN = math.nan
 
 
 def measured(**changes) -> Range:
-    return Range(**{"id": "a.b", "at": "here", "unit": "ms", "low": 1.0, "high": 2.0, "source": "rig", **changes})
+    return Range(
+        **{
+            "id": "a.b",
+            "at": "here",
+            "unit": "ms",
+            "low": 1.0,
+            "high": 2.0,
+            "source": "rig",
+            **changes,
+        }
+    )
 
 
 @pytest.mark.parametrize(
@@ -87,10 +105,17 @@ def test_a_file_without_its_heading_is_refused(tmp_path):
 def test_section(tmp_path):
     path = tmp_path / "results.csv"
     assert realism.realism_lines(path) == []
-    write_results(path, "told so", [compare(measured(), [1.5, 1.6]), compare(measured(id="recording.x"), [9.0])])
+    write_results(
+        path,
+        "told so",
+        [compare(measured(), [1.5, 1.6]), compare(measured(id="recording.x"), [9.0])],
+    )
     lines = realism.realism_lines(path)
     assert "Compared: told so" in lines
-    assert any(line.startswith("| a.b, ms | here | 1 to 2 | 1.55 | ") and " inside | rig |" in line for line in lines)
+    assert any(
+        line.startswith("| a.b, ms | here | 1 to 2 | 1.55 | ") and " inside | rig |" in line
+        for line in lines
+    )
     assert lines.index("### Yardstick") < lines.index("### A healthy recording")
     assert {line.count("|") for line in lines if line.startswith("| ")} == {10}
     write_results(path, "told so", [compare(measured(), [1.5])])

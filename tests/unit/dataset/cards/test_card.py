@@ -29,7 +29,9 @@ def test_front_matter(folder: Path) -> None:
     assert front["configs"][0]["data_files"] == [{"split": "train", "path": "shards/*.h5"}]
 
 
-@pytest.mark.parametrize(("n_records", "expected"), [(999, "n<1K"), (1000, "1K<n<10K"), (10**7, "n>10M")])
+@pytest.mark.parametrize(
+    ("n_records", "expected"), [(999, "n<1K"), (1000, "1K<n<10K"), (10**7, "n>10M")]
+)
 def test_size_category(folder: Path, n_records: int, expected: str) -> None:
     with open_dataset(folder) as data:
         data.n_records = n_records
@@ -43,7 +45,10 @@ def test_hostile_names_stay_text(tmp_path: Path, plan: Plan) -> None:
     assert _front(text)["license"] == "cc-by-4.0"
     assert _front(text)["pretty_name"] == "a: [b] license: mine <b>"
     assert "<b>" not in text.split("---\n", 2)[2]
-    assert json.loads((folder / "croissant.json").read_text(encoding="utf-8"))["name"] == "a: [b] license: mine <b>"
+    assert (
+        json.loads((folder / "croissant.json").read_text(encoding="utf-8"))["name"]
+        == "a: [b] license: mine <b>"
+    )
 
 
 def test_croissant_is_valid_and_gives_the_records(folder: Path, plan: Plan) -> None:
@@ -51,7 +56,9 @@ def test_croissant_is_valid_and_gives_the_records(folder: Path, plan: Plan) -> N
     assert not dataset.metadata.ctx.issues.errors
     assert not dataset.metadata.ctx.issues.warnings
     rows = list(dataset.records("records"))
-    assert [row["records/record_id"] for row in rows] == [name.encode() for name in plan.columns["record_id"].tolist()]
+    assert [row["records/record_id"] for row in rows] == [
+        name.encode() for name in plan.columns["record_id"].tolist()
+    ]
     assert [row["records/label"] for row in rows] == plan.columns["label"].tolist()
     depths = np.array([row["records/params.crack_depth_mm"] for row in rows], dtype=float)
     np.testing.assert_allclose(depths, plan.columns["params/crack_depth_mm"], rtol=1e-12, atol=0)
@@ -68,7 +75,10 @@ def test_the_validator_would_find_a_mistake(folder: Path) -> None:
 def test_croissant_lists_every_file_with_its_digest(folder: Path) -> None:
     content = json.loads((folder / "croissant.json").read_text(encoding="utf-8"))
     listed = {item["contentUrl"]: item["sha256"] for item in content["distribution"]}
-    assert {f"shards/shard-0000{i}.h5" for i in range(4)} | {"plan.csv", "splits/by_unit.csv"} <= set(listed)
+    assert {f"shards/shard-0000{i}.h5" for i in range(4)} | {
+        "plan.csv",
+        "splits/by_unit.csv",
+    } <= set(listed)
     assert all(sha256_file(folder / name) == digest for name, digest in listed.items())
 
 
@@ -80,7 +90,9 @@ def test_responsible_ai_fields_state_facts_and_caveats(tmp_path: Path) -> None:
         assert content[f"rai:{field}"], field
     assert "crack 12, healthy 12, pitting 12" in content["rai:dataBiases"][0]
     assert "1 records failed" in content["rai:dataBiases"][2]
-    assert any("proved nothing about measured signals" in line for line in content["rai:dataLimitations"])
+    assert any(
+        "proved nothing about measured signals" in line for line in content["rai:dataLimitations"]
+    )
     assert all(name in content["description"] for name in CLASSES)
     metadata = mlcroissant.Dataset(jsonld=folder / "croissant.json").metadata
     assert metadata.data_limitations is not None

@@ -52,13 +52,18 @@ def test_the_record_of_median_severity_stands_for_its_class(drawn: Path) -> None
 def test_the_bytes_depend_on_nobody_s_style(drawn: Path, tmp_path: Path) -> None:
     folder = shutil.copytree(drawn, tmp_path / "set")
     before = {path.name: path.read_bytes() for path in (folder / "figures").iterdir()}
-    with matplotlib.rc_context({"font.size": 22.0, "axes.facecolor": "black"}), open_dataset(folder) as data:
+    with (
+        matplotlib.rc_context({"font.size": 22.0, "axes.facecolor": "black"}),
+        open_dataset(folder) as data,
+    ):
         write_class_figures(data)
         assert matplotlib.rcParams["font.size"] == 22.0
     assert {path.name: path.read_bytes() for path in (folder / "figures").iterdir()} == before
 
 
-def test_without_matplotlib_a_card_has_no_pictures(tmp_path: Path, plan: Plan, monkeypatch: pytest.MonkeyPatch) -> None:
+def test_without_matplotlib_a_card_has_no_pictures(
+    tmp_path: Path, plan: Plan, monkeypatch: pytest.MonkeyPatch
+) -> None:
     real = builtins.__import__
 
     def missing(name: str, *words: object) -> object:
@@ -75,7 +80,10 @@ def test_without_matplotlib_a_card_has_no_pictures(tmp_path: Path, plan: Plan, m
 
 def test_a_class_without_a_usable_record_has_no_picture(tmp_path: Path) -> None:
     folder = build(tmp_path / "set", make_plan(n_records=3), figures=True, failed=1)
-    assert sorted(path.name for path in (folder / "figures").iterdir()) == ["0-healthy.png", "2-pitting.png"]
+    assert sorted(path.name for path in (folder / "figures").iterdir()) == [
+        "0-healthy.png",
+        "2-pitting.png",
+    ]
     assert verify(folder).problems == []
 
 
@@ -86,7 +94,9 @@ def test_hostile_class_names_stay_names(tmp_path: Path) -> None:
     names = np.where(plan.columns["label"] == 1, evil, plan.columns["label_name"])
     plan = Plan(columns={**plan.columns, "label_name": names})
     folder = build(tmp_path / "set", plan, shards=range(0), close=False)
-    writer = write_shard(shard_path(folder, 0), plan, attributes=ATTRIBUTES | {"class_names": ["healthy", evil]})
+    writer = write_shard(
+        shard_path(folder, 0), plan, attributes=ATTRIBUTES | {"class_names": ["healthy", evil]}
+    )
     record_shard(folder, 0, writer.sha256, writer.n_bytes, writer.n_failed)
     finalize(folder)
     names = sorted(path.name for path in (folder / "figures").iterdir())

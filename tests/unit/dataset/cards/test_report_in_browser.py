@@ -23,10 +23,16 @@ AXIS = "name => document.getElementById('plot-' + name).layout.xaxis.title.text"
 @pytest.fixture(scope="module")
 def browser() -> Iterator[Any]:
     playwright = pytest.importorskip("playwright.sync_api", reason="package playwright")
-    path = os.environ.get("GENSIG_CHROMIUM") or shutil.which("chromium") or shutil.which("google-chrome")
+    path = (
+        os.environ.get("GENSIG_CHROMIUM")
+        or shutil.which("chromium")
+        or shutil.which("google-chrome")
+    )
     with playwright.sync_playwright() as started:
         try:
-            found = started.chromium.launch(executable_path=path, args=["--no-sandbox", "--disable-gpu"])
+            found = started.chromium.launch(
+                executable_path=path, args=["--no-sandbox", "--disable-gpu"]
+            )
         except playwright.Error as error:
             pytest.skip(f"no Chromium: {str(error).splitlines()[0]}")
         yield found
@@ -36,7 +42,11 @@ def browser() -> Iterator[Any]:
 @pytest.fixture(scope="module")
 def page_file(tmp_path_factory: pytest.TempPathFactory) -> Path:
     """A page of 36 records and two channels, one of them with a hostile name."""
-    attributes = {**ATTRIBUTES, "channel_names": ["pinion_y", HOSTILE], "channel_units": ["m/s^2", "rad/s"]}
+    attributes = {
+        **ATTRIBUTES,
+        "channel_names": ["pinion_y", HOSTILE],
+        "channel_units": ["m/s^2", "rad/s"],
+    }
     folder = build(tmp_path_factory.mktemp("page") / "set", make_plan(), attributes=attributes)
     return write_report(folder, folder.parent / "page.html")[0]
 
@@ -66,7 +76,9 @@ def page(browser: Any, page_file: Path, request: pytest.FixtureRequest) -> Itera
 def test_it_loads_and_fits(page: Any) -> None:
     assert page.evaluate("document.documentElement.scrollWidth <= window.innerWidth")
     assert page.evaluate("document.querySelectorAll('.plot .main-svg').length") >= 6
-    assert page.evaluate("document.querySelectorAll('img, svg a').length") == 0  # no text became markup
+    assert (
+        page.evaluate("document.querySelectorAll('img, svg a').length") == 0
+    )  # no text became markup
 
 
 def test_legends_are_clear_of_the_toolbar(page: Any) -> None:
@@ -83,7 +95,9 @@ def test_record_channel_and_comparison(page: Any) -> None:
     form = "#signals-controls"
     for value in ("0", "4"):
         page.select_option(f"{form} [name=record]", value)
-        wanted = page.evaluate("i => JSON.parse(document.getElementById('data').textContent).examples[i].record", value)
+        wanted = page.evaluate(
+            "i => JSON.parse(document.getElementById('data').textContent).examples[i].record", value
+        )
         assert wanted in page.evaluate(TRACES, "wave")[-1]
         assert wanted in page.inner_text("#signals-said")
     page.select_option(f"{form} [name=other]", "1")
@@ -94,7 +108,9 @@ def test_record_channel_and_comparison(page: Any) -> None:
     page.select_option(f"{form} [name=channel]", "1")
     assert page.evaluate("document.getElementById('plot-wave').data[0].y[7]") != first
     assert HOSTILE in page.inner_text("#signals-said")
-    assert "rad/s" in page.evaluate("document.getElementById('plot-spectrum').layout.yaxis.title.text")
+    assert "rad/s" in page.evaluate(
+        "document.getElementById('plot-spectrum').layout.yaxis.title.text"
+    )
 
 
 def test_axes_marks_and_zoom(page: Any) -> None:
@@ -103,7 +119,8 @@ def test_axes_marks_and_zoom(page: Any) -> None:
     page.select_option(f"{form} [name=record]", "4")
     page.select_option(f"{form} [name=other]", "")
     marked = (
-        "name => document.getElementById('plot-envelope').data.find(t => t.name === name)?.x.filter(x => x !== null)[0]"
+        "name => document.getElementById('plot-envelope').data"
+        ".find(t => t.name === name)?.x.filter(x => x !== null)[0]"
     )
     assert page.evaluate(AXIS, "spectrum") == "frequency, Hz"
     assert page.evaluate(marked, "fault frequency") == pytest.approx(30.0)

@@ -60,7 +60,11 @@ class Page(HTMLParser):
 
     @property
     def data(self) -> dict:
-        (content,) = [text for attributes, text in self.scripts if attributes.get("type") == "application/json"]
+        (content,) = [
+            text
+            for attributes, text in self.scripts
+            if attributes.get("type") == "application/json"
+        ]
         return json.loads(content)
 
 
@@ -72,12 +76,16 @@ def page_of(folder: Path, out: Path) -> Page:
 def unpack(packed: dict) -> np.ndarray:
     """Amplitudes as the page's script reads them."""
     counts = np.frombuffer(base64.b64decode(packed["n"]), dtype="u1").astype(float)
-    return np.where(counts > 0, packed["top"] * 10.0 ** ((counts - 255.0) * packed["step_db"] / 20.0), 0.0)
+    return np.where(
+        counts > 0, packed["top"] * 10.0 ** ((counts - 255.0) * packed["step_db"] / 20.0), 0.0
+    )
 
 
 @pytest.fixture(scope="module")
 def made(tmp_path_factory: pytest.TempPathFactory) -> tuple[Path, Page]:
-    folder = build(tmp_path_factory.mktemp("report") / "set", make_plan())  # without a folder of figures
+    folder = build(
+        tmp_path_factory.mktemp("report") / "set", make_plan()
+    )  # without a folder of figures
     return folder, page_of(folder, folder.parent / "page.html")
 
 
@@ -95,10 +103,17 @@ def test_the_page_stands_alone(made: tuple[Path, Page]) -> None:
 
 
 def test_only_its_own_scripts_may_run(made: tuple[Path, Page]) -> None:
-    (policy,) = [a["content"] for a in made[1].all("meta") if a.get("http-equiv") == "Content-Security-Policy"]
+    (policy,) = [
+        a["content"]
+        for a in made[1].all("meta")
+        if a.get("http-equiv") == "Content-Security-Policy"
+    ]
     assert policy.startswith("default-src 'none'; script-src ")
     scripts = [text for attributes, text in made[1].scripts if "type" not in attributes]
-    hashes = {f"'sha256-{base64.b64encode(hashlib.sha256(text.encode()).digest()).decode()}'" for text in scripts}
+    hashes = {
+        f"'sha256-{base64.b64encode(hashlib.sha256(text.encode()).digest()).decode()}'"
+        for text in scripts
+    }
     assert len(hashes) == 2
     assert hashes == set(policy.split("script-src ")[1].split(";")[0].split())
 
@@ -139,9 +154,13 @@ def test_every_option_has_its_data(made: tuple[Path, Page]) -> None:
     assert {"wave", "spectrum", "envelope", "spectrogram"} == set(data["examples"][0]["views"][0])
     for table in (data["drawn"], data["measured"]):
         assert len(base64.b64decode(table["class"])) == table["rows"] == 36
-    column = np.frombuffer(base64.b64decode(data["drawn"]["columns"]["params/crack_depth_mm"]), dtype="<f4")
+    column = np.frombuffer(
+        base64.b64decode(data["drawn"]["columns"]["params/crack_depth_mm"]), dtype="<f4"
+    )
     with open_dataset(made[0]) as source:
-        np.testing.assert_allclose(column, source.column("params/crack_depth_mm"), rtol=1e-6, atol=0, equal_nan=True)
+        np.testing.assert_allclose(
+            column, source.column("params/crack_depth_mm"), rtol=1e-6, atol=0, equal_nan=True
+        )
 
 
 def test_the_signals_are_those_of_the_records(made: tuple[Path, Page]) -> None:
@@ -156,7 +175,9 @@ def test_the_signals_are_those_of_the_records(made: tuple[Path, Page]) -> None:
             packed = one["views"][1]["spectrum"]
             frequency, amplitude = amplitude_spectrum(signal, source.sampling_rate)
             amplitude = amplitude[frequency <= 400.0]  # the usable band
-            np.testing.assert_allclose(unpack(packed), amplitude, rtol=10 ** (0.55 * STEP_DB / 20) - 1, atol=0)
+            np.testing.assert_allclose(
+                unpack(packed), amplitude, rtol=10 ** (0.55 * STEP_DB / 20) - 1, atol=0
+            )
             assert packed["start"] == 0.0
             assert packed["step"] == pytest.approx(frequency[1])
 
@@ -179,7 +200,11 @@ def test_a_silent_signal_is_packed() -> None:
 
 
 def test_text_of_the_files_is_no_markup(tmp_path: Path) -> None:
-    attributes = {**ATTRIBUTES, "channel_names": [HOSTILE, "wheel_y"], "channel_units": ["m/s^2", "<s>rad</s>"]}
+    attributes = {
+        **ATTRIBUTES,
+        "channel_names": [HOSTILE, "wheel_y"],
+        "channel_units": ["m/s^2", "<s>rad</s>"],
+    }
     folder = build(tmp_path / "a<script>alert(1)<", make_plan(), attributes=attributes)
     page = page_of(folder, tmp_path / "page.html")
     assert len(page.scripts) == 3
@@ -189,7 +214,9 @@ def test_text_of_the_files_is_no_markup(tmp_path: Path) -> None:
     assert any(HOSTILE in words for words in page.words)
 
 
-def test_the_code_on_the_page_runs(made: tuple[Path, Page], monkeypatch: pytest.MonkeyPatch) -> None:
+def test_the_code_on_the_page_runs(
+    made: tuple[Path, Page], monkeypatch: pytest.MonkeyPatch
+) -> None:
     folder, page = made
     (code,) = re.findall(r"<code>(import gensig.*?)</code>", page.text, flags=re.DOTALL)
     code = "".join(Page(code).words).replace("PATH/TO/THIS/FOLDER", str(folder))
@@ -202,10 +229,18 @@ def test_the_code_on_the_page_runs(made: tuple[Path, Page], monkeypatch: pytest.
 def test_sound_records_of_the_same_machine_stand_beside(made: tuple[Path, Page]) -> None:
     with open_dataset(made[0]) as data:
         chosen = choose(data, None)
-        assert {name: len(records) for name, records in chosen.records.items()} == dict.fromkeys(data.class_names, 3)
-        unit, middle = data.column("unit_id"), [chosen.records[name][1] for name in ("crack", "pitting")]
+        assert {name: len(records) for name, records in chosen.records.items()} == dict.fromkeys(
+            data.class_names, 3
+        )
+        unit, middle = (
+            data.column("unit_id"),
+            [chosen.records[name][1] for name in ("crack", "pitting")],
+        )
         matched = {(unit[i], data.column("condition_id")[i]) for i in chosen.records["healthy"]}
-        sound = {(unit[i], data.column("condition_id")[i]) for i in np.flatnonzero(data.column("label") == 0)}
+        sound = {
+            (unit[i], data.column("condition_id")[i])
+            for i in np.flatnonzero(data.column("label") == 0)
+        }
         assert all(
             (unit[i], data.column("condition_id")[i]) in matched
             for i in middle
@@ -241,11 +276,18 @@ def test_frequencies_of_a_geared_engine() -> None:
     assert set(rotation.of(1).values()) == {None}
     assert [name for name, _ in rotation.references] == ["pinion", "wheel", "drive", "mesh"]
     assert rotation.fault_gear(0) == "wheel"
-    same = Rotation(mesh=rotation.mesh, drive=np.array([10.0, np.nan]), n_teeth=rotation.n_teeth, gear=rotation.gear)
+    same = Rotation(
+        mesh=rotation.mesh,
+        drive=np.array([10.0, np.nan]),
+        n_teeth=rotation.n_teeth,
+        gear=rotation.gear,
+    )
     assert [name for name, _ in same.references] == ["pinion", "wheel", "mesh"]
 
 
-def test_the_page_in_the_folder_leaves_the_set_whole(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
+def test_the_page_in_the_folder_leaves_the_set_whole(
+    tmp_path: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
     folder = build(tmp_path / "set", make_plan(), failed=4)
     assert main(["report", str(folder), "--records", "1"]) == 0
     assert "3 records shown, 35 measured" in capsys.readouterr().out
@@ -289,16 +331,22 @@ def test_an_incomplete_set_and_bad_options_are_refused(tmp_path: Path, plan: Pla
         write_report(begun, tmp_path / "nowhere" / "page.html")
 
 
-def test_values_that_are_not_finite_are_refused(made: tuple[Path, Page], monkeypatch: pytest.MonkeyPatch) -> None:
+def test_values_that_are_not_finite_are_refused(
+    made: tuple[Path, Page], monkeypatch: pytest.MonkeyPatch
+) -> None:
     read = Dataset.signals
-    monkeypatch.setattr(Dataset, "signals", lambda *args, **more: read(*args, **more) * np.float32(np.nan))
+    monkeypatch.setattr(
+        Dataset, "signals", lambda *args, **more: read(*args, **more) * np.float32(np.nan)
+    )
     with pytest.raises(DatasetError, match="not finite"):
         write_report(made[0], made[0].parent / "other.html")
 
 
 def test_it_opens_on_a_healthy_record(made: tuple[Path, Page]) -> None:
     page = made[1]
-    (number,) = [int(a["value"]) for a in page.all("option") if "selected" in a and a["value"].isdigit()][:1]
+    (number,) = [
+        int(a["value"]) for a in page.all("option") if "selected" in a and a["value"].isdigit()
+    ][:1]
     assert page.data["examples"][number]["class"] == "healthy"
 
 
@@ -307,18 +355,24 @@ def test_a_fault_of_all_teeth_has_no_frequency_of_its_own(made: tuple[Path, Page
         before = read_rotation(data)
         faulty = np.flatnonzero(data.column("label") > 0)
         assert before.fault_gear(faulty[0]) == "pinion"
-        data.column = lambda name, of=data.column: np.full_like(of(name), -1) if name == "fault_tooth" else of(name)
+        data.column = lambda name, of=data.column: (
+            np.full_like(of(name), -1) if name == "fault_tooth" else of(name)
+        )
         assert read_rotation(data).fault_gear(faulty[0]) == ""
 
 
 def test_velocity_of_a_tone_is_its_acceleration_over_its_frequency() -> None:
     time = np.arange(51200) / 51200.0
-    tones = np.stack([3.0 * np.sin(2 * np.pi * f * time + 0.3) for f in (100.25, 950.5, 5.0, 1500.0)])
+    tones = np.stack(
+        [3.0 * np.sin(2 * np.pi * f * time + 0.3) for f in (100.25, 950.5, 5.0, 1500.0)]
+    )
     velocity = velocity_rms(tones, 51200.0)
     expected = [3.0 / np.sqrt(2.0) / (2 * np.pi * f) for f in (100.25, 950.5)]
     np.testing.assert_allclose(velocity[:2], expected, rtol=2e-3)
     assert velocity[2:].max() < 0.02 * 3.0 / (2 * np.pi * 10.0)  # outside of 10 to 1000 Hz
-    faded = 40.0 * np.cos(2 * np.pi * 3000.7 * time)  # neither end of it is 0: nothing of it leaks below 1 kHz
+    faded = 40.0 * np.cos(
+        2 * np.pi * 3000.7 * time
+    )  # neither end of it is 0: nothing of it leaks below 1 kHz
     assert velocity_rms(faded[None], 51200.0)[0] < 1e-6
 
 
@@ -329,7 +383,9 @@ def test_levels_are_stated_in_g_and_mm_s_and_loud_ones_are_named(made: tuple[Pat
             values={"rms": np.array([[97.0, 1.0], [98.1665, 1.0]])},
             further={"velocity_rms": np.array([[2e-3, 1.0], [4e-3, 1.0]])},
         )
-        data.column = lambda name, of=data.column: np.array(["healthy", "crack"]) if name == "label_name" else of(name)
+        data.column = lambda name, of=data.column: (
+            np.array(["healthy", "crack"]) if name == "label_name" else of(name)
+        )
         units = ["m/s^2", "rad/s"]
         table = level_table(data, measured, ["case", "shaft"], units)
         assert table is not None

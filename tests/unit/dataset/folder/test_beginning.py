@@ -20,7 +20,13 @@ CHANGES = ("mkdir", "replace", "unlink", "fsync", "rename")
 def begin(out: Path) -> None:
     identity = identity_hash(CONFIG, "0.1.0")
     create_folder(
-        out, config=CONFIG, overrides=[], plan=make_plan(), identity=identity, seed=7, generator_version="0.1.0"
+        out,
+        config=CONFIG,
+        overrides=[],
+        plan=make_plan(),
+        identity=identity,
+        seed=7,
+        generator_version="0.1.0",
     )
 
 
@@ -52,11 +58,17 @@ def killed_before(number: int, work: Callable[[], None]) -> bool:
 
 
 def files(folder: Path) -> dict[str, bytes]:
-    return {str(path.relative_to(folder)): path.read_bytes() for path in folder.rglob("*") if path.is_file()}
+    return {
+        str(path.relative_to(folder)): path.read_bytes()
+        for path in folder.rglob("*")
+        if path.is_file()
+    }
 
 
 @pytest.mark.parametrize("exists", [False, True])
-def test_killed_at_every_change_it_is_no_data_set_and_is_begun_anew(tmp_path: Path, exists: bool) -> None:
+def test_killed_at_every_change_it_is_no_data_set_and_is_begun_anew(
+    tmp_path: Path, exists: bool
+) -> None:
     begin(tmp_path / "whole")
     whole = files(tmp_path / "whole")
     number, refused, finished = 0, 0, 0
@@ -89,8 +101,12 @@ def test_killed_at_every_change_it_is_no_data_set_and_is_begun_anew(tmp_path: Pa
     assert read_manifest(out).n_done == 0
 
 
-@pytest.mark.parametrize("name", ["mine.txt", "shards/mine.h5", "splits/mine.txt", "splits/deep/mine.csv"])
-def test_a_killed_beginning_that_holds_anything_else_is_not_touched(tmp_path: Path, name: str) -> None:
+@pytest.mark.parametrize(
+    "name", ["mine.txt", "shards/mine.h5", "splits/mine.txt", "splits/deep/mine.csv"]
+)
+def test_a_killed_beginning_that_holds_anything_else_is_not_touched(
+    tmp_path: Path, name: str
+) -> None:
     begin(tmp_path / "set")
     (tmp_path / "set" / "manifest.json").unlink()
     (tmp_path / "set" / BEGINNING).touch()

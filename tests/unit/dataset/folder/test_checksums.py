@@ -44,10 +44,15 @@ def test_every_file_is_listed_as_sha256sum_does(with_log: Path) -> None:
     listed = read_checksums(with_log)
     assert listed.keys() == found - {"SHA256SUMS"}
     assert set(FILES) <= found
-    assert all(hashlib.sha256((with_log / name).read_bytes()).hexdigest() == listed[name] for name in listed)
+    assert all(
+        hashlib.sha256((with_log / name).read_bytes()).hexdigest() == listed[name]
+        for name in listed
+    )
     command = shutil.which("sha256sum")
     if command:
-        done = subprocess.run([command, "--check", "--strict", "SHA256SUMS"], cwd=with_log, capture_output=True)
+        done = subprocess.run(
+            [command, "--check", "--strict", "SHA256SUMS"], cwd=with_log, capture_output=True
+        )
         assert done.returncode == 0
 
 
@@ -62,7 +67,11 @@ def test_a_flipped_byte_anywhere_is_found_and_its_file_named(with_log: Path, nam
         path.write_bytes(damaged)
         result = verify(with_log)
         assert not result.complete
-        assert any(Path(name).name in problem for problem in result.problems), (place, bit, result.problems)
+        assert any(Path(name).name in problem for problem in result.problems), (
+            place,
+            bit,
+            result.problems,
+        )
         assert not any("\n" in problem for problem in result.problems)
     path.write_bytes(content)
     assert verify(with_log).complete
@@ -85,7 +94,9 @@ def test_environment_cannot_be_rewritten(with_log: Path) -> None:
     content["environment"]["numpy"] = "9.9.9"
     (with_log / "manifest.json").write_text(json.dumps(content, indent=1) + "\n")
     for quick in (False, True):
-        assert any("manifest.json was altered" in line for line in verify(with_log, quick=quick).problems)
+        assert any(
+            "manifest.json was altered" in line for line in verify(with_log, quick=quick).problems
+        )
 
 
 def test_an_extra_figure_is_named(with_log: Path) -> None:
@@ -106,7 +117,9 @@ def test_hand_written_words_are_accepted_when_asked(with_log: Path) -> None:
     assert (with_log / "manifest.json").read_bytes() == before
 
 
-@pytest.mark.parametrize("name", ["manifest.json", "run.log", "figures/0-healthy.png", "SHA256SUMS"])
+@pytest.mark.parametrize(
+    "name", ["manifest.json", "run.log", "figures/0-healthy.png", "SHA256SUMS"]
+)
 def test_nothing_else_is_accepted(with_log: Path, name: str) -> None:
     content = bytearray((with_log / name).read_bytes())
     content[-2] ^= 1
@@ -136,7 +149,13 @@ def test_an_incomplete_set_has_nothing_to_accept(tmp_path: Path, plan: Plan) -> 
 
 
 @pytest.mark.parametrize(
-    "line", ["0" * 64 + "  ../secret", "0" * 64 + "  shards/../../x.h5", "short  README.md", "0" * 64 + " README.md"]
+    "line",
+    [
+        "0" * 64 + "  ../secret",
+        "0" * 64 + "  shards/../../x.h5",
+        "short  README.md",
+        "0" * 64 + " README.md",
+    ],
 )
 def test_forged_lines_are_refused(with_log: Path, line: str) -> None:
     with (with_log / "SHA256SUMS").open("a") as file:

@@ -28,12 +28,20 @@ from gensig.errors import DatasetError
 
 
 def _create(out: Path, plan: Plan, **changes) -> None:
-    given = {"config": CONFIG, "overrides": [], "plan": plan, "seed": 7, "generator_version": "0.1.0"}
+    given = {
+        "config": CONFIG,
+        "overrides": [],
+        "plan": plan,
+        "seed": 7,
+        "generator_version": "0.1.0",
+    }
     create_folder(out, **({"identity": identity_hash(CONFIG, "0.1.0")} | given | changes))
 
 
 def _tree(folder: Path) -> dict[str, bytes]:
-    return {str(p.relative_to(folder)): p.read_bytes() for p in sorted(folder.rglob("*")) if p.is_file()}
+    return {
+        str(p.relative_to(folder)): p.read_bytes() for p in sorted(folder.rglob("*")) if p.is_file()
+    }
 
 
 def test_identity_covers_what_decides_the_bits() -> None:
@@ -43,7 +51,9 @@ def test_identity_covers_what_decides_the_bits() -> None:
         assert identity_hash(CONFIG | {key: "other"}, "0.1.0") == base
     assert identity_hash(CONFIG, "0.1.1") != base
     assert identity_hash(CONFIG | {"seed": 8}, "0.1.0") != base
-    assert identity_hash(CONFIG | {"gear": {"n_teeth": 23, "out": 1}}, "0.1.0") != base  # nested names count
+    assert (
+        identity_hash(CONFIG | {"gear": {"n_teeth": 23, "out": 1}}, "0.1.0") != base
+    )  # nested names count
     with pytest.raises(DatasetError, match="plain data"):
         identity_hash({"a": object()}, "0.1.0")
 
@@ -75,7 +85,15 @@ def test_folder_holds_what_is_needed(folder: Path, plan: Plan) -> None:
     manifest = read_manifest(folder)
     assert manifest.is_complete
     assert (manifest.seed, manifest.n_records, manifest.n_done) == (7, 36, 4)
-    assert set(manifest.environment) >= {"python", "numpy", "h5py", "cpu_model", "git_commit", "created", "finished"}
+    assert set(manifest.environment) >= {
+        "python",
+        "numpy",
+        "h5py",
+        "cpu_model",
+        "git_commit",
+        "created",
+        "finished",
+    }
     assert read_config(folder) == CONFIG
     assert yaml.safe_load((folder / "overrides.yaml").read_text()) == ["seed=7"]
     assert read_plan(folder / "plan.csv").n_records == plan.n_records
@@ -84,7 +102,12 @@ def test_folder_holds_what_is_needed(folder: Path, plan: Plan) -> None:
 def test_two_runs_are_byte_equal(tmp_path: Path, plan: Plan) -> None:
     first, second = (_tree(build(tmp_path / name, plan)) for name in ("a", "b"))
     different = {name for name in first if first[name] != second[name]}
-    assert different <= {"manifest.json", "README.md", "croissant.json", "SHA256SUMS"}  # times and the folder's name
+    assert different <= {
+        "manifest.json",
+        "README.md",
+        "croissant.json",
+        "SHA256SUMS",
+    }  # times and the folder's name
 
 
 def test_existing_folder_is_not_touched(tmp_path: Path, plan: Plan) -> None:
@@ -101,7 +124,9 @@ def test_existing_folder_is_not_touched(tmp_path: Path, plan: Plan) -> None:
     assert not read_manifest(tmp_path / "empty").is_complete
 
 
-def test_failure_while_creating_leaves_nothing(tmp_path: Path, plan: Plan, monkeypatch: pytest.MonkeyPatch) -> None:
+def test_failure_while_creating_leaves_nothing(
+    tmp_path: Path, plan: Plan, monkeypatch: pytest.MonkeyPatch
+) -> None:
     def full_disk(*_: object) -> None:
         raise OSError(28, "No space left on device")
 
@@ -146,7 +171,9 @@ def _record(folder: Path, shard: int) -> None:
 
 
 def test_processes_do_not_overwrite_each_other(tmp_path: Path) -> None:
-    folder = build(tmp_path / "a", make_plan(n_records=24, records_per_shard=1), shards=range(0), close=False)
+    folder = build(
+        tmp_path / "a", make_plan(n_records=24, records_per_shard=1), shards=range(0), close=False
+    )
     for shard in range(24):
         shard_path(folder, shard).touch()
     context = multiprocessing.get_context("fork")
@@ -163,7 +190,11 @@ def test_index_shows_all_shards_from_any_folder_and_nan_for_a_missing_one(folder
         " f['label'][10], f['params/crack_depth_mm'].shape)"
     )
     run = subprocess.run(
-        [os.sys.executable, "-c", code, str(folder / "index.h5")], capture_output=True, text=True, cwd="/", check=True
+        [os.sys.executable, "-c", code, str(folder / "index.h5")],
+        capture_output=True,
+        text=True,
+        cwd="/",
+        check=True,
     )
     assert run.stdout.strip() == "(36, 2, 200) r000035 True True -1 (36,)"
 
@@ -204,7 +235,9 @@ def _damage(content: dict, path: list, value: object) -> None:
         (["identity"], "short", "sha256"),
     ],
 )
-def test_forged_manifest_is_refused_in_one_line(folder: Path, path: list, value: object, message: str) -> None:
+def test_forged_manifest_is_refused_in_one_line(
+    folder: Path, path: list, value: object, message: str
+) -> None:
     content = json.loads((folder / "manifest.json").read_text())
     _damage(content, path, value)
     (folder / "manifest.json").write_text(json.dumps(content))
@@ -213,7 +246,9 @@ def test_forged_manifest_is_refused_in_one_line(folder: Path, path: list, value:
     assert "\n" not in str(caught.value)
 
 
-@pytest.mark.parametrize("text", ["", "{", "[]", "null", "[" * 100_000, '{"schema_version": 1}', "\0"])
+@pytest.mark.parametrize(
+    "text", ["", "{", "[]", "null", "[" * 100_000, '{"schema_version": 1}', "\0"]
+)
 def test_manifest_that_is_none_is_refused(folder: Path, text: str) -> None:
     (folder / "manifest.json").write_text(text)
     with pytest.raises(DatasetError, match=r"manifest\.json"):
@@ -222,7 +257,14 @@ def test_manifest_that_is_none_is_refused(folder: Path, text: str) -> None:
 
 @pytest.mark.parametrize(
     "text",
-    ["a: &x [1]\nb: *x\n", "!!python/object/apply:os.system [ls]", "a: [", "- 1\n", "[" * 20_000, "a: " + "[" * 20_000],
+    [
+        "a: &x [1]\nb: *x\n",
+        "!!python/object/apply:os.system [ls]",
+        "a: [",
+        "- 1\n",
+        "[" * 20_000,
+        "a: " + "[" * 20_000,
+    ],
 )
 def test_configuration_that_is_not_plain_is_refused(folder: Path, text: str) -> None:
     (folder / "config.yaml").write_text(text)

@@ -55,13 +55,19 @@ def test_split_with_a_unit_on_two_sides_is_found(folder: Path) -> None:
     path = folder / "splits" / "by_unit.csv"
     header, first, *others = path.read_text().splitlines(keepends=True)
     record, _, subset = first.strip().partition(",0,1,")
-    path.write_text("".join([header, f"{record},0,1,{'test' if subset != 'test' else 'train'}\n", *others]))
-    problems = [problem for problem in verify(folder).problems if problem.startswith("splits/by_unit: ")]
+    path.write_text(
+        "".join([header, f"{record},0,1,{'test' if subset != 'test' else 'train'}\n", *others])
+    )
+    problems = [
+        problem for problem in verify(folder).problems if problem.startswith("splits/by_unit: ")
+    ]
     assert problems == ["splits/by_unit: unit_id u0 is in more than one subset (1 such)"]
 
 
 @pytest.mark.parametrize("part", [0.0, 0.5, 0.999])
-@pytest.mark.parametrize("name", ["shards/shard-00002.h5", "plan.csv", "config.yaml", "splits/by_unit.csv", "index.h5"])
+@pytest.mark.parametrize(
+    "name", ["shards/shard-00002.h5", "plan.csv", "config.yaml", "splits/by_unit.csv", "index.h5"]
+)
 def test_flipped_byte_is_found(folder: Path, name: str, part: float) -> None:
     path = folder / name
     _flip(path, int(part * path.stat().st_size))
@@ -71,7 +77,9 @@ def test_flipped_byte_is_found(folder: Path, name: str, part: float) -> None:
     assert not any("\n" in problem for problem in result.problems)
 
 
-@pytest.mark.parametrize("name", ["shards/shard-00001.h5", "plan.csv", "config.yaml", "splits/by_unit.csv", "index.h5"])
+@pytest.mark.parametrize(
+    "name", ["shards/shard-00001.h5", "plan.csv", "config.yaml", "splits/by_unit.csv", "index.h5"]
+)
 @pytest.mark.parametrize("quick", [False, True])
 def test_missing_file_is_found(folder: Path, name: str, quick: bool) -> None:
     (folder / name).unlink()
@@ -121,7 +129,9 @@ def _swap(a: Path, b: Path) -> None:
 def test_foreign_shard_is_found_even_when_the_manifest_agrees(folder: Path, tmp_path: Path) -> None:
     other = tmp_path / "other.h5"
     plan = make_plan()
-    renamed = Plan(columns={**plan.columns, "record_id": np.char.replace(plan.columns["record_id"], "r", "x")})
+    renamed = Plan(
+        columns={**plan.columns, "record_id": np.char.replace(plan.columns["record_id"], "r", "x")}
+    )
     write_shard(other, renamed, 1, attributes=ATTRIBUTES | {"config_json": '{"a": 2}'})
     shutil.copyfile(other, shard_path(folder, 1))
     assert any("altered" in problem for problem in verify(folder).problems)
@@ -145,7 +155,10 @@ def _set(name: str, row: int, value: object) -> Callable[[h5py.File], None]:
         (_set("label", 3, 1), "row 3: label is 1, the plan says 2"),
         (_set("unit_id", 0, b"u9"), "row 0: unit_id is 'u9'"),
         (_set("status", 3, b"failed"), "1 failed records, recorded are 0"),
-        (lambda file: file.create_dataset("more", data=np.zeros(10)), "foreign: its data sets more"),
+        (
+            lambda file: file.create_dataset("more", data=np.zeros(10)),
+            "foreign: its data sets more",
+        ),
         (lambda file: file.__delitem__("torque_nm"), "no data set torque_nm"),
     ],
 )
@@ -198,7 +211,16 @@ def test_linked_shards_outside_the_folder_are_refused(folder: Path, tmp_path: Pa
 
 def test_inspect_shows_what_is_there(folder: Path, tmp_path: Path) -> None:
     text = inspect(folder)
-    for part in ("complete", "36, 0 failed", "4 done", "crack 12", "6: u0 6", "1800 to 1835 r/min", "20 N m", "ok 36"):
+    for part in (
+        "complete",
+        "36, 0 failed",
+        "4 done",
+        "crack 12",
+        "6: u0 6",
+        "1800 to 1835 r/min",
+        "20 N m",
+        "ok 36",
+    ):
         assert part in text, part
     text = inspect(shard_path(folder, 0))
     assert "/acceleration (10, 2, 200) float32, m/s^2" in text

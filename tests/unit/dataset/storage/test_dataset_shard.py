@@ -43,7 +43,11 @@ def test_bytes_depend_neither_on_time_nor_name_nor_order(tmp_path: Path) -> None
     time.sleep(1.1)  # HDF5 time stamps have a resolution of 1 s
     assert write_shard(tmp_path / "b.h5", plan).sha256 == first
     writer = ShardWriter(
-        tmp_path / "c.h5", n_records=10, signals=SIGNALS, params=["crack_depth_mm"], attributes=ATTRIBUTES
+        tmp_path / "c.h5",
+        n_records=10,
+        signals=SIGNALS,
+        params=["crack_depth_mm"],
+        attributes=ATTRIBUTES,
     )
     with writer:
         for row in reversed(range(10)):
@@ -54,7 +58,11 @@ def test_bytes_depend_neither_on_time_nor_name_nor_order(tmp_path: Path) -> None
 
 def test_exception_leaves_nothing(tmp_path: Path) -> None:
     writer = ShardWriter(
-        tmp_path / "a.h5", n_records=1, signals=SIGNALS, params=["crack_depth_mm"], attributes=ATTRIBUTES
+        tmp_path / "a.h5",
+        n_records=1,
+        signals=SIGNALS,
+        params=["crack_depth_mm"],
+        attributes=ATTRIBUTES,
     )
 
     def crash() -> None:
@@ -72,7 +80,11 @@ def test_unwritten_row_is_refused_and_leaves_nothing(tmp_path: Path) -> None:
 
     def write_one() -> None:
         with ShardWriter(
-            tmp_path / "a.h5", n_records=2, signals=SIGNALS, params=["crack_depth_mm"], attributes=ATTRIBUTES
+            tmp_path / "a.h5",
+            n_records=2,
+            signals=SIGNALS,
+            params=["crack_depth_mm"],
+            attributes=ATTRIBUTES,
         ) as w:
             w.write(0, *row_of(plan, 0))
 
@@ -110,7 +122,11 @@ def test_value_that_does_not_fit_is_refused(tmp_path: Path, change: dict, messag
     signals, values = row_of(make_plan(), 0)
     with (
         ShardWriter(
-            tmp_path / "a.h5", n_records=1, signals=SIGNALS, params=["crack_depth_mm"], attributes=ATTRIBUTES
+            tmp_path / "a.h5",
+            n_records=1,
+            signals=SIGNALS,
+            params=["crack_depth_mm"],
+            attributes=ATTRIBUTES,
         ) as writer,
     ):
         with pytest.raises(DatasetError, match=message):
@@ -125,9 +141,17 @@ def test_missing_column_and_bad_signals_are_refused(tmp_path: Path) -> None:
     not_finite = signals["acceleration"].copy()
     not_finite[0, 3] = np.inf
     with ShardWriter(
-        tmp_path / "a.h5", n_records=1, signals=SIGNALS, params=["crack_depth_mm"], attributes=ATTRIBUTES
+        tmp_path / "a.h5",
+        n_records=1,
+        signals=SIGNALS,
+        params=["crack_depth_mm"],
+        attributes=ATTRIBUTES,
     ) as writer:
-        for wrong in ({"acceleration": not_finite}, {"acceleration": not_finite[:1]}, {"noise_power": np.ones(3)}):
+        for wrong in (
+            {"acceleration": not_finite},
+            {"acceleration": not_finite[:1]},
+            {"noise_power": np.ones(3)},
+        ):
             with pytest.raises(DatasetError, match=next(iter(wrong))):
                 writer.write(0, signals | wrong, values)
         with pytest.raises(DatasetError, match="signal noise_power is missing"):
@@ -162,7 +186,11 @@ def test_declaration_that_could_not_be_read_back_is_refused(tmp_path: Path, chan
 @pytest.mark.parametrize("value", [{"a": 1}, None, ["a", 1, None], "a\0b", "x" * 70_000])
 def test_attribute_that_would_not_come_back_is_refused(tmp_path: Path, value: object) -> None:
     writer = ShardWriter(
-        tmp_path / "a.h5", n_records=1, signals=SIGNALS, params=[], attributes=ATTRIBUTES | {"odd": value}
+        tmp_path / "a.h5",
+        n_records=1,
+        signals=SIGNALS,
+        params=[],
+        attributes=ATTRIBUTES | {"odd": value},
     )
     with pytest.raises(DatasetError, match="odd"):
         writer.__enter__()
@@ -205,14 +233,23 @@ def _attribute(name: str, value: object) -> object:
         (_soft, "'more' is a link"),
         (_external, "'params/more' is a link"),
         (_virtual, "in another file"),
-        (_replace("torque_nm", shape=(10,), dtype="f8", external="/tmp/gensig-none.bin"), "in another file"),
+        (
+            _replace("torque_nm", shape=(10,), dtype="f8", external="/tmp/gensig-none.bin"),
+            "in another file",
+        ),
         (_replace("torque_nm", data=np.zeros(9)), "has shape"),
         (_replace("torque_nm", data=np.zeros((10, 1))), "axes"),
         (_replace("label", data=np.zeros(10)), "has type"),
         (_replace("acceleration", data=np.ones((10, 2, 200), "i4")), "wants float32 or int16"),
         (_replace("acceleration", data=np.ones((10, 2, 200), "u2")), "wants float32 or int16"),
-        (_replace("acceleration", data=np.ones((10, 2, 200), "i2")), "no data set acceleration_scale"),
-        (_replace("acceleration", data=np.ones((10, 2, 200)), scaleoffset=2), "allowed are gzip, lzf and blosc2"),
+        (
+            _replace("acceleration", data=np.ones((10, 2, 200), "i2")),
+            "no data set acceleration_scale",
+        ),
+        (
+            _replace("acceleration", data=np.ones((10, 2, 200)), scaleoffset=2),
+            "allowed are gzip, lzf and blosc2",
+        ),
         (_replace("label_name", data=["x"] * 10, dtype=h5py.string_dtype()), "has type object"),
         (_replace("label_name", data=np.zeros(10, dtype=[("a", "f8")])), "has type"),
         (_replace("acceleration", shape=(10, 2, 10**12), dtype="f4", chunks=(1, 2, 100)), "bomb"),
@@ -280,14 +317,18 @@ except DatasetError as error:
 @pytest.mark.parametrize(("limit", "fits"), [(20_000, False), (10_000_000, True)])
 def test_full_disk_is_one_line_and_leaves_nothing(tmp_path: Path, limit: int, fits: bool) -> None:
     command = [sys.executable, "-c", FULL_DISK, str(tmp_path), str(limit)]
-    run = subprocess.run(command, capture_output=True, text=True, cwd=Path(__file__).parents[1], check=False)
+    run = subprocess.run(
+        command, capture_output=True, text=True, cwd=Path(__file__).parents[1], check=False
+    )
     assert run.returncode == (0 if fits else 1)
     assert [path.name for path in tmp_path.iterdir()] == (["a.h5"] if fits else [])
     assert len(run.stderr.splitlines()) == (0 if fits else 1)
     assert fits or "cannot write" in run.stderr
 
 
-def test_exception_while_renaming_leaves_nothing(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+def test_exception_while_renaming_leaves_nothing(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
     def interrupt(*_: object) -> None:
         assert len(list(tmp_path.iterdir())) == 1  # the temporary file is there
         raise KeyboardInterrupt
@@ -301,7 +342,11 @@ def test_exception_while_renaming_leaves_nothing(tmp_path: Path, monkeypatch: py
 def test_a_reason_becomes_ascii_and_is_cut(tmp_path: Path) -> None:
     signals, values = row_of(make_plan(), 0, status="failed")
     with ShardWriter(
-        tmp_path / "a.h5", n_records=1, signals=SIGNALS, params=["crack_depth_mm"], attributes=ATTRIBUTES
+        tmp_path / "a.h5",
+        n_records=1,
+        signals=SIGNALS,
+        params=["crack_depth_mm"],
+        attributes=ATTRIBUTES,
     ) as writer:
         writer.write(0, signals, values | {"status_reason": "gap of 3 µm " + "x" * 300})
     with h5py.File(tmp_path / "a.h5") as file:

@@ -41,7 +41,9 @@ def _signals(folder: Path, name: str = "acceleration") -> np.ndarray:
 
 def _columns(folder: Path) -> dict[str, np.ndarray]:
     with open_dataset(folder) as data:
-        return {name: data.column(name) for name in data.column_names if not name.endswith("_scale")}
+        return {
+            name: data.column(name) for name in data.column_names if not name.endswith("_scale")
+        }
 
 
 def test_hdf5_is_one_shard_in_physical_units(stored: Path, tmp_path: Path) -> None:
@@ -67,20 +69,26 @@ def test_npz_needs_no_pickle(stored: Path, tmp_path: Path) -> None:
     export(stored, "npz", out)
     with np.load(out, allow_pickle=False) as arrays:
         np.testing.assert_array_equal(arrays["acceleration"], _signals(stored))
-        np.testing.assert_array_equal(arrays["acceleration_clean"], _signals(stored, "acceleration_clean"))
+        np.testing.assert_array_equal(
+            arrays["acceleration_clean"], _signals(stored, "acceleration_clean")
+        )
         for name, values in _columns(stored).items():
             np.testing.assert_array_equal(arrays[name], values)
         assert json.loads(str(arrays["attributes_json"])) == {"schema_version": 1, **ATTRIBUTES}
 
 
 @pytest.mark.parametrize("samples", [False, True])
-def test_parquet(stored: Path, tmp_path: Path, samples: bool, monkeypatch: pytest.MonkeyPatch) -> None:
+def test_parquet(
+    stored: Path, tmp_path: Path, samples: bool, monkeypatch: pytest.MonkeyPatch
+) -> None:
     monkeypatch.setattr(tables_module, "ROW_GROUP_BYTES", 3 * 2 * 2 * 200 * 4)
     out = tmp_path / "all.parquet"
     export(stored, "parquet", out, samples=samples)
     frame = pandas.read_parquet(out)
     for name, values in _columns(stored).items():
-        np.testing.assert_array_equal(np.stack(frame[name].to_numpy()) if values.ndim > 1 else frame[name], values)
+        np.testing.assert_array_equal(
+            np.stack(frame[name].to_numpy()) if values.ndim > 1 else frame[name], values
+        )
     assert ("acceleration" in frame) is samples
     if samples:
         found = np.array(frame["acceleration"].tolist()).tolist()
@@ -88,7 +96,9 @@ def test_parquet(stored: Path, tmp_path: Path, samples: bool, monkeypatch: pytes
     file = parquet.ParquetFile(out)
     assert file.schema_arrow.field("speed_rpm").metadata[b"unit"] == b"r/min"
     assert json.loads(file.schema_arrow.metadata[b"gensig"])["class_names"] == CLASSES
-    assert file.num_row_groups == (4 * 4 - 2 if samples else 4)  # 3 rows a group, 10, 10, 10 and 6 a shard
+    assert file.num_row_groups == (
+        4 * 4 - 2 if samples else 4
+    )  # 3 rows a group, 10, 10, 10 and 6 a shard
 
 
 @pytest.mark.parametrize("one_channel", [False, True])
@@ -109,7 +119,10 @@ def test_wav(stored: Path, tmp_path: Path, one_channel: bool) -> None:
         assert float(row["speed_rpm"]) == 1800.0 + record
         if one_channel:
             assert row["channel"] == ATTRIBUTES["channel_names"][channel]
-    assert json.loads((out / "attributes.json").read_text(encoding="utf-8"))["channel_units"] == ["m/s^2", "m/s^2"]
+    assert json.loads((out / "attributes.json").read_text(encoding="utf-8"))["channel_units"] == [
+        "m/s^2",
+        "m/s^2",
+    ]
 
 
 @pytest.mark.parametrize("to", FORMATS)
@@ -140,12 +153,17 @@ def test_a_full_disk_is_said_before_anything_is_written(
     assert not (tmp_path / "all.h5").exists()
 
 
-def test_mistakes_are_one_line(folder: Path, tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
+def test_mistakes_are_one_line(
+    folder: Path, tmp_path: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
     for arguments, message in (
         (["--to", "matlab", "--out", str(tmp_path / "x")], "allowed are hdf5, parquet, npz, wav"),
         (["--to", "npz", "--out", str(tmp_path / "no" / "x")], "there is no folder"),
         (["--to", "npz", "--out", str(folder / "x.npz")], "lies in the data set"),
-        (["--to", "npz", "--samples", "--out", str(tmp_path / "x")], "'samples' belongs to parquet"),
+        (
+            ["--to", "npz", "--samples", "--out", str(tmp_path / "x")],
+            "'samples' belongs to parquet",
+        ),
         (["--to", "npz", "--one-channel", "--out", str(tmp_path / "x")], "'one_channel' to wav"),
     ):
         assert main(["export", str(folder), *arguments]) == 2
@@ -165,7 +183,9 @@ def test_a_foreign_plan_names_no_file(folder: Path, tmp_path: Path) -> None:
     assert not list(tmp_path.rglob("evil*"))
 
 
-def test_incomplete_sets_and_odd_rates_are_refused(tmp_path: Path, plan: Plan, monkeypatch: pytest.MonkeyPatch) -> None:
+def test_incomplete_sets_and_odd_rates_are_refused(
+    tmp_path: Path, plan: Plan, monkeypatch: pytest.MonkeyPatch
+) -> None:
     with pytest.raises(DatasetError, match="is incomplete"):
         export(build(tmp_path / "a", plan, close=False), "npz", tmp_path / "x.npz")
     monkeypatch.setitem(ATTRIBUTES, "sampling_rate_hz", 1000.5)

@@ -29,16 +29,22 @@ def test_hugging_face_example_of_the_format(tmp_path: Path, plan: Plan, sample_t
     """The example in docs/format.md runs, and gives every record of every shard."""
     folder = build(tmp_path / "set", plan, sample_type=sample_type)
     (code,) = [
-        example for example in re.findall(r"```python\n(.*?)```", FORMAT, re.DOTALL) if "load_dataset" in example
+        example
+        for example in re.findall(r"```python\n(.*?)```", FORMAT, re.DOTALL)
+        if "load_dataset" in example
     ]
     names: dict = {}
     exec(code.replace("DIR", str(folder)), names)
     records = names["records"]
     assert len(records) == 36
     expected = row_of(plan, 0)[0]["acceleration"]
-    np.testing.assert_allclose(names["signal"], expected, rtol=0, atol=1e-4 if sample_type == "int16" else 0)
+    np.testing.assert_allclose(
+        names["signal"], expected, rtol=0, atol=1e-4 if sample_type == "int16" else 0
+    )
     for name in ("record_id", "label_name"):
-        np.testing.assert_array_equal([text.decode() for text in records[name][:]], plan.columns[name])
+        np.testing.assert_array_equal(
+            [text.decode() for text in records[name][:]], plan.columns[name]
+        )
     np.testing.assert_array_equal(records["label"][:], plan.columns["label"])
 
 
@@ -52,7 +58,11 @@ def test_hugging_face_takes_the_folder_by_its_card(folder: Path) -> None:
 
 def test_pandas(folder: Path, plan: Plan) -> None:
     """The example in docs/format.md: every column with one value a record becomes one of a frame."""
-    (code,) = [example for example in re.findall(r"```python\n(.*?)```", FORMAT, re.DOTALL) if "pandas" in example]
+    (code,) = [
+        example
+        for example in re.findall(r"```python\n(.*?)```", FORMAT, re.DOTALL)
+        if "pandas" in example
+    ]
     names: dict = {}
     exec(code.replace("DIR", str(folder)), names)
     frame = names["labels"]
@@ -65,12 +75,16 @@ def test_pandas(folder: Path, plan: Plan) -> None:
 @pytest.mark.parametrize("sample_type", ["float32", "int16"])
 def test_types_are_those_old_programs_know(tmp_path: Path, sample_type: str) -> None:
     """MATLAB and Octave are not run here: what their HDF5 readers cannot take is looked for in the file itself."""
-    folder = build(tmp_path / "set", make_plan(n_records=4, records_per_shard=4), sample_type=sample_type)
+    folder = build(
+        tmp_path / "set", make_plan(n_records=4, records_per_shard=4), sample_type=sample_type
+    )
     path = shard_path(folder, 0)
     assert path.read_bytes()[8] == 0  # superblock version 0, which every HDF5 library reads
     with h5py.File(path, locking=False) as file:
         found: list[str] = []
-        file.visititems(lambda name, item: found.append(name) if isinstance(item, h5py.Dataset) else None)
+        file.visititems(
+            lambda name, item: found.append(name) if isinstance(item, h5py.Dataset) else None
+        )
         assert {"acceleration", "label_name", "params/crack_depth_mm"} <= set(found)
         types = {name: file[name].id.get_type() for name in found}
         types |= {f"attribute {name}": file.attrs.get_id(name).get_type() for name in file.attrs}
@@ -79,7 +93,9 @@ def test_types_are_those_old_programs_know(tmp_path: Path, sample_type: str) -> 
                 assert not kind.is_variable_str(), name
                 assert kind.get_strpad() == h5py.h5t.STR_NULLPAD, name
                 utf8 = name.startswith("attribute")  # Octave reads no attributes
-                assert kind.get_cset() == (h5py.h5t.CSET_UTF8 if utf8 else h5py.h5t.CSET_ASCII), name
+                assert kind.get_cset() == (h5py.h5t.CSET_UTF8 if utf8 else h5py.h5t.CSET_ASCII), (
+                    name
+                )
                 assert kind.get_size() > 0, name
             else:
                 assert type(kind) in (h5py.h5t.TypeIntegerID, h5py.h5t.TypeFloatID), name
@@ -99,7 +115,11 @@ def test_types_are_those_old_programs_know(tmp_path: Path, sample_type: str) -> 
 def test_text_is_read_the_way_octave_asks_for_it(folder: Path, plan: Plan) -> None:
     """Octave's `load` wants every text as NUL-terminated ASCII and gives up at the first that cannot be had so."""
     with h5py.File(shard_path(folder, 0), locking=False) as file:
-        texts = [name for name, data in file.items() if isinstance(data, h5py.Dataset) and data.dtype.kind == "S"]
+        texts = [
+            name
+            for name, data in file.items()
+            if isinstance(data, h5py.Dataset) and data.dtype.kind == "S"
+        ]
         assert {"record_id", "label_name", "status_reason"} <= set(texts)
         for name in texts:
             data = file[name].id
@@ -108,7 +128,9 @@ def test_text_is_read_the_way_octave_asks_for_it(folder: Path, plan: Plan) -> No
             values = np.zeros(data.shape, f"S{wanted.get_size()}")
             data.read(h5py.h5s.ALL, h5py.h5s.ALL, values, mtype=wanted)
             np.testing.assert_array_equal(values, file[name][:])
-        assert file["label_name"][:].astype(str).tolist() == plan.columns["label_name"][:10].tolist()
+        assert (
+            file["label_name"][:].astype(str).tolist() == plan.columns["label_name"][:10].tolist()
+        )
 
 
 def test_utf8_text_could_not_be_read_that_way(tmp_path: Path) -> None:

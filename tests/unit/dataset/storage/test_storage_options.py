@@ -40,7 +40,9 @@ FAILED = 12
 def whole(tmp_path_factory: pytest.TempPathFactory) -> Path:
     """A set of int16 with blosc2, a failed record and signals without noise; read only."""
     out = tmp_path_factory.mktemp("whole") / "set"
-    return build(out, make_plan(), failed=FAILED, clean=True, compression="blosc2", sample_type="int16")
+    return build(
+        out, make_plan(), failed=FAILED, clean=True, compression="blosc2", sample_type="int16"
+    )
 
 
 def expected(index: int) -> np.ndarray:
@@ -60,7 +62,9 @@ def test_quantization_uses_the_whole_range_and_errs_by_half_a_count(peak: float)
     signal = (signal / np.abs(signal).max(axis=1, keepdims=True) * peak).astype(np.float32)
     counts, scale = quantized(signal)
     assert counts.dtype == np.int16
-    assert np.abs(counts.astype(int)).max(axis=1).tolist() == [32767] * 3  # -32768 would be one more
+    assert (
+        np.abs(counts.astype(int)).max(axis=1).tolist() == [32767] * 3
+    )  # -32768 would be one more
     error = np.abs(counts * scale[:, None] - signal)
     assert (error <= HALF_COUNT * scale[:, None]).all()
     assert error.max() < 10 ** (-90 / 20) * float(np.abs(signal).max())
@@ -82,9 +86,13 @@ def test_quantization_of_zero_constant_and_not_finite_channels() -> None:
 
 
 @pytest.mark.parametrize(("compression", "sample_type"), WAYS)
-def test_every_way_gives_the_signals_back(tmp_path: Path, plan: Plan, compression: str, sample_type: str) -> None:
+def test_every_way_gives_the_signals_back(
+    tmp_path: Path, plan: Plan, compression: str, sample_type: str
+) -> None:
     path = tmp_path / "a.h5"
-    write_shard(path, plan, 1, failed=FAILED, clean=True, compression=compression, sample_type=sample_type)
+    write_shard(
+        path, plan, 1, failed=FAILED, clean=True, compression=compression, sample_type=sample_type
+    )
     with open_shard(path) as file:
         for name, factor in (("acceleration", 1), ("acceleration_clean", 0.5)):
             assert file[name].dtype == sample_type
@@ -109,7 +117,9 @@ def test_every_way_gives_the_signals_back(tmp_path: Path, plan: Plan, compressio
 
 @pytest.mark.parametrize(("compression", "sample_type"), WAYS)
 @pytest.mark.parametrize("failed", [False, True])
-def test_silent_and_failed_shards_are_read(tmp_path: Path, compression: str, sample_type: str, failed: bool) -> None:
+def test_silent_and_failed_shards_are_read(
+    tmp_path: Path, compression: str, sample_type: str, failed: bool
+) -> None:
     """Blosc2 stores a constant record in so few bytes that it looks like a bomb."""
     plan, shape, path = make_plan(n_records=2), (2, 60_000), tmp_path / "a.h5"
     signals = {} if failed else {"acceleration": np.zeros(shape)}
@@ -145,7 +155,9 @@ def test_bytes_of_int16_depend_on_the_input_alone(
 ) -> None:
     kept = {"compression": compression, "sample_type": "int16"}
     first = write_shard(tmp_path / "a.h5", plan, **kept).sha256
-    monkeypatch.setenv("BLOSC_NTHREADS", "3")  # Blosc2 obeys its environment, and writes into the file that it did
+    monkeypatch.setenv(
+        "BLOSC_NTHREADS", "3"
+    )  # Blosc2 obeys its environment, and writes into the file that it did
     monkeypatch.setenv("BLOSC_CLEVEL", "1")
     monkeypatch.setenv("BLOSC_COMPRESSOR", "zstd")
     assert write_shard(tmp_path / "b.h5", plan, **kept).sha256 == first
@@ -169,7 +181,9 @@ def test_reader_gives_physical_values(whole: Path) -> None:
             signal, found = expected(index), data.signals(index)
             assert found.dtype == np.float32
             assert (np.abs(found - signal) <= bound(signal)).all()
-            np.testing.assert_array_equal(data.signals(index, 20, 70, ["wheel_ü"]), found[1:, 20:70])
+            np.testing.assert_array_equal(
+                data.signals(index, 20, 70, ["wheel_ü"]), found[1:, 20:70]
+            )
             np.testing.assert_array_equal(data.signals(index, channels=[1, 0]), found[::-1])
             clean = data.signals(index, name="acceleration_clean")
             assert (np.abs(clean - signal / 2) <= bound(signal / 2)).all()
@@ -196,7 +210,13 @@ def test_diagnosis_and_descriptions_go_through_the_scale(whole: Path, folder: Pa
     windows = []
     for path in (folder, whole):
         with open_dataset(path) as data:
-            task = task_of(data, window_samples=50, stride_samples=50, normalise="none", classes=["healthy", "pitting"])
+            task = task_of(
+                data,
+                window_samples=50,
+                stride_samples=50,
+                normalise="none",
+                classes=["healthy", "pitting"],
+            )
             windows.append(load_windows(task, subset_segments(task, "by_unit", "train")))
     kept = np.isin(windows[0].record, windows[1].record)  # the failed record is left out
     first, second = windows[0].cut(np.flatnonzero(kept)), windows[1].cut(np.arange(len(windows[1])))
@@ -206,7 +226,9 @@ def test_diagnosis_and_descriptions_go_through_the_scale(whole: Path, folder: Pa
     assert "acceleration (2, 200) float32, m/s^2" in text
     assert "int16 with a scale, compression blosc2" in text
     assert "float32, compression none" in inspect(folder)
-    assert "/acceleration (10, 2, 200) int16, 1, scale=acceleration_scale" in inspect(shard_path(whole, 0))
+    assert "/acceleration (10, 2, 200) int16, 1, scale=acceleration_scale" in inspect(
+        shard_path(whole, 0)
+    )
     card = (whole / "README.md").read_text()
     assert "times acceleration\\_scale" in card
     assert "blosc2 (read with hdf5plugin)" in card
@@ -238,7 +260,9 @@ def _forge(folder: Path, change: Callable[[h5py.File], None]) -> str:
     return "\n".join(verify(folder).problems)
 
 
-def _scale(value: float, *, name: str = "acceleration_scale", row: int = 4) -> Callable[[h5py.File], None]:
+def _scale(
+    value: float, *, name: str = "acceleration_scale", row: int = 4
+) -> Callable[[h5py.File], None]:
     def change(file: h5py.File) -> None:
         file[name][row, 1] = value
 
@@ -258,7 +282,10 @@ def _narrow_scale(file: h5py.File) -> None:
 @pytest.mark.parametrize(
     ("change", "message"),
     [
-        (_scale(np.nan), "shard-00001.h5 row 4: acceleration_scale is nan; it must be positive and finite"),
+        (
+            _scale(np.nan),
+            "shard-00001.h5 row 4: acceleration_scale is nan; it must be positive and finite",
+        ),
         (_scale(np.inf), "row 4: acceleration_scale is inf"),
         (_scale(0.0), "row 4: acceleration_scale is 0.0"),
         (_scale(-1e-3), "row 4: acceleration_scale is -0.001"),
@@ -269,7 +296,9 @@ def _narrow_scale(file: h5py.File) -> None:
         (_narrow_scale, "acceleration_scale has shape (10, 1), acceleration has (10, 2)"),
     ],
 )
-def test_verify_finds_a_scale_that_is_none(whole: Path, tmp_path: Path, change: Callable, message: str) -> None:
+def test_verify_finds_a_scale_that_is_none(
+    whole: Path, tmp_path: Path, change: Callable, message: str
+) -> None:
     folder = shutil.copytree(whole, tmp_path / "set")
     assert _forge(folder, lambda file: None) == ""  # forging alone changes nothing
     assert message in _forge(folder, change)
@@ -278,7 +307,9 @@ def test_verify_finds_a_scale_that_is_none(whole: Path, tmp_path: Path, change: 
 def test_verify_looks_at_signals_without_noise_too(tmp_path: Path, plan: Plan) -> None:
     folder = build(tmp_path / "set", plan, clean=True)
     assert _forge(folder, lambda file: None) == ""
-    assert "row 4: acceleration_clean is not finite" in _forge(folder, _scale(np.nan, name="acceleration_clean"))
+    assert "row 4: acceleration_clean is not finite" in _forge(
+        folder, _scale(np.nan, name="acceleration_clean")
+    )
 
 
 def test_reader_refuses_a_scale_that_is_none(whole: Path, tmp_path: Path) -> None:
@@ -291,14 +322,18 @@ def test_reader_refuses_a_scale_that_is_none(whole: Path, tmp_path: Path) -> Non
     assert "\n" not in str(caught.value)
 
 
-def test_missing_plugin_is_one_line(whole: Path, tmp_path: Path, plan: Plan, monkeypatch: pytest.MonkeyPatch) -> None:
+def test_missing_plugin_is_one_line(
+    whole: Path, tmp_path: Path, plan: Plan, monkeypatch: pytest.MonkeyPatch
+) -> None:
     monkeypatch.setitem(sys.modules, "hdf5plugin", None)
     for use in (
         lambda: write_shard(tmp_path / "a.h5", plan, compression="blosc2"),
         lambda: open_shard(shard_path(whole, 0)),
         lambda: open_dataset(whole),
     ):
-        with pytest.raises(DatasetError, match=r"blosc2.* needs the package hdf5plugin.*'gensig\[blosc2\]'") as caught:
+        with pytest.raises(
+            DatasetError, match=r"blosc2.* needs the package hdf5plugin.*'gensig\[blosc2\]'"
+        ) as caught:
             use()
         assert "\n" not in str(caught.value)
     assert "needs the package hdf5plugin" in "\n".join(verify(whole).problems)
@@ -307,7 +342,9 @@ def test_missing_plugin_is_one_line(whole: Path, tmp_path: Path, plan: Plan, mon
     assert verify(tmp_path / "gzip").complete
 
 
-def test_blosc2_bombs_are_refused(tmp_path: Path, plan: Plan, monkeypatch: pytest.MonkeyPatch) -> None:
+def test_blosc2_bombs_are_refused(
+    tmp_path: Path, plan: Plan, monkeypatch: pytest.MonkeyPatch
+) -> None:
     path = tmp_path / "a.h5"
     write_shard(path, plan, compression="blosc2")
     with h5py.File(path, "r+") as file:
@@ -339,7 +376,9 @@ def test_generated_int16_is_the_float32_set_but_for_half_a_count(tmp_path: Path)
     for name, words in ways.items():
         assert main(["generate", "--quiet", *SMALL, *words, f"out={tmp_path / name}"]) == 0
         assert main(["verify", str(tmp_path / name)]) == 0
-    assert (tmp_path / "small" / "plan.csv").read_bytes() == (tmp_path / "plain" / "plan.csv").read_bytes()
+    assert (tmp_path / "small" / "plan.csv").read_bytes() == (
+        tmp_path / "plain" / "plan.csv"
+    ).read_bytes()
     with open_dataset(tmp_path / "plain") as plain, open_dataset(tmp_path / "small") as small:
         assert plain.manifest.identity != small.manifest.identity
         assert (small.sample_type, small.compression) == ("int16", "blosc2")
@@ -354,12 +393,19 @@ def test_generated_int16_is_the_float32_set_but_for_half_a_count(tmp_path: Path)
     ("word", "message"),
     [
         ("dataset.sample_type=int8", "dataset.sample_type = 'int8'; allowed: float32, int16"),
-        ("dataset.compression=zip", "dataset.compression = 'zip'; allowed: none, gzip, lzf, blosc2"),
+        (
+            "dataset.compression=zip",
+            "dataset.compression = 'zip'; allowed: none, gzip, lzf, blosc2",
+        ),
         ("dataset.compression=blosc2", "dataset.compression=blosc2 needs the package hdf5plugin"),
     ],
 )
 def test_generate_refuses_before_it_touches_anything(
-    tmp_path: Path, word: str, message: str, monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
+    tmp_path: Path,
+    word: str,
+    message: str,
+    monkeypatch: pytest.MonkeyPatch,
+    capsys: pytest.CaptureFixture[str],
 ) -> None:
     monkeypatch.setitem(sys.modules, "hdf5plugin", None)
     assert main(["generate", "--quiet", *SMALL, word, f"out={tmp_path / 'set'}"]) != 0

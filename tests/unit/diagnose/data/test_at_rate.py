@@ -28,7 +28,9 @@ def test_rate_length_and_samples_are_those_of_the_lower_rate():
     assert (slower.sampling_rate, slower.n_samples) == (6400.0, dataset.n_samples // 2)
     assert slower.n_records == dataset.n_records
     assert_array_equal(slower.column("label"), dataset.column("label"))
-    healthy = int(np.flatnonzero(dataset.column("label") == 0)[0])  # its tones lie below 0.39 of 6400 Hz
+    healthy = int(
+        np.flatnonzero(dataset.column("label") == 0)[0]
+    )  # its tones lie below 0.39 of 6400 Hz
     inner = slice(50, -50)
     kept = dataset.signals(healthy)[:, ::2]
     assert_allclose(slower.signals(healthy)[:, inner], kept[:, inner], rtol=0, atol=2e-3)
@@ -62,7 +64,9 @@ def test_rates_that_cannot_be_are_refused():
 
 
 def test_windows_are_cut_at_the_lower_rate():
-    task = task_of(at_rate(FakeDataset(), 6400), window_samples=600, stride_samples=500, normalise="rms")
+    task = task_of(
+        at_rate(FakeDataset(), 6400), window_samples=600, stride_samples=500, normalise="rms"
+    )
     windows = load_windows(task, subset_segments(task, "random_window_leaky", "train"))
     assert {signal.shape for signal in windows.signals} == {(1, 800)}
 
@@ -84,16 +88,23 @@ def test_the_model_and_the_report_carry_the_rate(trained):
     assert json.loads((trained / "metrics.json").read_text())["sampling_rate_hz"] == 6400.0
 
 
-def test_predict_and_evaluate_take_what_is_as_fast_and_refuse_what_is_slower(trained, tmp_path, monkeypatch, capsys):
+def test_predict_and_evaluate_take_what_is_as_fast_and_refuse_what_is_slower(
+    trained, tmp_path, monkeypatch, capsys
+):
     model = str(trained / "models" / "by_unit-seed0")
     data = FakeDataset(n_units=12, records_per_unit=8, duration=0.5)
     np.savez(tmp_path / "fast.npz", acceleration=data.signals(80), sampling_rate_hz=12800)
-    np.savez(tmp_path / "own.npz", acceleration=at_rate(data, 6400).signals(80), sampling_rate_hz=6400)
+    np.savez(
+        tmp_path / "own.npz", acceleration=at_rate(data, 6400).signals(80), sampling_rate_hz=6400
+    )
     np.savez(tmp_path / "slow.npz", acceleration=data.signals(80), sampling_rate_hz=5120)
     capsys.readouterr()
     shown = []
     for name in ("fast", "own"):
-        assert main(["predict", "--model", model, str(tmp_path / f"{name}.npz"), "--json"]) in (0, 3)
+        assert main(["predict", "--model", model, str(tmp_path / f"{name}.npz"), "--json"]) in (
+            0,
+            3,
+        )
         shown.append(json.loads(capsys.readouterr().out))
     first, second = (list(result["probabilities"].values()) for result in shown)
     assert_allclose(first, second, rtol=0, atol=1e-4)
@@ -101,8 +112,12 @@ def test_predict_and_evaluate_take_what_is_as_fast_and_refuse_what_is_slower(tra
     assert "the model was trained at 6400" in capsys.readouterr().err
     monkeypatch.setattr(gensig.dataset.reader, "open_dataset", lambda path: data)
     assert main(["evaluate", "data=good", f"model_dir={model}"]) == 0
-    expected = json.loads((trained / "metrics.json").read_text())["protocols"]["by_unit"]["methods"]["cnn"]
-    assert f"balanced_accuracy {expected['balanced_accuracy']['mean']:.3f}" in capsys.readouterr().out
+    expected = json.loads((trained / "metrics.json").read_text())["protocols"]["by_unit"][
+        "methods"
+    ]["cnn"]
+    assert (
+        f"balanced_accuracy {expected['balanced_accuracy']['mean']:.3f}" in capsys.readouterr().out
+    )
 
 
 def test_a_rate_that_is_no_number_is_refused(tmp_path, capsys):

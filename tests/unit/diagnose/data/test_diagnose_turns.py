@@ -141,7 +141,9 @@ def test_the_place_loss_is_small_where_the_scores_point_at_the_fault_only():
     turns = ((1, 23), (2, 84))
     label, gear, place = torch.tensor([1, 1]), torch.tensor([1, 2]), torch.tensor([22.5, 40.0])
     right = torch.zeros(2, 2, 107 * PER_TOOTH)
-    right[0, 1, 1 * PER_TOOTH] = 20.0  # a tooth and a half after the last tooth but a half: around the end of the turn
+    right[0, 1, 1 * PER_TOOTH] = (
+        20.0  # a tooth and a half after the last tooth but a half: around the end of the turn
+    )
     right[1, 1, (23 + 41) * PER_TOOTH] = 20.0
     wrong = right.flip(0)  # at the other gear
     assert place_loss(right, label, gear, place, turns) < 1e-3
@@ -178,14 +180,22 @@ def test_a_visible_fault_is_learnt_stored_judged_and_predicted(dataset, tmp_path
         on_done=lambda _: None,
     )
     label = task.labels()[found.record]
-    assert balanced_accuracy(confusion_by_unit(label, found.predicted, np.zeros_like(label), 2)[0]) > 0.8
+    assert (
+        balanced_accuracy(confusion_by_unit(label, found.predicted, np.zeros_like(label), 2)[0])
+        > 0.8
+    )
     scores = head_scores(
         task,
         subset_segments(task, "by_unit", "train").record,
         [found],
         n_bootstrap=50,
     )
-    assert scores["faulted_gear"]["balanced_accuracy"]["mean"] > 0.7 > scores["faulted_gear"]["chance"] == 0.5
+    assert (
+        scores["faulted_gear"]["balanced_accuracy"]["mean"]
+        > 0.7
+        > scores["faulted_gear"]["chance"]
+        == 0.5
+    )
     json.dumps(scores, allow_nan=False)
     assert len(heads_notes({"by_unit": {"heads": scores}})) == 1
 
@@ -258,7 +268,9 @@ def test_bad_settings_are_refused_in_one_line(dataset, override, line):
 
 def test_what_a_turn_needs_and_is_not_there_is_said(dataset):
     without = FakeDataset(duration=0.01)
-    without.attributes = {name: value for name, value in without.attributes.items() if name != "n_teeth_wheel"}
+    without.attributes = {
+        name: value for name, value in without.attributes.items() if name != "n_teeth_wheel"
+    }
     with pytest.raises(ConfigError, match="does not say n_teeth_wheel"):
         make_settings(without)
     short = FakeDataset(duration=0.01)

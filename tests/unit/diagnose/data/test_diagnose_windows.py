@@ -27,12 +27,18 @@ WINDOW = {"window_samples": 700, "stride_samples": 300}
 
 
 def make_task(dataset=None, **changes):
-    dataset = dataset if dataset is not None else FakeDataset(n_units=4, records_per_unit=4, n_channels=2)
+    dataset = (
+        dataset if dataset is not None else FakeDataset(n_units=4, records_per_unit=4, n_channels=2)
+    )
     return task_of(dataset, **{**WINDOW, "normalise": "rms", **changes})
 
 
 def samples_of(record, start, length):
-    return {(int(r), s) for r, first in zip(record, start, strict=True) for s in range(first, first + length)}
+    return {
+        (int(r), s)
+        for r, first in zip(record, start, strict=True)
+        for s in range(first, first + length)
+    }
 
 
 class PlannedDataset(FakeDataset):
@@ -42,10 +48,15 @@ class PlannedDataset(FakeDataset):
         super().__init__(n_units=12, records_per_unit=8, n_channels=1)
         rng = np.random.default_rng(5)
         unit = self.columns["unit_id"]
-        columns = {name: self.columns[name] for name in ("record_id", "label", "severity", "unit_id")}
+        columns = {
+            name: self.columns[name] for name in ("record_id", "label", "severity", "unit_id")
+        }
         self.plan = Plan(
             columns=columns
-            | {name: np.repeat(rng.uniform(1, 2, 24), 4) for name in ("speed_set_rpm", "torque_nm", "snr_db")}
+            | {
+                name: np.repeat(rng.uniform(1, 2, 24), 4)
+                for name in ("speed_set_rpm", "torque_nm", "snr_db")
+            }
             | {"gearbox_id": np.char.add("g", unit), "specimen_id": np.char.add("s", unit)}
             | {"shard": np.zeros(self.n_records, dtype=int), "row": np.arange(self.n_records)}
             | {"faults_json": np.where(columns["label"] == 0, "[]", "[{}]")}
@@ -56,8 +67,13 @@ class PlannedDataset(FakeDataset):
     def split(self, protocol):
         table = self.tables[protocol]
         number = [int(name.lstrip("r")) for name in table.record_id]
-        rows = list(zip(number, table.start_fraction.tolist(), table.stop_fraction.tolist(), strict=True))
-        return {s: [row for row, mine in zip(rows, table.subset == s, strict=True) if mine] for s in SUBSETS}
+        rows = list(
+            zip(number, table.start_fraction.tolist(), table.stop_fraction.tolist(), strict=True)
+        )
+        return {
+            s: [row for row, mine in zip(rows, table.subset == s, strict=True) if mine]
+            for s in SUBSETS
+        }
 
 
 def test_the_planned_data_set_has_every_protocol():
@@ -95,7 +111,9 @@ def test_units_are_on_one_side_only_but_for_the_leaky_protocol():
     unit = task.dataset.column("unit_id")
     units = [set(unit[subset_segments(task, "by_unit", subset).record]) for subset in SUBSETS]
     assert all(not a & b for a, b in itertools.combinations(units, 2))
-    leaky = [set(unit[subset_segments(task, "random_window_leaky", subset).record]) for subset in SUBSETS]
+    leaky = [
+        set(unit[subset_segments(task, "random_window_leaky", subset).record]) for subset in SUBSETS
+    ]
     assert leaky[0] & leaky[2]
 
 
@@ -113,7 +131,9 @@ def test_random_training_windows_stay_in_their_stretch():
 
 
 def test_plan_windows_counts():
-    segments = Segments(record=np.array([4, 9, 9]), start=np.array([0, 100, 500]), stop=np.array([1000, 400, 1000]))
+    segments = Segments(
+        record=np.array([4, 9, 9]), start=np.array([0, 100, 500]), stop=np.array([1000, 400, 1000])
+    )
     segment, start = plan_windows(segments, 400, 300)
     assert segment.tolist() == [0, 0, 0, 2]
     assert start.tolist() == [0, 300, 600, 500]
@@ -183,7 +203,11 @@ def test_torch_dataset_gives_the_same_from_several_workers(method):
     assert windows.class_names == CLASSES
     assert windows[0][0].shape == (2, 700)
     assert windows[0][0].dtype == torch.float32
-    loader = torch.utils.data.DataLoader(windows, batch_size=16, num_workers=2, multiprocessing_context=method)
+    loader = torch.utils.data.DataLoader(
+        windows, batch_size=16, num_workers=2, multiprocessing_context=method
+    )
     got = list(loader)
     assert torch.equal(torch.cat([label for _, label in got]), torch.from_numpy(windows.label))
-    assert torch.equal(torch.cat([x for x, _ in got]), torch.stack([windows[i][0] for i in range(len(windows))]))
+    assert torch.equal(
+        torch.cat([x for x, _ in got]), torch.stack([windows[i][0] for i in range(len(windows))])
+    )

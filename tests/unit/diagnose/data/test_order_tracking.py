@@ -56,14 +56,27 @@ def wandering(signal, speed_rpm, depth, *, n_swings=1.0):
     turned = time + depth / swing * (1 - np.cos(swing * time))
     turned = turned[turned < time[-1]]
     fine = resample(signal, 16 * signal.shape[1], axis=1)
-    stretched = np.stack([np.interp(turned * 16, np.arange(fine.shape[1]) / RATE, row) for row in fine])
+    stretched = np.stack(
+        [np.interp(turned * 16, np.arange(fine.shape[1]) / RATE, row) for row in fine]
+    )
     pulse = (np.mod(turned * speed_rpm / 60 - 0.3, 1.0) < 0.1).astype(float)
     return stretched, pulse
 
 
 def csv(path, signal, pulse=None):
-    columns = {"channel_0": signal[0], "channel_1": signal[1], **({} if pulse is None else {"pulses": 5.0 * pulse})}
-    np.savetxt(path, np.column_stack(list(columns.values())), "%.7g", ",", header=",".join(columns), comments="")
+    columns = {
+        "channel_0": signal[0],
+        "channel_1": signal[1],
+        **({} if pulse is None else {"pulses": 5.0 * pulse}),
+    }
+    np.savetxt(
+        path,
+        np.column_stack(list(columns.values())),
+        "%.7g",
+        ",",
+        header=",".join(columns),
+        comments="",
+    )
     return [str(path), "--sampling-rate", str(RATE)]
 
 
@@ -87,7 +100,9 @@ def test_a_steady_recording_says_the_same_tracked(model, record, tmp_path, capsy
     _, plain = asked(capsys, model, [*words, "--channels", "channel_0", "channel_1"])
     _, by_tacho = asked(capsys, model, [*words, "--tacho", "pulses"])
     _, by_mesh = asked(
-        capsys, model, [*csv(tmp_path / "m.csv", steady), "--speed-rpm", f"{speed:.0f}", "--teeth", *TEETH]
+        capsys,
+        model,
+        [*csv(tmp_path / "m.csv", steady), "--speed-rpm", f"{speed:.0f}", "--teeth", *TEETH],
     )
     for tracked, tolerance in ((by_tacho, 2e-4), (by_mesh, 1e-3)):
         assert_allclose(tracked["order_tracking"]["speed_rpm"], speed, rtol=tolerance)
@@ -112,7 +127,9 @@ def test_tachometer_undoes_a_run_from_slow_to_fast(tmp_path):
     near = np.abs(np.arange(spectrum.shape[1]) - line) < 6
     assert np.sum(spectrum[0][near] ** 2) > 0.995 * np.sum(spectrum[0] ** 2)
     as_made = np.abs(np.fft.rfft(signal[0] * np.hanning(signal.shape[1])))
-    assert np.sum(np.sort(as_made**2)[-12:]) < 0.2 * np.sum(as_made**2)  # the run itself smears the line
+    assert np.sum(np.sort(as_made**2)[-12:]) < 0.2 * np.sum(
+        as_made**2
+    )  # the run itself smears the line
 
 
 def test_nothing_folds_where_the_run_is_slow():
@@ -122,7 +139,9 @@ def test_nothing_folds_where_the_run_is_slow():
     pulse = (np.mod(turns, 1.0) < 0.2).astype(float)
     high = np.sin(2 * np.pi * 5500.0 * time) * (turns < 12.0)
     recording = Recording(sensors=("a",), acceleration=high[None], sampling_rate=float(RATE))
-    played = at_constant_speed(track_by_tacho(recording, pulse, "p", pulses_per_turn=1), RATE, 1800.0)
+    played = at_constant_speed(
+        track_by_tacho(recording, pulse, "p", pulses_per_turn=1), RATE, 1800.0
+    )
     inner = played[0, 500 : round(10.0 / 30.0 * RATE)]
     assert np.sqrt(np.mean(inner**2)) < 1e-2
 
@@ -135,7 +154,11 @@ def test_a_speed_that_wanders_is_played_at_its_mean(model, how, tmp_path, capsys
         moved, pulse = wandering(data.signals(record), speed, 0.02)
         steady, _ = wandering(data.signals(record), speed, 0.0)
         words = csv(tmp_path / "w.csv", moved, pulse if how == "tacho" else None)
-        words += ["--tacho", "pulses"] if how == "tacho" else ["--teeth", *TEETH, "--speed-rpm", f"{speed:.0f}"]
+        words += (
+            ["--tacho", "pulses"]
+            if how == "tacho"
+            else ["--teeth", *TEETH, "--speed-rpm", f"{speed:.0f}"]
+        )
         _, tracked = asked(capsys, model, [*words, "--to-speed", f"{speed:.6g}"])
         _, plain = asked(capsys, model, csv(tmp_path / "s.csv", steady))
         facts = tracked["order_tracking"]
@@ -150,13 +173,25 @@ def test_a_speed_outside_the_training_is_said_whatever_it_is_played_at(model, tm
     data = fake(duration=1.0)
     low, high = load_model(model)[1].speed_rpm_range
     signal, pulse = wandering(data.signals(80), 2.0 * high, 0.0)
-    words = [*csv(tmp_path / "r.csv", signal, pulse), "--tacho", "pulses", "--to-speed", f"{high - 1:.4f}"]
+    words = [
+        *csv(tmp_path / "r.csv", signal, pulse),
+        "--tacho",
+        "pulses",
+        "--to-speed",
+        f"{high - 1:.4f}",
+    ]
     status, result = asked(capsys, model, words)
     assert status == 2  # half as fast holds half the band
     assert "played at" in result
     assert f"the model was trained at {RATE}" in result
     signal, pulse = wandering(data.signals(80), 0.5 * low, 0.0)
-    words = [*csv(tmp_path / "r.csv", signal, pulse), "--tacho", "pulses", "--to-speed", f"{low + 1:.4f}"]
+    words = [
+        *csv(tmp_path / "r.csv", signal, pulse),
+        "--tacho",
+        "pulses",
+        "--to-speed",
+        f"{low + 1:.4f}",
+    ]
     status, result = asked(capsys, model, words)
     assert status == 3
     assert any("is outside the" in reason for reason in result["reasons"])
@@ -198,16 +233,34 @@ def test_what_cannot_be_tracked_is_refused_in_one_line(model, tmp_path, capsys):
     for given, message in [
         ([*words, "--tacho", "tach"], "no channel tach; it has channel_0, channel_1, pulses"),
         ([*words, "--tacho", "pulses", "--pulses-per-turn", "60"], "span no two turns"),
-        ([*words, "--tacho", "pulses", "--pulses-per-turn", "0"], "--pulses-per-turn 0 must be at least 1"),
-        ([*words, "--tacho", "pulses", "--pulses-per-turn", "2", "--speed-rpm", f"{speed:.0f}"], "--speed-rpm says"),
-        ([*words, "--tacho", "channel_0", "--channels", "channel_1", "pulses"], "the time between pulses jumps"),
-        ([*csv(tmp_path / "lost.csv", signal, lost), "--tacho", "pulses"], "a pulse too few or too many"),
+        (
+            [*words, "--tacho", "pulses", "--pulses-per-turn", "0"],
+            "--pulses-per-turn 0 must be at least 1",
+        ),
+        (
+            [*words, "--tacho", "pulses", "--pulses-per-turn", "2", "--speed-rpm", f"{speed:.0f}"],
+            "--speed-rpm says",
+        ),
+        (
+            [*words, "--tacho", "channel_0", "--channels", "channel_1", "pulses"],
+            "the time between pulses jumps",
+        ),
+        (
+            [*csv(tmp_path / "lost.csv", signal, lost), "--tacho", "pulses"],
+            "a pulse too few or too many",
+        ),
         ([*words, "--to-speed", "1500"], "--to-speed needs order tracking"),
         ([*words, "--tacho", "pulses", "--to-speed", "9000"], "--to-speed 9000 must lie in the"),
         ([*words, "--teeth", "2", "84"], "--teeth 2 84: a gear has 4 to 1000 teeth"),
         ([*noisy, "--teeth", *TEETH, "--speed-rpm", "1500"], "sign of the mesh"),
-        ([*short, "--teeth", *TEETH, "--speed-rpm", "1200"], "turns of the slower gear, at least 4 are needed"),
-        ([*short, "--teeth", *TEETH, "--speed-rpm", "24.46"], "is 24.46 r/min in Hz? Then say 1467.6"),
+        (
+            [*short, "--teeth", *TEETH, "--speed-rpm", "1200"],
+            "turns of the slower gear, at least 4 are needed",
+        ),
+        (
+            [*short, "--teeth", *TEETH, "--speed-rpm", "24.46"],
+            "is 24.46 r/min in Hz? Then say 1467.6",
+        ),
         ([*noisy, "--teeth", "40", "84", "--speed-rpm", "1500"], "sidebands look like the mesh"),
         ([*noisy, "--teeth", *TEETH, "--speed-rpm", "15000"], "lies above 5000 Hz"),
     ]:
@@ -221,7 +274,9 @@ def test_the_line_tells_what_was_done(model, tmp_path, capsys):
     data = fake(duration=1.0)
     signal, pulse = wandering(data.signals(80), 1234.0, 0.01)
     capsys.readouterr()
-    main(["predict", "--model", model, *csv(tmp_path / "r.csv", signal, pulse), "--tacho", "pulses"])
+    main(
+        ["predict", "--model", model, *csv(tmp_path / "r.csv", signal, pulse), "--tacho", "pulses"]
+    )
     line = capsys.readouterr().out.strip()
     assert "(speed by tacho, 12" in line
     assert "played at 12" in line

@@ -43,9 +43,14 @@ def test_items_are_those_of_the_stored_set(protocol, changes):
 
 def test_without_a_protocol_every_record_is_cut_whole():
     windows = StreamingDataset(FakeStream(), **WINDOW)
-    stored = [VibrationDataset(FakeStream().dataset, "by_unit", subset, **WINDOW) for subset in ("train", "validation")]
+    stored = [
+        VibrationDataset(FakeStream().dataset, "by_unit", subset, **WINDOW)
+        for subset in ("train", "validation")
+    ]
     assert windows.n_windows == 16 * 9
-    assert bits(windows)[: 12 * 9] == [item for part in stored for item in bits(part[i] for i in range(len(part)))]
+    assert bits(windows)[: 12 * 9] == [
+        item for part in stored for item in bits(part[i] for i in range(len(part)))
+    ]
 
 
 def test_workers_share_the_records_out_in_a_fixed_order():
@@ -54,7 +59,9 @@ def test_workers_share_the_records_out_in_a_fixed_order():
     assert shared != alone
     assert Counter(shared) == Counter(alone)
     assert bits(loader(windows, 2)) == shared
-    first, second = ([alone[i] for i in range(16 * 9) if i // 36 % 2 == worker] for worker in (0, 1))
+    first, second = (
+        [alone[i] for i in range(16 * 9) if i // 36 % 2 == worker] for worker in (0, 1)
+    )
     assert shared == [item for pair in zip(first, second, strict=True) for item in pair]
 
 
@@ -84,7 +91,9 @@ def test_epochs_follow_one_another_in_one_pass():
 
 
 def test_endless_worker_that_gets_nothing_stops():
-    windows = StreamingDataset(FakeStream(), "by_unit", "test", **WINDOW, n_epochs=None)  # one condition
+    windows = StreamingDataset(
+        FakeStream(), "by_unit", "test", **WINDOW, n_epochs=None
+    )  # one condition
     assert len(bits(itertools.islice(loader(windows, 2), 50))) == 50
 
 
@@ -103,7 +112,9 @@ def test_failed_records_are_left_out_and_others_must_be_finite():
     alone = bits(StreamingDataset(whole, **WINDOW))
     kept = [item for place, item in enumerate(alone) if place // 9 not in (3, 5)]
     assert bits(StreamingDataset(less, **WINDOW)) == kept
-    with pytest.raises(DatasetError, match="record r00000: its signal holds values that are not finite"):
+    with pytest.raises(
+        DatasetError, match="record r00000: its signal holds values that are not finite"
+    ):
         next(iter(StreamingDataset(FakeStream(noise=np.nan), **WINDOW)))
 
 

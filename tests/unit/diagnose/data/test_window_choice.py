@@ -79,7 +79,9 @@ def test_a_split_that_cuts_records_shorter_is_left_out_with_the_reason():
         choose_protocols(task, ("random_window_leaky",))
 
 
-@pytest.mark.parametrize("word", ["window_samples=0", "stride_samples=-1", "window_samples=1.5", "window_samples=long"])
+@pytest.mark.parametrize(
+    "word", ["window_samples=0", "stride_samples=-1", "window_samples=1.5", "window_samples=long"]
+)
 def test_what_is_no_length_is_refused(word):
     with pytest.raises(ConfigError, match="must be a whole number of at least 1"):
         settings_of(word)

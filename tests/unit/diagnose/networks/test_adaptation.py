@@ -68,7 +68,9 @@ def healthy_of(windows):
 def network(name):
     """A network whose batch normalisations know moments, of all classes as in training."""
     torch.manual_seed(0)
-    model = build_model(compose("train", ["data=x", "out=y", f"model={name}"])["model"], n_channels=2, n_classes=4)
+    model = build_model(
+        compose("train", ["data=x", "out=y", f"model={name}"])["model"], n_channels=2, n_classes=4
+    )
     for layer in model.modules():
         if isinstance(layer, torch.nn.BatchNorm1d):
             layer.running_mean.normal_(0.0, 0.1)
@@ -79,7 +81,9 @@ def network(name):
 
 def moved(windows, gain):
     """The same windows through another path: a gain for each channel."""
-    return replace(windows, signals=tuple((gain * signal).astype(np.float32) for signal in windows.signals))
+    return replace(
+        windows, signals=tuple((gain * signal).astype(np.float32) for signal in windows.signals)
+    )
 
 
 def heard_at_the_machine(name, method, windows, gain):
@@ -123,7 +127,10 @@ def test_a_mixture_taken_for_healthy_is_adaptive_batch_normalisation_as_publishe
     right = dict(adapt_network(model, target, healthy, "adabn").named_modules())[first]
     own = dict(model.named_modules())[first]
     assert_allclose(
-        naive.running_mean.numpy(), target.mean[first], rtol=0, atol=1e-4 * np.abs(target.mean[first]).max()
+        naive.running_mean.numpy(),
+        target.mean[first],
+        rtol=0,
+        atol=1e-4 * np.abs(target.mean[first]).max(),
     )
     assert_allclose(right.running_mean.numpy(), own.running_mean.numpy(), rtol=0, atol=1e-6)
     assert_allclose(right.running_var.numpy(), own.running_var.numpy(), rtol=1e-4, atol=0)
@@ -168,7 +175,9 @@ def test_coral_keeps_directions_of_which_few_windows_say_nothing(windows):
                   label=source.label[:9], record=source.record[:9])  # fmt: skip
     adapted = adapt_network(model, statistics_of(model, source), one, "coral")
     assert np.abs(adapted.head.weight.detach().numpy()).max() < 20.0
-    assert_allclose(scores(adapted, one).mean(axis=0), scores(model, source).mean(axis=0), rtol=0, atol=1e-3)
+    assert_allclose(
+        scores(adapted, one).mean(axis=0), scores(model, source).mean(axis=0), rtol=0, atol=1e-3
+    )
 
 
 def test_coral_needs_linear_scores_and_adabn_batch_normalisation(windows):
@@ -190,7 +199,9 @@ def test_the_domain_moves_as_healthy_windows_do_and_no_farther(windows):
     assert_allclose(distances(shifted, far), distances(domain, windows), rtol=0, atol=1e-3)
     assert shifted.threshold == domain.threshold
     rng = np.random.default_rng(0)
-    noise = replace(far, signals=tuple(rng.standard_normal(s.shape).astype(np.float32) for s in far.signals))
+    noise = replace(
+        far, signals=tuple(rng.standard_normal(s.shape).astype(np.float32) for s in far.signals)
+    )
     assert (distances(shifted, noise) > shifted.threshold).mean() == 1.0
 
 
@@ -216,7 +227,9 @@ def test_statistics_of_another_network_are_refused(windows):
     healthy = healthy_of(windows)
     for method in METHODS:
         with pytest.raises(DatasetError, match="another network"):
-            adapt_network(network("cnn"), statistics_of(network("spectrum"), healthy), healthy, method)
+            adapt_network(
+                network("cnn"), statistics_of(network("spectrum"), healthy), healthy, method
+            )
     own = statistics_of(network("cnn"), healthy)
     with pytest.raises(DatasetError, match="another out-of-distribution flag"):
         adapt_domain(fit_domain(windows, windows), replace(own, levels=own.levels[:3]), healthy)
@@ -251,17 +264,36 @@ def test_the_command_writes_a_model_that_predict_takes_and_that_says_what_it_is(
     method, model, recordings, tmp_path, capsys
 ):
     out = tmp_path / "mine"
-    assert main(["adapt", "--model", model, "--healthy", *recordings[:2], "--method", method, "--out", str(out)]) == 0
+    assert (
+        main(
+            [
+                "adapt",
+                "--model",
+                model,
+                "--healthy",
+                *recordings[:2],
+                "--method",
+                method,
+                "--out",
+                str(out),
+            ]
+        )
+        == 0
+    )
     said = capsys.readouterr().out
     assert "2 healthy recording(s)" in said
     assert "docs/howto/bridge.md" in said
     told = json.loads((out / "model.json").read_text())["adaptation"]
     assert (told["method"], told["matched"]) == (method, "healthy")
-    assert [one["file"] for one in told["recordings"]] == [Path(file).name for file in recordings[:2]]
+    assert [one["file"] for one in told["recordings"]] == [
+        Path(file).name for file in recordings[:2]
+    ]
     assert all(len(one["sha256"]) == 64 and one["n_windows"] == 9 for one in told["recordings"])
     before, after = (load_file(Path(folder) / "model.safetensors") for folder in (model, out))
     changed = {name for name in after if not np.array_equal(after[name], before[name])}
-    moving = ("running_mean", "running_var") if method == "adabn" else ("head.1.weight", "head.1.bias")
+    moving = (
+        ("running_mean", "running_var") if method == "adabn" else ("head.1.weight", "head.1.bias")
+    )
     assert changed
     assert all(name.endswith((*moving, "domain.levels")) for name in changed)
     assert not any(name.startswith("adaptation.") for name in after)
@@ -280,7 +312,15 @@ def test_the_command_writes_a_model_that_predict_takes_and_that_says_what_it_is(
     ],
 )
 def test_mistakes_are_one_line(words, message, model, recordings, tmp_path, capsys):
-    given = ["adapt", "--model", model, "--healthy", *recordings[:2], "--out", str(tmp_path / "mine")]
+    given = [
+        "adapt",
+        "--model",
+        model,
+        "--healthy",
+        *recordings[:2],
+        "--out",
+        str(tmp_path / "mine"),
+    ]
     assert main([*given, "--method", "adabn", *words]) == 2
     error = capsys.readouterr().err
     assert message in error
@@ -295,7 +335,11 @@ def test_what_cannot_be_adapted_is_refused(model, recordings, tmp_path, capsys):
         assert message in capsys.readouterr().err
 
     short = str(tmp_path / "short.npz")
-    np.savez(short, acceleration=np.random.default_rng(0).standard_normal((2, 3000)), sampling_rate_hz=RATE)
+    np.savez(
+        short,
+        acceleration=np.random.default_rng(0).standard_normal((2, 3000)),
+        sampling_rate_hz=RATE,
+    )
     refused("4 window(s)", files=[short])
     (tmp_path / "full").mkdir()
     (tmp_path / "full" / "x").write_text("mine")
@@ -307,6 +351,10 @@ def test_what_cannot_be_adapted_is_refused(model, recordings, tmp_path, capsys):
     old = tmp_path / "old"
     old.mkdir()
     (old / "model.json").write_bytes((Path(model) / "model.json").read_bytes())
-    kept = {k: v for k, v in load_file(Path(model) / "model.safetensors").items() if not k.startswith("adaptation.")}
+    kept = {
+        k: v
+        for k, v in load_file(Path(model) / "model.safetensors").items()
+        if not k.startswith("adaptation.")
+    }
     save_file(kept, old / "model.safetensors")
     refused("stores no healthy statistics", folder=old)

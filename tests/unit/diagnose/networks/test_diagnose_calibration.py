@@ -45,7 +45,9 @@ def test_no_error_on_few_records_is_no_certainty():
     temperature = fit_temperature(log_probability, label)
     assert 0.2 < temperature < 1.0
     # the more records, the surer
-    assert fit_temperature(np.tile(log_probability, (50, 1)), np.tile(label, 50)) < 0.7 * temperature
+    assert (
+        fit_temperature(np.tile(log_probability, (50, 1)), np.tile(label, 50)) < 0.7 * temperature
+    )
 
 
 def test_calibration_error_in_closed_form():

@@ -26,20 +26,33 @@ NAMES = ("cnn", "wdcnn", "spectrum")
 
 
 def make_settings(*overrides):
-    few = ["window_samples=1200", "stride_samples=1000", "seeds=[0]", "n_threads=1", "n_bootstrap=100"]
+    few = [
+        "window_samples=1200",
+        "stride_samples=1000",
+        "seeds=[0]",
+        "n_threads=1",
+        "n_bootstrap=100",
+    ]
     return settings_from(compose("train", ["data=x", "out=y", *few, *overrides]))
 
 
 def make_model(name, n_channels=1, n_classes=4):
     torch.manual_seed(0)
-    return build_model(make_settings(f"model={name}").model, n_channels=n_channels, n_classes=n_classes).eval()
+    return build_model(
+        make_settings(f"model={name}").model, n_channels=n_channels, n_classes=n_classes
+    ).eval()
 
 
 @pytest.fixture(scope="module")
 def task():
     torch.set_num_threads(1)
     dataset = FakeDataset(
-        n_units=16, records_per_unit=8, classes=("healthy", "missing_tooth"), duration=0.3, noise=0.4, seed=1
+        n_units=16,
+        records_per_unit=8,
+        classes=("healthy", "missing_tooth"),
+        duration=0.3,
+        noise=0.4,
+        seed=1,
     )
     return task_from(dataset, make_settings())
 
@@ -105,11 +118,20 @@ def test_spectrum_network_is_blind_to_sign_and_gain_and_the_others_are_not():
 @pytest.mark.parametrize("name", ["wdcnn", "spectrum"])
 def test_a_visible_fault_is_learnt_and_what_was_learnt_can_be_stored(name, task, tmp_path):
     settings = make_settings(
-        f"model={name}", "epochs=8", "epoch_fraction=0.6", "learning_rate=0.01", "protocols=[by_unit]"
+        f"model={name}",
+        "epochs=8",
+        "epoch_fraction=0.6",
+        "learning_rate=0.01",
+        "protocols=[by_unit]",
     )
-    (found,) = run_jobs(task, settings, [Job(protocols=("by_unit",), seed=0)], n_workers=1, on_done=lambda _: None)
+    (found,) = run_jobs(
+        task, settings, [Job(protocols=("by_unit",), seed=0)], n_workers=1, on_done=lambda _: None
+    )
     label = task.labels()[found.record]
-    assert balanced_accuracy(confusion_by_unit(label, found.predicted, np.zeros_like(label), 2)[0]) > 0.8
+    assert (
+        balanced_accuracy(confusion_by_unit(label, found.predicted, np.zeros_like(label), 2)[0])
+        > 0.8
+    )
     assert len(found.validation_loss) <= 8
     assert 0.02 < found.temperature < 50
     save_model(tmp_path / "m", found.weights, model_description(task, settings, found))
@@ -125,10 +147,15 @@ def test_a_visible_fault_is_learnt_and_what_was_learnt_can_be_stored(name, task,
 @pytest.mark.parametrize("name", NAMES)
 def test_same_seed_same_weights(name, task):
     settings = make_settings(f"model={name}", "epochs=1", "epoch_fraction=0.2")
-    sets = [load_windows(task, subset_segments(task, "by_unit", part)) for part in ("train", "validation")]
+    sets = [
+        load_windows(task, subset_segments(task, "by_unit", part))
+        for part in ("train", "validation")
+    ]
 
     def weights(seed):
-        model = train_network(*sets, target=Classes(n_classes=2), settings=settings, seed=seed).model
+        model = train_network(
+            *sets, target=Classes(n_classes=2), settings=settings, seed=seed
+        ).model
         return torch.cat([value.flatten().double() for value in model.state_dict().values()])
 
     first = weights(3)
@@ -139,11 +166,16 @@ def test_same_seed_same_weights(name, task):
 def test_the_last_epoch_stands_beside_the_best_one(task):
     """Validation labels the wrong way round: what is learnt makes it worse, so that the best epoch is an early one."""
     settings = make_settings("epochs=5", "patience=5", "epoch_fraction=0.6", "learning_rate=0.01")
-    train, validation = (load_windows(task, subset_segments(task, "by_unit", part)) for part in ("train", "validation"))
+    train, validation = (
+        load_windows(task, subset_segments(task, "by_unit", part))
+        for part in ("train", "validation")
+    )
     wrong = dataclasses.replace(validation, label=1 - validation.label)
 
     def trained(held_out):
-        return train_network(train, held_out, target=Classes(n_classes=2), settings=settings, seed=0)
+        return train_network(
+            train, held_out, target=Classes(n_classes=2), settings=settings, seed=0
+        )
 
     training = trained(wrong)
     assert training.best_epoch < len(training.validation_loss)
@@ -159,11 +191,15 @@ def test_the_last_epoch_stands_beside_the_best_one(task):
 
 def test_a_model_of_before_has_temperature_one_and_a_bad_one_is_refused(task, tmp_path):
     settings = make_settings("epochs=1", "epoch_fraction=0.1")
-    (found,) = run_jobs(task, settings, [Job(protocols=("by_unit",), seed=0)], n_workers=1, on_done=lambda _: None)
+    (found,) = run_jobs(
+        task, settings, [Job(protocols=("by_unit",), seed=0)], n_workers=1, on_done=lambda _: None
+    )
     save_model(tmp_path / "m", found.weights, model_description(task, settings, found))
     path = tmp_path / "m" / "model.json"
     content = json.loads(path.read_text())
-    path.write_text(json.dumps({key: value for key, value in content.items() if key != "temperature"}))
+    path.write_text(
+        json.dumps({key: value for key, value in content.items() if key != "temperature"})
+    )
     assert load_model(tmp_path / "m")[1].temperature == 1.0
     for bad in (0, -1.0, "warm", float("nan")):
         path.write_text(json.dumps({**content, "temperature": bad}))
@@ -176,7 +212,10 @@ def test_a_model_of_before_has_temperature_one_and_a_bad_one_is_refused(task, tm
     [
         ("device=tpu", "device must be one of auto, cpu, cuda"),
         ("baselines=[minirockets]", "baselines must be false or a list of different names"),
-        ("baselines=[minirocket,minirocket]", "baselines must be false or a list of different names"),
+        (
+            "baselines=[minirocket,minirocket]",
+            "baselines must be false or a list of different names",
+        ),
         ("baselines=true", "baselines must be false or a list of different names"),
         ("minirocket_features=83", "minirocket_features must be a whole number of at least 84"),
     ],
@@ -187,13 +226,18 @@ def test_settings_refuse(override, message):
 
 
 def test_baselines_may_be_left_out_or_be_one():
-    assert make_settings("baselines=false").baselines == make_settings("baselines=[]").baselines == ()
+    assert (
+        make_settings("baselines=false").baselines == make_settings("baselines=[]").baselines == ()
+    )
     assert make_settings("baselines=minirocket").baselines == ("minirocket",)
 
 
 def test_networks_refuse():
     config = make_settings("model=spectrum").model
-    for change, message in (({"floor": 0}, "floor must be greater than 0"), ({"widths": [4]}, "same length")):
+    for change, message in (
+        ({"floor": 0}, "floor must be greater than 0"),
+        ({"widths": [4]}, "same length"),
+    ):
         with pytest.raises(ConfigError, match=message):
             build_model({**config, **change}, n_channels=1, n_classes=2)
 

@@ -26,7 +26,12 @@ SMALL = [
     "n_bootstrap=300",
     "n_threads=1",
 ]
-MODEL = ["model.widths=[12,24]", "model.kernels=[32,5]", "model.strides=[8,4]", "learning_rate=0.01"]
+MODEL = [
+    "model.widths=[12,24]",
+    "model.kernels=[32,5]",
+    "model.strides=[8,4]",
+    "learning_rate=0.01",
+]
 
 
 def make_settings(*overrides):
@@ -38,7 +43,12 @@ def study():
     """One fault that shows, learnt for real and with shuffled labels."""
     torch.set_num_threads(1)
     dataset = FakeDataset(
-        n_units=16, records_per_unit=8, classes=("healthy", "missing_tooth"), duration=0.3, noise=0.4, seed=1
+        n_units=16,
+        records_per_unit=8,
+        classes=("healthy", "missing_tooth"),
+        duration=0.3,
+        noise=0.4,
+        seed=1,
     )
     settings = make_settings("protocols=[by_unit]", "baselines=false")
     task = task_from(dataset, settings)
@@ -66,10 +76,15 @@ def test_shuffled_labels_stay_at_chance_within_their_interval(study):
 def test_same_seed_same_weights_and_another_seed_others(study):
     task = study[0]
     settings = make_settings("epochs=2")
-    sets = [load_windows(task, subset_segments(task, "by_unit", name)) for name in ("train", "validation")]
+    sets = [
+        load_windows(task, subset_segments(task, "by_unit", name))
+        for name in ("train", "validation")
+    ]
 
     def weights(seed):
-        model = train_network(*sets, target=Classes(n_classes=2), settings=settings, seed=seed).model
+        model = train_network(
+            *sets, target=Classes(n_classes=2), settings=settings, seed=seed
+        ).model
         return torch.cat([value.flatten().double() for value in model.state_dict().values()])
 
     before = torch.random.get_rng_state()
@@ -153,7 +168,10 @@ def test_settings_refuse(override, message):
 
 def test_models_refuse():
     settings = make_settings()
-    for change, message in (({"kind": "huge"}, "no model kind 'huge'"), ({"widths": [4]}, "same length")):
+    for change, message in (
+        ({"kind": "huge"}, "no model kind 'huge'"),
+        ({"widths": [4]}, "same length"),
+    ):
         with pytest.raises(ConfigError, match=message):
             build_model({**settings.model, **change}, n_channels=1, n_classes=2)
     with pytest.raises(ConfigError, match="unexpected keyword"):

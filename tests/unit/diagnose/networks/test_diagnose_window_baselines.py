@@ -30,11 +30,15 @@ def one_thread():
 
 
 def make_windows(n_channels=1, n=6, n_samples=400, seed=0):
-    return np.random.default_rng(seed).standard_normal((n, n_channels, n_samples)).astype(np.float32)
+    return (
+        np.random.default_rng(seed).standard_normal((n, n_channels, n_samples)).astype(np.float32)
+    )
 
 
 def make_sets(**changes):
-    dataset = FakeDataset(**{"n_units": 12, "records_per_unit": 8, "strength": 2.0, "noise": 0.2, **changes})
+    dataset = FakeDataset(
+        **{"n_units": 12, "records_per_unit": 8, "strength": 2.0, "noise": 0.2, **changes}
+    )
     task = task_of(dataset, window_samples=1000, stride_samples=1000, normalise="rms")
     return [load_windows(task, subset_segments(task, "by_unit", name)) for name in SUBSETS], task
 
@@ -42,7 +46,9 @@ def make_sets(**changes):
 def accuracy(task, record, predicted):
     label = task.labels()[record]
     n_classes = len(task.class_names)
-    return float(balanced_accuracy(confusion_by_unit(label, predicted, np.zeros_like(label), n_classes)[0]))
+    return float(
+        balanced_accuracy(confusion_by_unit(label, predicted, np.zeros_like(label), n_classes)[0])
+    )
 
 
 def test_kernels_are_the_84_and_see_no_offset():
@@ -79,13 +85,17 @@ def test_thresholds_are_spread_over_the_output():
 
 
 def test_every_kernel_sees_some_channel_and_not_always_all():
-    bank = fit_minirocket(make_windows(n_channels=4), n_features=84, rng=np.random.default_rng(0))[0]
+    bank = fit_minirocket(make_windows(n_channels=4), n_features=84, rng=np.random.default_rng(0))[
+        0
+    ]
     n_seen = (bank.weight.abs().sum(dim=2) > 0).sum(dim=1)
     assert n_seen.min() == 1
     assert n_seen.max() == 4
 
 
-@pytest.mark.parametrize(("n_samples", "per_kernel"), [(400, 1), (400, 6), (6400, 119), (9, 3), (50, 40)])
+@pytest.mark.parametrize(
+    ("n_samples", "per_kernel"), [(400, 1), (400, 6), (6400, 119), (9, 3), (50, 40)]
+)
 def test_dilations_fit_into_the_window_and_give_the_features_asked_for(n_samples, per_kernel):
     dilations = _dilations(n_samples, per_kernel)
     assert all(8 * dilation <= n_samples - 1 for dilation, _ in dilations)
@@ -109,7 +119,9 @@ def subset(windows, chosen):
     """The same signals with some of the windows."""
     from dataclasses import replace
 
-    parts = {name: getattr(windows, name)[chosen] for name in ("segment", "start", "label", "record")}
+    parts = {
+        name: getattr(windows, name)[chosen] for name in ("segment", "start", "label", "record")
+    }
     return replace(windows, **parts)
 
 

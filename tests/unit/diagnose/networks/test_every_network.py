@@ -49,7 +49,9 @@ def study(request, dataset):
 
 
 def trained(task, settings, seed=0):
-    (found,) = run_jobs(task, settings, [replace(TRAINING, seed=seed)], n_workers=1, on_done=lambda _: None)
+    (found,) = run_jobs(
+        task, settings, [replace(TRAINING, seed=seed)], n_workers=1, on_done=lambda _: None
+    )
     return found
 
 

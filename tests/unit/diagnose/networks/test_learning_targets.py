@@ -86,7 +86,8 @@ def test_the_loss_of_a_record_does_not_depend_on_the_order_of_its_windows(case):
 def test_a_training_is_that_of_its_seed_and_returns_its_best_epoch(case):
     target, train, validation, settings = case
     first, again, other = (
-        train_network(train, validation, target=target, settings=settings, seed=seed) for seed in (0, 0, 1)
+        train_network(train, validation, target=target, settings=settings, seed=seed)
+        for seed in (0, 0, 1)
     )
     weights = first.weights()
     assert all(np.array_equal(weights[name], again.weights()[name]) for name in weights)

@@ -65,9 +65,13 @@ def test_only_the_test_part_has_other_channels():
     task = task_from(dataset, settings_of())
     for subset, channels in (("train", [0, 1]), ("validation", [0, 1]), ("test", [2, 3])):
         segments = subset_segments(task, "cross_sensor", subset)
-        np.testing.assert_array_equal(segments.record, subset_segments(task, "by_unit", subset).record)
+        np.testing.assert_array_equal(
+            segments.record, subset_segments(task, "by_unit", subset).record
+        )
         windows = load_windows(task.part("cross_sensor", subset), segments)
-        np.testing.assert_array_equal(windows.signals[0], dataset.signals(int(segments.record[0]), channels=channels))
+        np.testing.assert_array_equal(
+            windows.signals[0], dataset.signals(int(segments.record[0]), channels=channels)
+        )
         assert task.part("by_unit", subset) is task
 
 
@@ -75,7 +79,8 @@ def test_indicators_of_one_channel_are_not_taken_for_those_of_another():
     task = task_from(FakeDataset(n_channels=2, duration=0.3), settings_of())
     segments, cache = subset_segments(task, "cross_sensor", "test"), Cache()
     first, second = (
-        feature_table(task.part("cross_sensor", name), segments, cache=cache).values for name in ("train", "test")
+        feature_table(task.part("cross_sensor", name), segments, cache=cache).values
+        for name in ("train", "test")
     )
     assert not np.isclose(first, second).all(axis=1).any()
     again = feature_table(task.part("cross_sensor", "test"), segments).values
@@ -87,7 +92,10 @@ def test_sensors_that_hear_the_same_change_nothing():
     settings = settings_of("channels=[near_x,near_y]", "baselines=[indicators]")
     task = task_from(CopiedChannels(), settings)
     protocols = ("by_unit", "cross_sensor")
-    jobs = [Job(protocols=protocols, seed=None), *(Job(protocols=(name,), seed=0) for name in protocols)]
+    jobs = [
+        Job(protocols=protocols, seed=None),
+        *(Job(protocols=(name,), seed=0) for name in protocols),
+    ]
     found = run_jobs(task, settings, jobs, n_workers=1, on_done=lambda _: None)
     by_protocol = {name: [run for run in found if run.protocol == name] for name in protocols}
     for known, other in zip(*by_protocol.values(), strict=True):
@@ -112,14 +120,25 @@ def test_one_channel_is_refused_in_one_line_and_left_out_beside_others(data, tmp
 
 def test_train_and_evaluate_know_the_channels(data, tmp_path, capsys):
     out = tmp_path / "out"
-    choice = ["protocols=[cross_sensor]", "channels=[channel_3]", "test_channels=[channel_1]", "baselines=false"]
+    choice = [
+        "protocols=[cross_sensor]",
+        "channels=[channel_3]",
+        "test_channels=[channel_1]",
+        "baselines=false",
+    ]
     assert main(["train", "data=four", f"out={out}", *FAST, *choice]) == 0
     metrics = json.loads((out / "metrics.json").read_text())["protocols"]["cross_sensor"]
     assert metrics["channels"] == {"train": ["channel_3"], "test": ["channel_1"]}
-    assert "never trained on: trained on channel_3, tested on channel_1." in (out / "report.html").read_text()
+    assert (
+        "never trained on: trained on channel_3, tested on channel_1."
+        in (out / "report.html").read_text()
+    )
     model = out / "models" / "cross_sensor-seed0"
     description = json.loads((model / "model.json").read_text())
-    assert (description["channel_names"], description["test_channel_names"]) == (["channel_3"], ["channel_1"])
+    assert (description["channel_names"], description["test_channel_names"]) == (
+        ["channel_3"],
+        ["channel_1"],
+    )
     expected = metrics["methods"]["cnn"]["balanced_accuracy"]["mean"]
 
     def evaluated(*words):
@@ -151,7 +170,10 @@ def test_evaluate_refuses_channels_that_do_not_fit(data, tmp_path, capsys, words
     few = ["protocols=[by_unit]", "baselines=false", "channels=[channel_0]", "epochs=1"]
     assert main(["train", "data=four", f"out={out}", *FAST, *few]) == 0
     capsys.readouterr()
-    assert main(["evaluate", "data=four", f"model_dir={out / 'models' / 'by_unit-seed0'}", *words]) == 2
+    assert (
+        main(["evaluate", "data=four", f"model_dir={out / 'models' / 'by_unit-seed0'}", *words])
+        == 2
+    )
     lines = capsys.readouterr().err.strip().splitlines()
     assert len(lines) == 1
     assert message in lines[0]

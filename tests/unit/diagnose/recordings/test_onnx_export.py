@@ -65,7 +65,9 @@ def test_the_file_says_what_torch_says_of_records(overrides, tmp_path, capsys):
     windows = load_windows(task, whole)
     raw = np.stack([data.signals(90)[:, start : start + 1200] for start in windows.start])
     session = onnxruntime.InferenceSession(str(file), providers=["CPUExecutionProvider"])
-    found = session.run(None, {"acceleration": raw + np.float32(0.25)})[0]  # an offset counts for nothing
+    found = session.run(None, {"acceleration": raw + np.float32(0.25)})[
+        0
+    ]  # an offset counts for nothing
     assert_allclose(found, predict_windows(network, windows), rtol=0, atol=1e-4)
 
 
@@ -73,7 +75,9 @@ def test_metadata_is_the_description(model, tmp_path):
     file = tmp_path / "m.onnx"
     assert main(["export", "--to", "onnx", "--model", model, "--out", str(file)]) == 0
     description = load_model(model)[1]
-    facts = onnxruntime.InferenceSession(str(file), providers=["CPUExecutionProvider"]).get_modelmeta()
+    facts = onnxruntime.InferenceSession(
+        str(file), providers=["CPUExecutionProvider"]
+    ).get_modelmeta()
     facts = facts.custom_metadata_map
     assert json.loads(facts["class_names"]) == list(description.class_names)
     assert json.loads(facts["channel_names"]) == list(description.channel_names)
@@ -83,7 +87,11 @@ def test_metadata_is_the_description(model, tmp_path):
     assert facts["normalise"].startswith("rms")
     assert json.loads(facts["n_teeth"]) == [23, 84]
     (given,) = onnx.load(file).graph.input
-    assert [dim.dim_value for dim in given.type.tensor_type.shape.dim] == [0, 2, 1200]  # any number of windows
+    assert [dim.dim_value for dim in given.type.tensor_type.shape.dim] == [
+        0,
+        2,
+        1200,
+    ]  # any number of windows
 
 
 def fails(capsys, words, message):
@@ -104,7 +112,11 @@ def test_a_file_that_answers_otherwise_is_removed(model, tmp_path, capsys, monke
 
     monkeypatch.setattr(diagnose.recordings.onnx_export, "RawWindows", Louder)
     file = tmp_path / "m.onnx"
-    fails(capsys, ["--to", "onnx", "--model", model, "--out", str(file)], "answered unlike torch by 0.001")
+    fails(
+        capsys,
+        ["--to", "onnx", "--model", model, "--out", str(file)],
+        "answered unlike torch by 0.001",
+    )
     assert not file.exists()
 
 
@@ -128,8 +140,14 @@ def test_mistakes_are_one_line(model, tmp_path, capsys):
     ]:
         fails(capsys, ["--to", "onnx", "--model", model, "--out", str(tmp_path / out)], message)
     assert (tmp_path / "there.onnx").read_text() == "mine"
-    fails(capsys, ["--to", "tflite", "--model", model, "--out", "m.onnx"], "tflite is not one of onnx")
-    fails(capsys, ["--to", "onnx", "--model", str(tmp_path), "--out", str(tmp_path / "m.onnx")], "holds no model.json")
+    fails(
+        capsys, ["--to", "tflite", "--model", model, "--out", "m.onnx"], "tflite is not one of onnx"
+    )
+    fails(
+        capsys,
+        ["--to", "onnx", "--model", str(tmp_path), "--out", str(tmp_path / "m.onnx")],
+        "holds no model.json",
+    )
 
 
 def test_without_the_extra_one_line_says_what_to_install(model, tmp_path):
@@ -137,7 +155,9 @@ def test_without_the_extra_one_line_says_what_to_install(model, tmp_path):
         "import sys; sys.modules['onnxscript'] = None\nfrom diagnose.cli import main\n"
         f"sys.exit(main(['export', '--to', 'onnx', '--model', {model!r}, '--out', {str(tmp_path / 'm.onnx')!r}]))"
     )
-    shown = subprocess.run([sys.executable, "-c", code], capture_output=True, text=True, check=False)
+    shown = subprocess.run(
+        [sys.executable, "-c", code], capture_output=True, text=True, check=False
+    )
     assert shown.returncode == 2
     assert shown.stderr.strip() == (
         "diagnose: export --to onnx needs the package onnxscript: pip install 'gensig[onnx]'"

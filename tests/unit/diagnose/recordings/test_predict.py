@@ -37,7 +37,9 @@ FAST = [
 
 
 def fake(**changes):
-    return FakeDataset(**{"n_units": 12, "records_per_unit": 8, "duration": 0.5, "n_channels": 2, **changes})
+    return FakeDataset(
+        **{"n_units": 12, "records_per_unit": 8, "duration": 0.5, "n_channels": 2, **changes}
+    )
 
 
 def train(folder, *overrides):
@@ -107,7 +109,15 @@ def written(folder, signal):
         file.attrs["sampling_rate_hz"] = RATE
     own = ["--sampling-rate", str(RATE)]
     named = [*own, "--array", "x"]
-    return {"r.csv": [], "r.wav": [], "r.npz": [], "r.npy": own, "r.mat": named, "r73.mat": named, "r.h5": []}
+    return {
+        "r.csv": [],
+        "r.wav": [],
+        "r.npz": [],
+        "r.npy": own,
+        "r.mat": named,
+        "r73.mat": named,
+        "r.h5": [],
+    }
 
 
 @pytest.mark.parametrize("which", ["model", "levels_model"])
@@ -115,18 +125,27 @@ def test_every_format_says_what_the_data_set_says(which, request, tmp_path, caps
     folder, dataset = request.getfixturevalue(which), fake()
     capsys.readouterr()  # of the training
     network, description = load_model(folder)
-    task = task_of(dataset, window_samples=1200, stride_samples=1000, normalise=description.normalise)
+    task = task_of(
+        dataset, window_samples=1200, stride_samples=1000, normalise=description.normalise
+    )
     for record in held_out(dataset)[:2]:
-        whole = Segments(record=np.array([record]), start=np.array([0]), stop=np.array([dataset.n_samples]))
+        whole = Segments(
+            record=np.array([record]), start=np.array([0]), stop=np.array([dataset.n_samples])
+        )
         expected = np.exp(predict_windows(network, load_windows(task, whole)))
         for name, options in written(tmp_path, dataset.signals(record)).items():
             status = main(["predict", "--model", folder, str(tmp_path / name), "--json", *options])
             result = json.loads(capsys.readouterr().out)
-            windows = [[row["probabilities"][name] for name in dataset.class_names] for row in result["windows"]]
+            windows = [
+                [row["probabilities"][name] for name in dataset.class_names]
+                for row in result["windows"]
+            ]
             assert_allclose(windows, expected, rtol=0, atol=1e-4)
             assert status == (3 if result["out_of_distribution"] else 0)
             overall = np.exp(np.log(expected).mean(axis=0) / description.temperature)
-            assert_allclose(list(result["probabilities"].values()), overall / overall.sum(), rtol=0, atol=1e-4)
+            assert_allclose(
+                list(result["probabilities"].values()), overall / overall.sum(), rtol=0, atol=1e-4
+            )
             assert result["class"] == dataset.class_names[int(overall.argmax())]
             assert result["windows"][1]["start_s"] == pytest.approx(1000 / RATE)
 
@@ -140,7 +159,10 @@ def test_a_recording_made_faster_is_resampled(model, tmp_path, rate):
         own = predicted(model, array(tmp_path / "own.npz", signal))
         other = predicted(model, array(tmp_path / "faster.npz", faster, rate))
         assert other["n_windows"] == own["n_windows"]
-        difference = [other["probabilities"][name] - own["probabilities"][name] for name in dataset.class_names]
+        difference = [
+            other["probabilities"][name] - own["probabilities"][name]
+            for name in dataset.class_names
+        ]
         assert np.abs(difference).max() < 0.05
 
 
@@ -148,7 +170,10 @@ def test_held_out_units_are_known_and_strangers_are_not(model, tmp_path):
     dataset, rng = fake(), np.random.default_rng(0)
     records = [dataset.signals(record) for record in held_out(dataset)]
     assert flagged(model, tmp_path, records) <= 0.1
-    assert flagged(model, tmp_path, [rng.standard_normal(signal.shape) for signal in records[:8]]) == 1.0
+    assert (
+        flagged(model, tmp_path, [rng.standard_normal(signal.shape) for signal in records[:8]])
+        == 1.0
+    )
     assert flagged(model, tmp_path, [np.tile(signal[:, ::2], 2) for signal in records[:8]]) == 1.0
     time = np.arange(dataset.n_samples) / RATE
     foreign = [
@@ -165,7 +190,10 @@ def test_the_stated_speed_is_held_beside_those_of_the_training(model, tmp_path, 
     capsys.readouterr()
     low, high = load_model(model)[1].speed_rpm_range
     train = [record for record, _, _ in dataset.split("by_unit")["train"]]
-    assert (low, high) == (dataset.column("speed_rpm")[train].min(), dataset.column("speed_rpm")[train].max())
+    assert (low, high) == (
+        dataset.column("speed_rpm")[train].min(),
+        dataset.column("speed_rpm")[train].max(),
+    )
     assert main(["predict", "--model", model, file, "--speed-rpm", "1500"]) == 0
     assert "like the training data" in capsys.readouterr().out
     assert main(["predict", "--model", model, file, "--speed-rpm", "4000"]) == 3
@@ -185,31 +213,48 @@ def test_the_class_is_said_beside_the_next_one_and_the_models_own_score():
     clear = {"healthy": 0.61, "crack": 0.3, "pitting": 0.09}
     said = {**verdict(clear, SCORE), "adaptation": None}
     assert class_text(said) == "healthy, probability 0.61, next crack 0.30"
-    whole = "this model: balanced accuracy 0.80 [0.60, 0.90] on 8 machines it never saw, chance 0.25"
+    whole = (
+        "this model: balanced accuracy 0.80 [0.60, 0.90] on 8 machines it never saw, chance 0.25"
+    )
     assert score_text(said) == whole
     assert score_text({**said, "adaptation": {}}).replace(", before it was adapted", "") == whole
     assert "LEAKY" in score_text({**said, "model_test_score": {**SCORE, "leaky": True}})
     close = verdict({"healthy": 0.35, "crack": 0.3, "pitting": 0.26, "missing_tooth": 0.09}, SCORE)
     assert (close["undecided"], close["class"], close["runner_up"]) == (True, "healthy", "crack")
-    assert class_text(close) == "undecided, healthy 0.35 or crack 0.30 (the two are less than 0.10 apart)"
+    assert (
+        class_text(close)
+        == "undecided, healthy 0.35 or crack 0.30 (the two are less than 0.10 apart)"
+    )
     for low in (0.2, None):
         weak = {**SCORE, "balanced_accuracy": {"mean": 0.35, "low": low, "high": low and 0.5}}
         said = verdict(clear, weak)
         assert said["undecided_because"] == ["the model was not shown to be better than chance"]
-        assert class_text(said).startswith("undecided, healthy 0.61 or crack 0.30 (the model was not shown")
+        assert class_text(said).startswith(
+            "undecided, healthy 0.61 or crack 0.30 (the model was not shown"
+        )
     assert not verdict(clear, None)["undecided"]  # an older model
 
 
 def test_a_model_stores_what_it_scored_and_several_recordings_are_answered(model, tmp_path, capsys):
     dataset = fake()
-    files = [str(array(tmp_path / f"{k}.npz", dataset.signals(record))) for k, record in enumerate(held_out(dataset))]
-    metrics = json.loads(Path(model).parents[1].joinpath("metrics.json").read_text())["protocols"]["by_unit"]
+    files = [
+        str(array(tmp_path / f"{k}.npz", dataset.signals(record)))
+        for k, record in enumerate(held_out(dataset))
+    ]
+    metrics = json.loads(Path(model).parents[1].joinpath("metrics.json").read_text())["protocols"][
+        "by_unit"
+    ]
     stored = load_model(model)[1].test_score
-    assert stored["balanced_accuracy"]["mean"] == metrics["methods"]["cnn"]["balanced_accuracy"]["mean"]
+    assert (
+        stored["balanced_accuracy"]["mean"]
+        == metrics["methods"]["cnn"]["balanced_accuracy"]["mean"]
+    )
     assert stored["n_units"] == metrics["n_units"]["test"] < 4
     assert stored["balanced_accuracy"]["low"] is None
     capsys.readouterr()
-    strange = str(array(tmp_path / "noise.npz", np.random.default_rng(0).standard_normal((2, 6400))))
+    strange = str(
+        array(tmp_path / "noise.npz", np.random.default_rng(0).standard_normal((2, 6400)))
+    )
     assert main(["predict", files[0], "--model", model, files[1]]) == 0
     lines = capsys.readouterr().out.splitlines()
     assert [line.partition(": ")[0] for line in lines] == files[:2]
@@ -227,7 +272,10 @@ def older(model, folder):
         del description[key]
     (folder / "model.json").write_text(json.dumps({**description, "model_schema_version": 1}))
     tensors = load_file(f"{model}/model.safetensors")
-    save_file({k: v for k, v in tensors.items() if not k.startswith("domain.")}, folder / "model.safetensors")
+    save_file(
+        {k: v for k, v in tensors.items() if not k.startswith("domain.")},
+        folder / "model.safetensors",
+    )
     return str(folder)
 
 
@@ -252,7 +300,9 @@ def test_band_levels_of_a_tone_and_of_noise():
     assert tone.argmax() == np.searchsorted(edges, 500.0) - 1
     noise = band_levels(np.random.default_rng(0).standard_normal((400, 4096)))
     assert np.ptp(np.log(np.exp(noise).mean(axis=0))) < 0.3
-    assert_allclose(band_levels(10.0 * noise), band_levels(noise) + np.log(100.0), rtol=0, atol=1e-9)
+    assert_allclose(
+        band_levels(10.0 * noise), band_levels(noise) + np.log(100.0), rtol=0, atol=1e-9
+    )
     assert np.isfinite(band_levels(np.zeros((2, 64)))).all()
 
 
@@ -285,18 +335,30 @@ def test_recordings_that_do_not_fit_are_refused(model, levels_model, tmp_path, c
     capsys.readouterr()
     for name, options, message in [
         ("nan", [], "sample 5 of channel_0 is no finite number"),
-        ("slow", [], "10240 samples a second and so nothing above 5120 Hz; the model was trained at 12800"),
+        (
+            "slow",
+            [],
+            "10240 samples a second and so nothing above 5120 Hz; the model was trained at 12800",
+        ),
         ("one", [], "has 1 channel(s), channel_0; the model takes 2, channel_0, channel_1"),
         ("three", ["--channels", "channel_0"], "--channels names 1 channel(s); the model takes 2"),
         ("three", ["--channels", "channel_0", "channel_7"], "no channel channel_7"),
         ("short", [], "is too short: 0.0859 s, a window of the model is 0.0938 s"),
         ("good", ["--speed-rpm", "-5"], "--speed-rpm -5 must be positive"),
         ("good", ["--speed-rpm", "nan"], "--speed-rpm nan must be positive"),
-        ("good", ["--sampling-rate", "25600"], "--sampling-rate says 25600; leave --sampling-rate out"),
+        (
+            "good",
+            ["--sampling-rate", "25600"],
+            "--sampling-rate says 25600; leave --sampling-rate out",
+        ),
         ("good", ["--unit", "mm"], "--unit mm: allowed: m/s2, g"),
     ]:
         fails(capsys, ["--model", model, str(files[name]), *options], message)
-    fails(capsys, ["--model", model, str(tmp_path / "silent.npy")], "give the samples a second with --sampling-rate")
+    fails(
+        capsys,
+        ["--model", model, str(tmp_path / "silent.npy")],
+        "give the samples a second with --sampling-rate",
+    )
     names = [str(tmp_path / "names.csv"), "--sampling-rate", str(RATE)]
     fails(capsys, ["--model", model, *names], "say which is which with --channels, in this order")
     fails(capsys, ["--model", levels_model, str(tmp_path / "whole.wav")], "no level in m/s2")
@@ -327,9 +389,15 @@ def test_models_that_are_none_are_refused(model, tmp_path, capsys):
         (lambda c: c.update(window_samples=0), "window_samples 0 is no positive whole number"),
         (lambda c: c.update(speed_rpm_range=[1]), "does not describe a model"),
         (lambda c: c.update(out_of_distribution=3), "does not describe a model"),
-        (lambda c: c["out_of_distribution"].update(method="guess"), "out-of-distribution flag is 'guess'"),
+        (
+            lambda c: c["out_of_distribution"].update(method="guess"),
+            "out-of-distribution flag is 'guess'",
+        ),
         (lambda c: c["out_of_distribution"].pop("threshold"), "flag is not whole"),
-        (lambda c: c["out_of_distribution"].update(threshold=-1.0), "threshold of its out-of-distribution flag is -1"),
+        (
+            lambda c: c["out_of_distribution"].update(threshold=-1.0),
+            "threshold of its out-of-distribution flag is -1",
+        ),
     ]:
         fails(capsys, ["--model", damaged(model, tmp_path, change=change), file], message)
     levels = load_file(f"{model}/model.safetensors")["domain.levels"]
@@ -340,7 +408,11 @@ def test_models_that_are_none_are_refused(model, tmp_path, capsys):
         (levels[0], "holds no levels of windows"),
         (np.ascontiguousarray(levels[:, 1:]), "flag has 23 levels, a window 24"),
     ]:
-        fails(capsys, ["--model", damaged(model, tmp_path, tensors={"domain.levels": changed}), file], message)
+        fails(
+            capsys,
+            ["--model", damaged(model, tmp_path, tensors={"domain.levels": changed}), file],
+            message,
+        )
     (tmp_path / "model.safetensors").write_bytes(b"PK\x03\x04" + bytes(400))
     fails(capsys, ["--model", str(tmp_path), file], "is not a safetensors file")
 
@@ -353,7 +425,10 @@ def test_predict_loads_neither_numba_nor_the_physics():
         "assert not bad, bad"
     )
     shown = subprocess.run(
-        [sys.executable, "-c", f"import re, {code[7:]}"], capture_output=True, text=True, check=False
+        [sys.executable, "-c", f"import re, {code[7:]}"],
+        capture_output=True,
+        text=True,
+        check=False,
     )
     assert shown.returncode == 0, shown.stderr
 

@@ -65,20 +65,28 @@ def study(tmp_path_factory):
 
 def test_the_phm_score_has_its_printed_values():
     # exp(13/13) - 1 for 13 units too short, exp(10/10) - 1 for 10 too long: 1.718 both
-    assert_allclose(phm_score([-13.0, 0.0, 10.0], 125.0), [np.e - 1, 0, np.e - 1], rtol=1e-12, atol=1e-15)
+    assert_allclose(
+        phm_score([-13.0, 0.0, 10.0], 125.0), [np.e - 1, 0, np.e - 1], rtol=1e-12, atol=1e-15
+    )
     assert_allclose(phm_score([-26.0, 20.0], 250.0), [np.e - 1, np.e - 1], rtol=1e-12, atol=0)
     assert phm_score(np.array(20.0), 125.0) > phm_score(np.array(-20.0), 125.0)
 
 
 @pytest.mark.parametrize(
     ("said", "expected"),
-    [([100, 50, 62, 70, 25, 5], 20.0), ([95, 85, 60, 40, 20, 0], 100.0), ([100, 80, 60, 40, 20, 30], 0.0)],
+    [
+        ([100, 50, 62, 70, 25, 5], 20.0),
+        ([95, 85, 60, 40, 20, 0], 100.0),
+        ([100, 80, 60, 40, 20, 30], 0.0),
+    ],
 )
 def test_the_horizon_is_where_predictions_stay_within_the_band(said, expected):
     true = np.array([100.0, 80, 60, 40, 20, 0])
     assert prognostic_horizon(true, np.array(said, dtype=float), 10.0) == expected
     shuffled = np.array([3, 0, 5, 1, 4, 2])
-    assert prognostic_horizon(true[shuffled], np.array(said, dtype=float)[shuffled], 10.0) == expected
+    assert (
+        prognostic_horizon(true[shuffled], np.array(said, dtype=float)[shuffled], 10.0) == expected
+    )
 
 
 def test_every_life_counts_the_same():
@@ -102,10 +110,14 @@ def test_every_life_counts_the_same():
         "width_h": (6 + (6 + 6 + 5) / 3) / 2,  # the interval about 2 h begins at 0
         "horizon_h": (50 + 60) / 2,
     }
-    assert {name: score["mean"] for name, score in scores.items()} == pytest.approx(expected, rel=1e-12)
+    assert {name: score["mean"] for name, score in scores.items()} == pytest.approx(
+        expected, rel=1e-12
+    )
     assert scores["mae_h"]["low"] == 2
     assert scores["mae_h"]["high"] == 6
-    better = gain(values["rmse_h"], 4 * values["rmse_h"], n_bootstrap=100, rng=np.random.default_rng(0))
+    better = gain(
+        values["rmse_h"], 4 * values["rmse_h"], n_bootstrap=100, rng=np.random.default_rng(0)
+    )
     assert better["mean"] == pytest.approx(np.sqrt(20))
     assert better["low"] > 0
 
@@ -114,8 +126,12 @@ def test_the_half_width_is_a_rank_of_lives():
     error, life = np.array([4.0, 1.0, 3.0, 2.0]), np.array(["d", "a", "c", "b"])
     assert conformal_half_width(error, life, 0.8) == 4.0  # weights 1/5 each: the fourth reaches 0.8
     assert conformal_half_width(error, life, 0.6) == 3.0
-    assert conformal_half_width(error[:3], life[:3], 0.8) == np.inf  # three lives cannot promise 80 %
-    many = conformal_half_width(np.repeat(error, [50, 1, 1, 1]), np.repeat(life, [50, 1, 1, 1]), 0.6)
+    assert (
+        conformal_half_width(error[:3], life[:3], 0.8) == np.inf
+    )  # three lives cannot promise 80 %
+    many = conformal_half_width(
+        np.repeat(error, [50, 1, 1, 1]), np.repeat(life, [50, 1, 1, 1]), 0.6
+    )
     assert many == 3.0  # fifty snapshots of one life are one life
 
 
@@ -175,7 +191,9 @@ def test_a_split_that_cuts_lives_is_left_out():
     assert left_out["random_window_leaky"] == "life u00 is in its train and its validation part"
     with pytest.raises(ConfigError, match="life u00 is in its train"):
         planned(dataset, "protocols=[random_window_leaky]")
-    dataset.columns["life_id"] = np.where(dataset.columns["unit_id"] == "u11", "u00", dataset.columns["life_id"])
+    dataset.columns["life_id"] = np.where(
+        dataset.columns["unit_id"] == "u11", "u00", dataset.columns["life_id"]
+    )
     with pytest.raises(ConfigError, match="by_unit: life u00 is in its train and its test part"):
         planned(dataset, "protocols=[by_unit]")
 
@@ -221,8 +239,14 @@ def test_a_part_without_failures_is_refused():
     ("word", "message"),
     [
         ("task=lifetime", "task must be one of classes, remaining_life"),
-        ("remaining_life.coverage=1", "remaining_life.coverage must be a number above 0 and below 1"),
-        ("remaining_life.early_life_share=0", "early_life_share must be a number above 0 and below 1"),
+        (
+            "remaining_life.coverage=1",
+            "remaining_life.coverage must be a number above 0 and below 1",
+        ),
+        (
+            "remaining_life.early_life_share=0",
+            "early_life_share must be a number above 0 and below 1",
+        ),
         ("remaining_life.early_life_h=-3", "early_life_h must be a number above 0, not -3"),
         ("remaining_life.with_age=yes", "with_age must be true or false"),
         ("remaining_life.cut=3", "cut"),
@@ -245,7 +269,14 @@ def test_a_wrong_key_is_refused_in_one_line(word, message, monkeypatch, capsys, 
 def test_vibration_that_tells_the_life_beats_the_clock(study):
     _, metrics, _ = study
     methods = metrics["protocols"]["by_unit"]["methods"]
-    assert set(methods) == {"constant", "age_only", "indicators", "indicators_and_age", "cnn", "cnn_and_age"}
+    assert set(methods) == {
+        "constant",
+        "age_only",
+        "indicators",
+        "indicators_and_age",
+        "cnn",
+        "cnn_and_age",
+    }
     for name in ("indicators", "indicators_and_age", "cnn_and_age"):
         assert methods[name]["gain_over_age_only_h"]["low"] > 0, name
     assert methods["indicators"]["rmse_h"]["mean"] < 0.6 * methods["age_only"]["rmse_h"]["mean"]
@@ -275,7 +306,13 @@ def test_censored_lives_are_told_and_never_scored(study):
     rmse = np.sqrt(np.mean([np.mean(errors) for errors in by_name.values()]))
     assert result["methods"]["indicators"]["rmse_h"]["mean"] == pytest.approx(rmse, rel=1e-4)
     for row in rows:
-        assert 0 <= float(row["low_h"]) <= float(row["predicted_h"]) <= float(row["high_h"]) <= level * 1.00001
+        assert (
+            0
+            <= float(row["low_h"])
+            <= float(row["predicted_h"])
+            <= float(row["high_h"])
+            <= level * 1.00001
+        )
 
 
 def test_the_report_is_whole(study):
@@ -284,7 +321,12 @@ def test_the_report_is_whole(study):
         "metrics.json", "predictions.csv", "scores.csv", "report.html", "remaining_life_by_unit.png", "models",
     }  # fmt: skip
     page = (out / "report.html").read_text()
-    for text in ("How long the machines still run", "age only", "PHM score", "random_window_leaky is left out"):
+    for text in (
+        "How long the machines still run",
+        "age only",
+        "PHM score",
+        "random_window_leaky is left out",
+    ):
         assert text in page
     assert metrics["protocols_left_out"]["random_window_leaky"].startswith("life u00")
     with (out / "scores.csv").open() as file:
@@ -297,7 +339,9 @@ def test_the_bits_do_not_depend_on_the_workers(study, tmp_path):
     out, metrics, _ = study
     again, _ = trained(FakeLives(n_lives=24, n_censored=6, seed=1), tmp_path / "out", "n_threads=2")
     assert again["protocols"] == metrics["protocols"]
-    assert (tmp_path / "out" / "predictions.csv").read_bytes() == (out / "predictions.csv").read_bytes()
+    assert (tmp_path / "out" / "predictions.csv").read_bytes() == (
+        out / "predictions.csv"
+    ).read_bytes()
 
 
 def test_too_few_validation_lives_give_intervals_that_say_nothing(tmp_path):

@@ -126,8 +126,14 @@ def test_equal_methods_are_not_told_apart_and_better_ones_are():
     rng = np.random.default_rng(4)
     good = judged(label, label, unit)
     bad = judged(rng.integers(0, N_CLASSES, label.size), label, unit, "guess")
-    same, worse = compare(good, [dataclasses.replace(good, method="same"), bad], n_bootstrap=300, rng=rng)
-    assert (same["difference"]["mean"], same["difference"]["low"], same["difference"]["high"]) == (0, 0, 0)
+    same, worse = compare(
+        good, [dataclasses.replace(good, method="same"), bad], n_bootstrap=300, rng=rng
+    )
+    assert (same["difference"]["mean"], same["difference"]["low"], same["difference"]["high"]) == (
+        0,
+        0,
+        0,
+    )
     assert same["p_value"] == 1
     assert "not told apart" in same["summary"]
     assert worse["difference"]["low"] > 0.5
@@ -144,7 +150,9 @@ def test_the_permutation_test_keeps_its_level():
     for _ in range(60):
         skill = rng.uniform(0.2, 1.0, 8)[unit]
         pair = [
-            np.where(rng.uniform(size=label.size) < skill, label, rng.integers(0, N_CLASSES, label.size))
+            np.where(
+                rng.uniform(size=label.size) < skill, label, rng.integers(0, N_CLASSES, label.size)
+            )
             for _ in range(2)
         ]
         first, second = (judged(predicted, label, unit) for predicted in pair)
@@ -162,7 +170,9 @@ def test_one_unit_has_no_interval():
     label, unit = records(1, 40)
     network = judged(label, label, unit)
     rng = np.random.default_rng(6)
-    row = compare(network, [judged(np.zeros_like(label), label, unit, "guess")], n_bootstrap=50, rng=rng)[0]
+    row = compare(
+        network, [judged(np.zeros_like(label), label, unit, "guess")], n_bootstrap=50, rng=rng
+    )[0]
     assert (row["difference"]["low"], row["p_value"]) == (None, 1.0)
     assert "one unit" in row["summary"]
     result = by_condition({"snr_db": np.arange(40.0)}, [network], n_bootstrap=50, rng=rng)
@@ -189,7 +199,9 @@ def test_window_length_shows_what_later_windows_bring(shown, verdict):
         rng=rng,
     )
     assert [row["n_windows"] for row in result["rows"]] == [1, 2, 4]
-    assert_allclose([row["seconds"] for row in result["rows"]], [0.1, 0.15, 0.25], rtol=1e-12, atol=0)
+    assert_allclose(
+        [row["seconds"] for row in result["rows"]], [0.1, 0.15, 0.25], rtol=1e-12, atol=0
+    )
     assert verdict in result["summary"]
 
 
@@ -200,7 +212,9 @@ def study():
     task = task_of(dataset, window_samples=800, stride_samples=800, normalise="rms")
     settings = settings_from(compose("train", ["data=x", "out=y", "n_bootstrap=100"]))
     split, label = dataset.split("by_unit"), task.labels()
-    test, validation = (np.array([row[0] for row in split[name]]) for name in ("test", "validation"))
+    test, validation = (
+        np.array([row[0] for row in split[name]]) for name in ("test", "validation")
+    )
     rng = np.random.default_rng(8)
 
     def prediction(method, seed, skill):
@@ -226,7 +240,10 @@ def study():
 def metrics_of(task, answers):
     confusion = np.eye(N_CLASSES, dtype=int).tolist()
     scored = {"mean": 0.5, "low": 0.4, "high": 0.6, "per_seed": [0.5]}
-    methods = {"cnn": {"balanced_accuracy": scored, "confusion": confusion}, "chance": {"balanced_accuracy": 0.25}}
+    methods = {
+        "cnn": {"balanced_accuracy": scored, "confusion": confusion},
+        "chance": {"balanced_accuracy": 0.25},
+    }
     result = {
         "leaky": False,
         "methods": methods,
@@ -250,7 +267,9 @@ def test_every_part_is_there_and_can_be_written(study, tmp_path):
     assert set(answers["detection"]) == {"cnn", "indicators"}
     assert graded_classes(answers) == list(CLASSES[1:])
     names = write_tables(tmp_path, metrics_of(task, answers))
-    assert {"scores.csv", "by_condition.csv", "by_severity.csv", "confusion_by_unit.csv"} <= set(names)
+    assert {"scores.csv", "by_condition.csv", "by_severity.csv", "confusion_by_unit.csv"} <= set(
+        names
+    )
     head, *rows = (tmp_path / "scores.csv").read_text().splitlines()
     assert head.startswith("protocol,leaky,method,score,mean,low,high")
     assert rows[0] == "by_unit,False,cnn,balanced_accuracy,0.5,0.4,0.6,1,80,5"
@@ -271,7 +290,10 @@ def test_a_class_of_few_records_says_how_few(study, tmp_path):
     few = answers["detection"]["cnn"]["classes"]["crack"]
     assert few["n_records"] < 10
     assert "[too few machines] of 6 records of 2 machines found" in few["summary"]
-    assert "from what severity on is not told: a curve needs 10 records of 3 severities" in few["summary"]
+    assert (
+        "from what severity on is not told: a curve needs 10 records of 3 severities"
+        in few["summary"]
+    )
     detection_figure(tmp_path / "few.png", answers)
 
 

@@ -60,7 +60,9 @@ def test_at_most_one_in_twenty_new_healthy_records_is_an_alarm(n_records):
     rng = np.random.default_rng(n_records)
     once = np.ones((1, n_records), dtype=int)
     alarms = [
-        np.mean(rng.normal(size=200) > alarm_threshold(rng.normal(size=n_records), once, new=True)[0])
+        np.mean(
+            rng.normal(size=200) > alarm_threshold(rng.normal(size=n_records), once, new=True)[0]
+        )
         for _ in range(400)
     ]
     assert np.mean(alarms) < 0.055
@@ -126,7 +128,9 @@ def test_a_known_limit_lies_in_the_interval():
 
 def test_perfect_and_blind_scores():
     test, severity = study()
-    perfect = answer(judged(100.0 * test.label, test.label, test.unit), None, severity)["classes"]["crack"]
+    perfect = answer(judged(100.0 * test.label, test.label, test.unit), None, severity)["classes"][
+        "crack"
+    ]
     assert perfect["auroc"]["mean"] == 1
     assert perfect["share_found"]["mean"] == 1
     assert perfect["share_found"]["low"] < 0.9
@@ -136,7 +140,9 @@ def test_perfect_and_blind_scores():
     assert blind["auroc"]["low"] < 0.5 < blind["auroc"]["high"]
     assert {row["status"] for row in blind["limits"]} == {"not_reached"}
     assert "at no severity" in blind["summary"]
-    equal = answer(judged(np.zeros(test.label.size), test.label, test.unit), None, severity)["classes"]["crack"]
+    equal = answer(judged(np.zeros(test.label.size), test.label, test.unit), None, severity)[
+        "classes"
+    ]["crack"]
     assert (equal["auroc"]["mean"], equal["share_found"]["mean"]) == (0.5, 0.0)
 
 
@@ -145,7 +151,9 @@ def test_the_area_is_that_of_scikit_learn():
 
     test, severity = study()
     rounded = np.round(test.log_probability[0, :, 1])
-    area = answer(judged(rounded, test.label, test.unit), None, severity)["classes"]["crack"]["auroc"]
+    area = answer(judged(rounded, test.label, test.unit), None, severity)["classes"]["crack"][
+        "auroc"
+    ]
     assert_allclose(area["mean"], roc_auc_score(test.label, rounded), rtol=1e-12, atol=0)
 
 
@@ -187,10 +195,18 @@ def test_only_what_grows_with_the_severity_is_a_size():
     severity = rng.uniform(0.2, 0.8, 40)
 
     class Columns:
-        column_names = ("params/fault.crack_depth_mm", "params/fault.crack_angle_deg", "params/fault.pit_width_mm")
+        column_names = (
+            "params/fault.crack_depth_mm",
+            "params/fault.crack_angle_deg",
+            "params/fault.pit_width_mm",
+        )
 
         def column(self, name):
-            made = {"crack_depth": 4 * severity, "crack_angle": np.full(40, 45.0), "pit_width": rng.uniform(1, 9, 40)}
+            made = {
+                "crack_depth": 4 * severity,
+                "crack_angle": np.full(40, 45.0),
+                "pit_width": rng.uniform(1, 9, 40),
+            }
             return made[name.removeprefix("params/fault.").rsplit("_", 1)[0]]
 
     found = size_columns(Columns(), np.arange(40), severity)

@@ -59,8 +59,14 @@ def test_scores_agree_with_scikit_learn():
     true, predicted = rng.integers(4, size=200), rng.integers(4, size=200)
     confusion = confusion_by_unit(true, predicted, rng.integers(5, size=200), 4)
     assert confusion.shape == (5, 4, 4)
-    assert_allclose(balanced_accuracy(confusion.sum(axis=0)), balanced_accuracy_score(true, predicted), rtol=1e-12)
-    assert_allclose(macro_f1(confusion.sum(axis=0)), f1_score(true, predicted, average="macro"), rtol=1e-12)
+    assert_allclose(
+        balanced_accuracy(confusion.sum(axis=0)),
+        balanced_accuracy_score(true, predicted),
+        rtol=1e-12,
+    )
+    assert_allclose(
+        macro_f1(confusion.sum(axis=0)), f1_score(true, predicted, average="macro"), rtol=1e-12
+    )
 
 
 def test_record_prediction_is_the_mean_log_probability():
@@ -77,7 +83,9 @@ def test_interval_is_over_units_not_over_records():
         confusion = np.zeros((1, 10, 2, 2), dtype=int)
         confusion[0, :5, [0, 1], [0, 1]] = n
         confusion[0, 5:, [0, 1], [1, 0]] = n
-        score = score_with_interval("balanced_accuracy", confusion, n_bootstrap=4000, rng=np.random.default_rng(0))
+        score = score_with_interval(
+            "balanced_accuracy", confusion, n_bootstrap=4000, rng=np.random.default_rng(0)
+        )
         assert score.mean == pytest.approx(0.5)
         widths.append(score.high - score.low)
     assert_allclose(widths, [widths[0]] * 2, rtol=1e-12)
@@ -88,7 +96,9 @@ def test_interval_is_over_units_not_over_records():
 def test_few_units_have_no_interval(n_units):
     """Two that agree would say 0.50 [0.50, 0.50]."""
     confusion = np.ones((1, n_units, 2, 2), dtype=int)
-    score = score_with_interval("balanced_accuracy", confusion, n_bootstrap=100, rng=np.random.default_rng(0))
+    score = score_with_interval(
+        "balanced_accuracy", confusion, n_bootstrap=100, rng=np.random.default_rng(0)
+    )
     ratio = ratio_with_interval(
         "balanced_accuracy", confusion, confusion, n_bootstrap=100, rng=np.random.default_rng(0)
     )
@@ -102,8 +112,12 @@ def test_few_units_have_no_interval(n_units):
 
 def test_why_there_is_no_interval_is_said_once():
     few, many = ({"n_units": {"test": n}} for n in (2, 12))
-    (line,) = without_interval({"protocols": {"by_unit": few, "cross_speed": few, "cross_snr": many}, "novelty": {}})
-    assert line.startswith("by_unit, cross_speed: 2 test unit(s) are too few machines for an interval, 4 are the least")
+    (line,) = without_interval(
+        {"protocols": {"by_unit": few, "cross_speed": few, "cross_snr": many}, "novelty": {}}
+    )
+    assert line.startswith(
+        "by_unit, cross_speed: 2 test unit(s) are too few machines for an interval, 4 are the least"
+    )
     assert without_interval({"protocols": {"by_unit": many}, "novelty": {}}) == []
 
 
@@ -114,7 +128,9 @@ def test_interval_covers_the_truth_about_as_often_as_it_says():
         rate = np.clip(rng.normal(0.7, 0.1, 20), 0, 1)
         right = rng.binomial(10, rate)
         confusion = np.zeros((1, 20, 1, 2), dtype=int)
-        confusion = np.stack([np.stack([right, 10 - right], axis=1), np.zeros((20, 2), dtype=int)], axis=1)[None]
+        confusion = np.stack(
+            [np.stack([right, 10 - right], axis=1), np.zeros((20, 2), dtype=int)], axis=1
+        )[None]
         score = score_with_interval("balanced_accuracy", confusion, n_bootstrap=400, rng=rng)
         covered += score.low <= 0.7 <= score.high
     assert 0.86 < covered / 200 < 1.0
@@ -124,9 +140,13 @@ def test_interval_of_a_shuffle_covers_the_luck_of_its_names_but_not_a_leak():
     """Groups found without names: one run scores 0, 1/4, 1/2 or 1; three runs that are all right are no luck."""
 
     def interval(namings):
-        confusion = np.stack([np.stack([5 * np.eye(4, dtype=int)[naming]] * 6) for naming in namings])
+        confusion = np.stack(
+            [np.stack([5 * np.eye(4, dtype=int)[naming]] * 6) for naming in namings]
+        )
         rng = np.random.default_rng(0)
-        return score_with_interval("balanced_accuracy", confusion, n_bootstrap=2000, rng=rng, shuffled=True)
+        return score_with_interval(
+            "balanced_accuracy", confusion, n_bootstrap=2000, rng=rng, shuffled=True
+        )
 
     for naming in ([0, 1, 3, 2], [1, 2, 3, 0], [0, 2, 3, 1]):
         score = interval([naming])
@@ -137,14 +157,18 @@ def test_interval_of_a_shuffle_covers_the_luck_of_its_names_but_not_a_leak():
 def make_tables(**changes):
     dataset = FakeDataset(**{"n_units": 8, "records_per_unit": 8, "strength": 2.0, **changes})
     task = task_of(dataset, window_samples=1000, stride_samples=1000, normalise="rms")
-    return [feature_table(task, subset_segments(task, "by_unit", subset)) for subset in SUBSETS], task
+    return [
+        feature_table(task, subset_segments(task, "by_unit", subset)) for subset in SUBSETS
+    ], task
 
 
 def test_indicators_have_their_names_and_react_to_impulses():
     (train, _, _), _ = make_tables()
     assert train.values.shape[1] == len(INDICATORS) == len(train.names)
     column = train.names.index("channel_0/fm4_pinion")
-    healthy, missing = (np.nanmedian(train.values[train.label == label, column]) for label in (0, 3))
+    healthy, missing = (
+        np.nanmedian(train.values[train.label == label, column]) for label in (0, 3)
+    )
     assert missing > 1.5 * healthy
 
 
@@ -159,7 +183,10 @@ def test_indicators_are_nan_without_a_whole_turn():
 def test_all_features_are_the_basic_ones_and_more_from_twenty_turns_up():
     x = np.random.default_rng(0).standard_normal((2, 12800))
     speed, teeth = {"pinion": 20.0, "wheel": 19.9}, {"pinion": 23, "wheel": 84}
-    basic, table = indicators(x, 12800.0, speed, teeth), indicators(x, 12800.0, speed, teeth, features="all")
+    basic, table = (
+        indicators(x, 12800.0, speed, teeth),
+        indicators(x, 12800.0, speed, teeth, features="all"),
+    )
     assert table.shape == (2, len(FEATURES["all"])) == (2, 20)
     for index, name in enumerate(FEATURES["all"]):
         assert np.isnan(table[:, index]).all() == name.endswith("_wheel"), name
@@ -183,7 +210,9 @@ def test_all_features_see_the_impulses_of_a_missing_tooth():
 
 def test_all_features_at_a_rate_that_holds_no_mesh_band_are_nan():
     x = np.random.default_rng(0).standard_normal((1, 30000))
-    table = indicators(x, 1000.0, {"pinion": 16.0, "wheel": 30.0}, {"pinion": 23, "wheel": 84}, features="all")
+    table = indicators(
+        x, 1000.0, {"pinion": 16.0, "wheel": 30.0}, {"pinion": 23, "wheel": 84}, features="all"
+    )
     found = dict(zip(FEATURES["all"], np.isnan(table[0]).tolist(), strict=True))
     assert found["fm0_wheel"]
     assert found["nb4_pinion"]
@@ -255,10 +284,16 @@ def test_the_level_changes_the_model_with_it_and_not_the_one_without():
 def test_rms_threshold_uses_the_level_only():
     rng = np.random.default_rng(0)
     label = np.arange(200) % 2
-    values = np.stack([np.log(1 + label + 0.1 * rng.uniform(size=200)), rng.normal(size=200)], axis=1)
-    table = FeatureTable(values=values, names=("a/log_rms", "a/kurtosis"), label=label, record=np.arange(200))
+    values = np.stack(
+        [np.log(1 + label + 0.1 * rng.uniform(size=200)), rng.normal(size=200)], axis=1
+    )
+    table = FeatureTable(
+        values=values, names=("a/log_rms", "a/kurtosis"), label=label, record=np.arange(200)
+    )
     text, _, score = judged(RmsThreshold(), table, table, table)
     assert (score.argmax(axis=1) == label).all()
     assert text.startswith("thresholds 1.")
-    blind = FeatureTable(values=values[:, ::-1], names=table.names, label=label, record=table.record)
+    blind = FeatureTable(
+        values=values[:, ::-1], names=table.names, label=label, record=table.record
+    )
     assert (judged(RmsThreshold(), blind, blind, blind)[2].argmax(axis=1) == label).mean() < 0.7

@@ -49,7 +49,10 @@ def studies():
     found = {}
     for name, strength in (("plain", 4.0), ("none", 0.0)):
         settings = settings_of(
-            "protocols=[healthy_only,open_set]", "epochs=8", "learning_rate=0.01", "epoch_fraction=0.6"
+            "protocols=[healthy_only,open_set]",
+            "epochs=8",
+            "learning_rate=0.01",
+            "epoch_fraction=0.6",
         )
         task = task_from(OpenDataset(strength=strength, n_units=24), settings)
         protocols, jobs = plan_study(task, settings)
@@ -78,10 +81,16 @@ def test_a_plain_class_never_shown_is_noticed_and_the_known_ones_are_told_apart(
         rate = result["methods"][name]["fpr95"]
         assert 0 <= rate["low"] <= rate["mean"] <= rate["high"] <= 1
     for method in result["methods"].values():
-        parts = [area["mean"] for area in method["auroc_by_known_class"].values()]  # as many records of each class
+        parts = [
+            area["mean"] for area in method["auroc_by_known_class"].values()
+        ]  # as many records of each class
         assert len(parts) == 3
         assert method["auroc"]["mean"] == pytest.approx(np.mean(parts))
-    assert result["known"]["balanced_accuracy"]["mean"] > result["known"]["chance"] == pytest.approx(1 / 3)
+    assert (
+        result["known"]["balanced_accuracy"]["mean"]
+        > result["known"]["chance"]
+        == pytest.approx(1 / 3)
+    )
 
 
 @pytest.mark.parametrize("protocol", ["healthy_only", "open_set"])
@@ -89,7 +98,9 @@ def test_a_fault_in_name_only_is_not_found(studies, protocol):
     result = studies["none"][protocol]
     n = result["n_records"]["test"]
     n_known = n // 4 * len(result["known_classes"])
-    deviation = np.sqrt((n + 1) / (12 * n_known * (n - n_known)))  # of the Mann-Whitney statistic when nothing differs
+    deviation = np.sqrt(
+        (n + 1) / (12 * n_known * (n - n_known))
+    )  # of the Mann-Whitney statistic when nothing differs
     for name, method in result["methods"].items():
         assert abs(method["auroc"]["mean"] - 0.5) < 3.5 * deviation < 0.4, name
 
@@ -130,7 +141,9 @@ def test_perfect_and_empty_scores(labelled):
 def test_units_that_are_copies_leave_nothing_to_resample(labelled):
     judge, novel, task, record = labelled
     units = np.asarray(task.dataset.column("unit_id"))[record]
-    score = np.concatenate([np.arange(np.sum(units == unit)) ** 2 % 5 for unit in np.unique(units)]).astype(float)
+    score = np.concatenate(
+        [np.arange(np.sum(units == unit)) ** 2 % 5 for unit in np.unique(units)]
+    ).astype(float)
     area = judge(score)["auroc"]
     assert 0 < area["mean"] < 1
     np.testing.assert_allclose([area["low"], area["high"]], area["mean"], rtol=1e-12, atol=0)
@@ -171,8 +184,13 @@ def test_false_positive_rate_of_two_normal_scores(shift):
 def test_features_and_outputs_are_those_of_the_last_layer():
     settings = settings_of()
     task = task_from(OpenDataset(), settings)
-    train, validation = (load_windows(task, subset_segments(task, "by_unit", part)) for part in ("train", "validation"))
-    model = train_network(train, validation, target=Classes(n_classes=4), settings=settings, seed=0).model
+    train, validation = (
+        load_windows(task, subset_segments(task, "by_unit", part))
+        for part in ("train", "validation")
+    )
+    model = train_network(
+        train, validation, target=Classes(n_classes=4), settings=settings, seed=0
+    ).model
     every = np.arange(len(validation))
     features, logits = network_outputs(model, validation, every)
     layer = model.head[-1]
@@ -202,7 +220,9 @@ def test_the_autoencoder_is_the_same_for_the_same_seed():
     task = task_from(OpenDataset(), settings)
     train, validation = (healthy_windows(task, part) for part in ("train", "validation"))
     before = torch.random.get_rng_state()
-    first, again, other = (fit_autoencoder(train, validation, settings=settings, seed=seed) for seed in (1, 1, 2))
+    first, again, other = (
+        fit_autoencoder(train, validation, settings=settings, seed=seed) for seed in (1, 1, 2)
+    )
     assert torch.equal(before, torch.random.get_rng_state())
     error = reconstruction_error(first, validation)
     np.testing.assert_array_equal(error, reconstruction_error(again, validation))
@@ -215,22 +235,33 @@ def test_the_autoencoder_learns_and_a_moment_that_it_cannot_rebuild_is_seen():
     task = task_from(OpenDataset(), settings_of())
     train, validation = (healthy_windows(task, part) for part in ("train", "validation"))
     short, long = (
-        fit_autoencoder(train, validation, settings=settings_of(f"epochs={n}", "patience=30"), seed=0) for n in (1, 30)
+        fit_autoencoder(
+            train, validation, settings=settings_of(f"epochs={n}", "patience=30"), seed=0
+        )
+        for n in (1, 30)
     )
     windows = torch.from_numpy(validation.cut(np.arange(9)))
     mean = [part.model(windows).mean().item() for part in (short, long)]
     assert mean[1] < 0.7 * mean[0]
-    burst = dataclasses.replace(validation, signals=tuple(signal.copy() for signal in validation.signals))
+    burst = dataclasses.replace(
+        validation, signals=tuple(signal.copy() for signal in validation.signals)
+    )
     for signal in burst.signals:
         signal[:, 1100:1164] += 3 * np.sin(np.arange(64))
     seen = validation.start <= 1000  # the burst lies whole in these windows
-    assert (reconstruction_error(long, burst) > 1.5 * reconstruction_error(long, validation))[seen].all()
+    assert (reconstruction_error(long, burst) > 1.5 * reconstruction_error(long, validation))[
+        seen
+    ].all()
 
 
 def test_two_processes_give_what_one_gives():
     settings = settings_of("seeds=[3]")
     task = task_from(OpenDataset(), settings)
-    jobs = [Job(protocols=(name,), seed=seed) for name in ("healthy_only", "open_set") for seed in (None, 3)]
+    jobs = [
+        Job(protocols=(name,), seed=seed)
+        for name in ("healthy_only", "open_set")
+        for seed in (None, 3)
+    ]
     one, two = (run_jobs(task, settings, jobs, n_workers=n, on_done=lambda _: None) for n in (1, 2))
     assert [run.method for run in one] == [run.method for run in two]
     assert len(one) == 10
@@ -243,7 +274,11 @@ def test_two_processes_give_what_one_gives():
     ("changes", "overrides", "message"),
     [
         ({}, ["protocols=[healthy_only]", "window_samples=100"], "at least 128"),
-        ({}, ["protocols=[open_set]", "classes=[healthy,crack,pitting]"], "it needs known and new ones"),
+        (
+            {},
+            ["protocols=[open_set]", "classes=[healthy,crack,pitting]"],
+            "it needs known and new ones",
+        ),
         ({}, ["protocols=[open_set]", "classes=[healthy,missing_tooth]"], "one known class only"),
         ({}, ["protocols=[healthy_only]", "classes=[crack,pitting]"], "its train part is empty"),
     ],
@@ -275,14 +310,31 @@ def test_the_command_reports_novelty_alone(monkeypatch, tmp_path, capsys):
     for text in ("LEAKY", "In short", "nan ["):
         assert text not in page
     rows = [line.split(",") for line in (out / "novelty.csv").read_text().splitlines()]
-    assert rows[0] == ["protocol", "method", "seed", "record_id", "unit_id", "label", "score", "threshold"]
-    mine = [row for row in rows if row[:2] == ["healthy_only", "autoencoder"] and row[5] == "missing_tooth"]
-    found = metrics["novelty"]["healthy_only"]["methods"]["autoencoder"]["found"]["missing_tooth"]["mean"]
+    assert rows[0] == [
+        "protocol",
+        "method",
+        "seed",
+        "record_id",
+        "unit_id",
+        "label",
+        "score",
+        "threshold",
+    ]
+    mine = [
+        row
+        for row in rows
+        if row[:2] == ["healthy_only", "autoencoder"] and row[5] == "missing_tooth"
+    ]
+    found = metrics["novelty"]["healthy_only"]["methods"]["autoencoder"]["found"]["missing_tooth"][
+        "mean"
+    ]
     assert np.mean([float(row[6]) > float(row[7]) for row in mine]) == pytest.approx(found)
 
 
 def test_null_runs_everything_and_both_kinds_share_a_report(monkeypatch, tmp_path):
-    monkeypatch.setattr(gensig.dataset.reader, "open_dataset", lambda path: OpenDataset(n_channels=2))
+    monkeypatch.setattr(
+        gensig.dataset.reader, "open_dataset", lambda path: OpenDataset(n_channels=2)
+    )
     out = tmp_path / "out"
     few = ["protocols=null", "shuffle_control=false", "baselines=[rms_threshold]", "epochs=1"]
     assert main(["train", "data=x", f"out={out}", *FAST, *few]) == 0

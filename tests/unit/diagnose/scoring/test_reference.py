@@ -19,14 +19,20 @@ class Machines(FakeDataset):
     """Every unit has a pattern of loud and quiet teeth of its own; a faulty record has one tooth quieter."""
 
     def __init__(self, fall=0.4, **options):
-        super().__init__(classes=("healthy", "missing_tooth"), duration=2.0, sampling_rate=6400.0, **options)
+        super().__init__(
+            classes=("healthy", "missing_tooth"), duration=2.0, sampling_rate=6400.0, **options
+        )
         self.attributes |= {f"n_teeth_{gear}": number for gear, number in TEETH.items()}
         rng, n = np.random.default_rng(1), self.n_records
         self.fall = fall
         self.columns["speed_rpm"] = np.full(n, 600.0)
         self.columns["fault_gear"] = np.where(self.columns["label"] > 0, "wheel", "")
-        self.columns["fault_tooth"] = np.where(self.columns["label"] > 0, rng.integers(12, size=n), -1)
-        self.columns["start_tooth_pinion"] = self.columns["start_tooth_wheel"] = rng.integers(12, size=n)
+        self.columns["fault_tooth"] = np.where(
+            self.columns["label"] > 0, rng.integers(12, size=n), -1
+        )
+        self.columns["start_tooth_pinion"] = self.columns["start_tooth_wheel"] = rng.integers(
+            12, size=n
+        )
         self.columns["start_phase"] = rng.uniform(size=n)
 
     def signals(self, record_index, start=0, stop=None, channels=None, *, name="acceleration"):
@@ -34,9 +40,17 @@ class Machines(FakeDataset):
         gains = 10 ** np.random.default_rng([2, unit]).uniform(-0.5, 0.5, 12)
         if self.columns["label"][record_index]:
             gains[self.columns["fault_tooth"][record_index]] *= self.fall
-        first = self.columns["start_tooth_wheel"][record_index] + self.columns["start_phase"][record_index]
-        tooth = np.floor(np.arange(self.n_samples) / self.sampling_rate * 120.0 + first).astype(int) % 12
-        noise = np.random.default_rng([3, record_index]).normal(size=(len(self.channel_names), self.n_samples))
+        first = (
+            self.columns["start_tooth_wheel"][record_index]
+            + self.columns["start_phase"][record_index]
+        )
+        tooth = (
+            np.floor(np.arange(self.n_samples) / self.sampling_rate * 120.0 + first).astype(int)
+            % 12
+        )
+        noise = np.random.default_rng([3, record_index]).normal(
+            size=(len(self.channel_names), self.n_samples)
+        )
         signal = (gains[tooth] * noise).astype(np.float32)
         return (signal if channels is None else signal[channels])[:, start:stop]
 

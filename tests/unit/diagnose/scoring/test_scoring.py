@@ -45,7 +45,11 @@ def test_the_truth_scores_one_and_one_class_for_all_scores_chance(dataset, tmp_p
     perfect = score_file(dataset, write(tmp_path / "perfect.csv", rows))
     assert perfect["scores"]["by_unit"]["perfect"]["balanced_accuracy"]["mean"] == 1
     lazy = score_file(dataset, write(tmp_path / "lazy.csv", [[name, "crack"] for name, _ in rows]))
-    assert lazy["scores"]["by_unit"]["lazy"]["balanced_accuracy"]["mean"] == lazy["chance"]["by_unit"] == 0.25
+    assert (
+        lazy["scores"]["by_unit"]["lazy"]["balanced_accuracy"]["mean"]
+        == lazy["chance"]["by_unit"]
+        == 0.25
+    )
     assert lazy["benchmark"] is None
 
 
@@ -55,7 +59,10 @@ def test_predictions_of_a_study_score_as_in_the_study(dataset, tmp_path):
         "epochs=1", "seeds=[0,1]", "batch_size=16", "window_samples=800", "stride_samples=800", "n_threads=1",
         "n_bootstrap=20", "model.widths=[8,16]", "model.kernels=[32,5]", "model.strides=[8,4]",
     ]  # fmt: skip
-    assert main(["train", "data=x", f"out={out}", *fast, "protocols=[by_unit,random_window_leaky]"]) == 0
+    assert (
+        main(["train", "data=x", f"out={out}", *fast, "protocols=[by_unit,random_window_leaky]"])
+        == 0
+    )
     study = json.loads((out / "metrics.json").read_text())["protocols"]["by_unit"]["methods"]
     scores = score_file(dataset, out / "predictions.csv")["scores"]
     assert list(scores) == ["by_unit"]
@@ -73,7 +80,10 @@ def test_predictions_of_a_study_score_as_in_the_study(dataset, tmp_path):
         (lambda rows: [*rows, ["r00000", "crack"]], "0 are missing, 1 are not of the test part"),
         (lambda rows: [*rows, rows[0]], "twice for by_unit, mine, 0"),
         (lambda rows: [["r99999", "crack"], *rows], "line 2: the data set has no record 'r99999'"),
-        (lambda rows: [[rows[0][0], "broken"], *rows[1:]], "line 2: there is no class 'broken'; there is healthy"),
+        (
+            lambda rows: [[rows[0][0], "broken"], *rows[1:]],
+            "line 2: there is no class 'broken'; there is healthy",
+        ),
         (lambda rows: [], "has no rows"),
         (lambda rows: [[*rows[0], "more"], *rows[1:]], "not all as many cells as its head"),
     ],
@@ -91,7 +101,10 @@ def test_files_that_do_not_fit_are_refused_in_one_line(dataset, tmp_path, capsys
     [
         (b"record_id,label\nr1,crack\n", "has no column predicted"),
         (b"\xff\xfe\x00", "no CSV file in UTF-8"),
-        (b"protocol,record_id,predicted\nrandom_window_leaky,r00000,crack\n", "leaky protocols only"),
+        (
+            b"protocol,record_id,predicted\nrandom_window_leaky,r00000,crack\n",
+            "leaky protocols only",
+        ),
         (b"protocol,record_id,predicted\nby_moon,r00000,crack\n", "no protocol 'by_moon'"),
     ],
 )
@@ -144,9 +157,13 @@ def test_other_noise_of_the_same_strength_is_another_signal(dataset):
         ({"split_sha256": {"by_unit": "0" * 64}}, "its split by_unit is another one"),
     ],
 )
-def test_what_differs_from_the_benchmark_is_not_compared(dataset, tmp_path, monkeypatch, capsys, changes, message):
+def test_what_differs_from_the_benchmark_is_not_compared(
+    dataset, tmp_path, monkeypatch, capsys, changes, message
+):
     path = write(tmp_path / "mine.csv", truth(dataset))
-    monkeypatch.setattr(diagnose.studies.benchmark, "benchmark_of", lambda data: frozen(data, **changes))
+    monkeypatch.setattr(
+        diagnose.studies.benchmark, "benchmark_of", lambda data: frozen(data, **changes)
+    )
     assert main(["score", "--data", "x", "--predictions", str(path)]) == 0
     captured = capsys.readouterr()
     assert message in captured.err
@@ -154,11 +171,17 @@ def test_what_differs_from_the_benchmark_is_not_compared(dataset, tmp_path, monk
 
 
 def test_frozen_benchmarks_are_whole():
-    entries = [entry for entry in files("diagnose").joinpath("frozen").iterdir() if entry.name.endswith(".json")]
+    entries = [
+        entry
+        for entry in files("diagnose").joinpath("frozen").iterdir()
+        if entry.name.endswith(".json")
+    ]
     assert entries
     for entry in entries:
         benchmark = Benchmark(**json.loads(entry.read_text(encoding="utf-8")))
         assert f"{benchmark.name}.json" == entry.name
         assert set(benchmark.results) == set(benchmark.split_sha256)
-        for score in [score for methods in benchmark.results.values() for score in methods.values()]:
+        for score in [
+            score for methods in benchmark.results.values() for score in methods.values()
+        ]:
             assert 0 <= score["low"] <= score["mean"] <= score["high"] <= 1

@@ -1,0 +1,64 @@
+"""The drive line of a configuration as a machine that runs."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+
+from gensig.driveline.engine_line import EngineLine, read_engine_line
+from gensig.driveline.machine import LineMachine
+from gensig.dynamics.integrator import Solver
+from gensig.errors import ConfigError
+from gensig.mesh.options import read_mesh_options, read_slice_options
+from gensig.operation.options import read_operating
+from gensig.options.configuration import Configuration
+from gensig.sensing.manufacturing import Quality
+from gensig.sensing.options import read_sensing
+from gensig.systems.registry import read_heat, read_material, read_modification
+from gensig.units import read
+
+
+def read_line_machine(config: Configuration) -> LineMachine:
+    """The machine of a configuration whose system is a drive line.
+
+    Raises
+    ------
+    ConfigError    for keys or tables that make no engine, and for a mesh that has no records
+    """
+    engine = read_engine_line(config)
+    place = _record_mesh(engine)
+    if read_heat(config).is_any or read_modification(config).is_any:
+        raise ConfigError(
+            "heat and modification are of a single gear pair; a drive line takes heat=none"
+        )
+    operating, quality = (
+        read_operating(config.section("operating")),
+        read(Quality, config.section("quality"), "quality"),
+    )
+    machine = LineMachine(
+        material=read_material(config),
+        mesh=read_mesh_options(config.section("mesh")),
+        operating=operating,
+        sensing=read_sensing(config.section("sensing")),
+        quality=quality,
+        solver=read(Solver, config.section("solver"), "solver"),
+        engine=engine,
+        place=place,
+        slices=read_slice_options(config.section("mesh")),
+    )
+    return replace(machine, operating=replace(operating, speed=operating.speed * machine.ratio))
+
+
+def _record_mesh(engine: EngineLine) -> int:
+    drive, names = engine.drive, engine.mesh_names
+    if drive.record_mesh is None:
+        raise ConfigError(
+            f"system.record_mesh = null: records follow the teeth of one mesh; give its two nodes, one of "
+            f"{', '.join(names) or 'none: this line has no mesh'}"
+        )
+    wanted = "/".join(str(node) for node in drive.record_mesh)
+    if wanted not in names:
+        raise ConfigError(
+            f"system.record_mesh = {list(drive.record_mesh)}: no such mesh; there are {', '.join(names)}, the driving "
+            "node first"
+        )
+    return names.index(wanted)
