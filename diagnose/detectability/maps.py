@@ -113,7 +113,7 @@ def make_maps(
 
     energy = over_cells([cell.energy for cell in cells])
     return Maps(
-        fault=pairs.config["fault"],
+        fault=pairs.config.section("fault").plain(),
         speeds_rpm=pairs.speeds_rpm,
         torques_nm=pairs.torques_nm,
         channels=pairs.channel_names,

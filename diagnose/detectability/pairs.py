@@ -2,11 +2,12 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping
-from typing import Any, Protocol
+from typing import Protocol
 
 import numpy as np
 from numpy.typing import NDArray
+
+from gensig.options.configuration import Configuration
 
 Array = NDArray[np.float64]
 
@@ -15,7 +16,7 @@ class Pairs(Protocol):
     """Machines with and without a fault over a map; every member as `gensig.production.fault_pairs.FaultPairs` says."""
 
     @property
-    def config(self) -> Mapping[str, Any]:
+    def config(self) -> Configuration:
         """The composed configuration."""
 
     @property

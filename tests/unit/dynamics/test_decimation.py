@@ -201,3 +201,14 @@ class TestInBandError:
     def test_of_what_is_still_is_none(self):
         still = np.zeros((1, 1, 256))
         assert_allclose(self.error(still, still), [0.0], rtol=0, atol=0)
+
+
+@pytest.mark.parametrize("n_channels", [1, 2])
+def test_the_error_of_a_record_does_not_depend_on_the_others(n_channels):
+    rng = np.random.default_rng(0)
+    exact = rng.standard_normal((8, n_channels, 1536))
+    found = exact + 1e-4 * rng.standard_normal(exact.shape)
+    together = in_band_error(found, exact, 51_200.0)
+    for n in (1, 2, 3, 8):
+        assert np.array_equal(in_band_error(found[:n], exact[:n], 51_200.0), together[:n])
+    assert np.unique(together).size == 8
