@@ -194,7 +194,7 @@ NAMED_IN_THE_DOCS = (
     "from gensig.config import read_request",
     "from gensig.streaming import RecordStream",
     "from gensig.pairs import FaultPairs",
-    "from gensig.systems.pair_machine import PairMachine",
+    "from gensig.systems.pair_machine import PairMachine, Run, Start, simulate_together",
     "from gensig.systems.shaft_line import DriveLine, read_drive_line",
     "from diagnose.data import StreamingDataset, VibrationDataset",
     "from diagnose.metrics import over_records, score_with_interval",

@@ -30,7 +30,7 @@ from gensig.geometry.gear import Gear
 from gensig.sensing.agreement import agreement
 from gensig.sensing.encoder import Disc
 from gensig.sensing.manufacturing import nominal_gearbox, perfect_specimen
-from gensig.systems.base import Machine, MachineMesh, specimen_table
+from gensig.systems.base import Machine, MachineMesh, simulate_together, specimen_table
 from gensig.systems.run import CleanRecord, Run, Start
 from gensig.systems.supports import in_gearbox
 from gensig.units import from_si
@@ -39,6 +39,18 @@ Array = NDArray[np.float64]
 
 FINEST_BOUNCING = 20  # steps per sample above which what bounces does not come nearer to anything
 PairMachine = Machine  # the name of version 0.9
+
+__all__ = [
+    "CleanRecord",
+    "GearPairMachine",
+    "Machine",
+    "PairMachine",
+    "Run",
+    "Start",
+    "pair_dynamics",
+    "severity",
+    "simulate_together",
+]
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
