@@ -13,6 +13,7 @@ from typing import Any
 
 from gensig.errors import ConfigError
 from gensig.faults.registry import COMPOUND, fault_parts
+from gensig.options import files as option_files
 from gensig.options.compose import compose, options, override_keys, typed_mapping
 from gensig.options.configuration import Configuration
 from gensig.plan.condition_courses import settle_courses
@@ -168,20 +169,28 @@ def _fault_option(
     """A fault option by its name, with words that its keys are given by.
 
     Its file is composed alone, which takes a third of the time. The whole configuration is composed
-    where the name is not known, and where that fails: for an option of one's own that refers to
-    another group, and for its message where no such option exists.
+    where the name is not known, where an experiment sets keys of the fault, and where composing alone
+    fails: for an option of one's own that refers to another group, and for its message where no such
+    option exists.
     """
     removed = tuple(word for word in words.others if word.startswith("~fault."))
-    if name is not None:
+    if name is not None and not _experiment_sets_fault(words.keys.get("experiment"), config_dir):
         try:
             return copy.deepcopy(_option_alone(name, (*removed, *fault_words), config_dir))
         except ConfigError:
             pass
     others = [word for word in words.others if name is None or not word.startswith("fault=")]
     chosen = [] if name is None else [f"fault={name}"]
-    return compose(CONFIG_NAME, [*others, *chosen, *fault_words], config_dir=config_dir)[
-        "fault"
-    ].plain()
+    whole = compose(CONFIG_NAME, [*others, *chosen, *fault_words], config_dir=config_dir)
+    return whole["fault"].plain()
+
+
+def _experiment_sets_fault(experiment: str | None, config_dir: str | Path | None) -> bool:
+    """Whether the file of an experiment sets keys of whatever fault is chosen, such as its gear."""
+    if experiment in (None, "null"):
+        return False
+    keys = option_files.option_keys("experiment", experiment, config_dir)
+    return any(key.name.startswith("fault.") for key in keys)
 
 
 def _option_alone(

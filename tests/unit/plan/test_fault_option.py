@@ -56,3 +56,15 @@ class TestFaultOptionAlone:
         words = _typed_words([])
         _fault_option(words, "crack", (), None)["vary"].clear()
         assert _fault_option(words, "crack", (), None)["vary"]
+
+    @pytest.mark.parametrize("name", ["engine_broken_tooth", "engine_test_point"])
+    def test_what_an_experiment_sets_of_every_fault_is_kept(self, name):
+        classes = read_request([f"experiment={name}"]).config["classes"]
+        assert {fault["gear"] for fault in classes.values()} == {"wheel"}
+
+    @pytest.mark.parametrize("experiment", options("experiment"))
+    def test_classes_are_those_of_whole_compositions(self, experiment):
+        classes = read_request([f"experiment={experiment}"]).config["classes"]
+        for name, fault in classes.items():
+            words = [f"experiment={experiment}", f"fault={name}"]
+            assert fault == compose("generate", words)["fault"]

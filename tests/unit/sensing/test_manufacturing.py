@@ -104,9 +104,11 @@ def pairs(xiamen, gear_with):
     """Pairs of gears from small to large, by name; what is drawn asks for no mesh."""
 
     def pair(pinion, wheel):
-        return SimpleNamespace(
-            pinion=gear_with(**pinion), wheel=replace(gear_with(**wheel), name="wheel")
-        )
+        gears = {
+            "pinion": gear_with(**pinion),
+            "wheel": replace(gear_with(**wheel), name="wheel"),
+        }
+        return SimpleNamespace(gears=gears, **gears)
 
     small, large = {"normal_module": 0.5e-3}, {"normal_module": 20e-3}
     return {
