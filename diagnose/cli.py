@@ -1,4 +1,7 @@
-"""The command ``diagnose``: verbs, help, and one line for a mistake. Everything heavy is imported when needed."""
+"""The command ``diagnose``.
+
+Verbs, help, and one line for a mistake. Everything heavy is imported when needed.
+"""
 
 from __future__ import annotations
 
@@ -37,7 +40,10 @@ PROGRAM = "diagnose"
 
 
 def main(argv: Sequence[str] | None = None) -> int:
-    """Run the command; exit status 0, 2 for a mistake, 3 for the flag of predict, 130 when interrupted."""
+    """Run the command.
+
+    Exit status 0, 2 for a mistake, 3 for the flag of predict, 130 when interrupted.
+    """
     from gensig.terminal.completion import answer, is_asked
 
     if is_asked():

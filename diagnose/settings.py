@@ -22,7 +22,10 @@ BOTH = "both"  # of normalise: without the level, and beside it a second trainin
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class LifeSettings:
-    """What ``task=remaining_life`` is told beside; each key is explained in ``configs/train.yaml``."""
+    """What ``task=remaining_life`` is told beside.
+
+    Each key is explained in ``configs/train.yaml``.
+    """
 
     early_life_h: float | None
     early_life_share: float

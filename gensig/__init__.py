@@ -7,7 +7,8 @@
 >>> float(system.pair.transverse_contact_ratio)              # doctest: +ELLIPSIS
 1.7117...
 
-Importing the package is light: physics, HDF5 and Hydra are imported by the functions that need them.
+Importing the package is light: physics, HDF5 and Hydra are imported by the functions that need
+them.
 """
 
 from __future__ import annotations
@@ -47,7 +48,10 @@ def open_dataset(path: str | Path, *, allow_incomplete: bool = False) -> Dataset
 
 
 def load_system(*overrides: str, config_dir: str | Path | None = None) -> Machine:
-    """The sound machine that overrides describe, as the commands would build it; for its faults see `load_faults`."""
+    """The sound machine that overrides describe, as the commands would build it.
+
+    For its faults see `load_faults`.
+    """
     from gensig.plan.request import read_request
     from gensig.record.machines import read_machine
 

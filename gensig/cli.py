@@ -1,4 +1,7 @@
-"""The command ``gensig``: verbs, help, and one line for a mistake. Only the verbs that need physics import it."""
+"""The command ``gensig``.
+
+Verbs, help, and one line for a mistake. Only the verbs that need physics import it.
+"""
 
 from __future__ import annotations
 
@@ -16,7 +19,10 @@ OF_DIAGNOSE = ("train", "evaluate", "predict", "adapt", "detectability", "score"
 
 
 def main(argv: Sequence[str] | None = None) -> int:
-    """Run the command; exit status 0, 1 for partial or damaged results, 2 for a mistake, 130 when interrupted."""
+    """Run the command.
+
+    Exit status 0, 1 for partial or damaged results, 2 for a mistake, 130 when interrupted.
+    """
     from gensig.terminal.completion import answer, is_asked
 
     if is_asked():

@@ -1,8 +1,14 @@
-"""The errors a user can cause: each says what was given, what is allowed and what to do, in one line."""
+"""The errors a user can cause.
+
+Each says what was given, what is allowed and what to do, in one line.
+"""
 
 
 class GensigError(Exception):
-    """Base of every error that is the user's to mend; commands print it as one line and exit with status 2."""
+    """Base of every error that is the user's to mend.
+
+    Commands print it as one line and exit with status 2.
+    """
 
 
 class ConfigError(GensigError):

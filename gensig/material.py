@@ -31,7 +31,8 @@ class Material:
             )
 
     def in_plane(self, elasticity: str) -> Material:
-        """The material whose plane-stress formulas are those of this one under ``plane_stress`` or ``plane_strain``.
+        """The material whose plane-stress formulas are those of this one under ``plane_stress``
+        or ``plane_strain``.
 
         Plane strain is plane stress with E / (1 - nu^2) and nu / (1 - nu); the shear modulus stays.
         """

@@ -1,7 +1,7 @@
 """Import paths of version 0.9 that users have in their programs, and where the modules are now.
 
-``import diagnose.metrics`` and ``from gensig.config import read_request`` keep working. The finder is
-asked only for modules that do not exist, so that it costs nothing elsewhere.
+``import diagnose.metrics`` and ``from gensig.config import read_request`` keep working. The
+finder is asked only for modules that do not exist, so that it costs nothing elsewhere.
 """
 
 from __future__ import annotations
@@ -37,7 +37,10 @@ MOVED = {
 
 
 class MovedFinder(MetaPathFinder, Loader):
-    """Finds a module of ``MOVED`` under its former name: the same module object as under the new one."""
+    """Finds a module of ``MOVED`` under its former name.
+
+    The same module object as under the new one.
+    """
 
     def find_spec(self, fullname: str, path: Any = None, target: Any = None) -> ModuleSpec | None:
         """The spec of a moved module; None for any other name."""

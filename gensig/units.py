@@ -1,7 +1,7 @@
 """The one converter between unit-suffixed names at the file boundary and SI inside.
 
-``normal_module_mm: 2`` in a file is ``normal_module = 0.002`` in the code. A name without a known suffix is a
-number without unit (``n_teeth``, ``damping_ratio``), taken as it is.
+``normal_module_mm: 2`` in a file is ``normal_module = 0.002`` in the code. A name without a known
+suffix is a number without unit (``n_teeth``, ``damping_ratio``), taken as it is.
 """
 
 from __future__ import annotations
@@ -197,7 +197,10 @@ def _convert(place: str, key: str, value: Any, hint: Any) -> Any:
 
 
 def _is_a(kind: type, value: Any, *, finite: bool = True) -> bool:
-    """Whether a value of a file stands for ``kind``: whole numbers are numbers too, true and false are none."""
+    """Whether a value of a file stands for ``kind``.
+
+    Whole numbers are numbers too, true and false are none.
+    """
     if kind is float:
         number = isinstance(value, int | float) and not isinstance(value, bool)
         return number and (not finite or math.isfinite(value))

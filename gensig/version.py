@@ -1,3 +1,6 @@
-"""The version, which is part of every data set's identity: a change of bits is a change of version."""
+"""The version, which is part of every data set's identity.
+
+A change of bits is a change of version.
+"""
 
 __version__ = "0.9.0"

@@ -1,6 +1,7 @@
 """Condition indicators of whole stretches of signal, for the baselines.
 
-A stretch (a whole record, or what the split gives to the subset) rather than a short window: averaging needs turns.
+A stretch (a whole record, or what the split gives to the subset) rather than a short window:
+averaging needs turns.
 """
 
 from __future__ import annotations

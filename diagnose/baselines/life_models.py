@@ -1,4 +1,7 @@
-"""What a network must beat on remaining lives: the clock alone, and regression on condition indicators."""
+"""What a network must beat on remaining lives.
+
+The clock alone, and regression on condition indicators.
+"""
 
 from __future__ import annotations
 
@@ -43,10 +46,12 @@ def operating_values(task: Task, record: IntArray) -> FloatArray:
 def indicator_table(
     task: Task, lives: Lives, segments: Segments, *, features: str, cache: Cache
 ) -> Table:
-    """Indicators of each snapshot, their change since the first snapshot of the life, and the operating condition.
+    """Indicators of each snapshot, their change since the first snapshot of the life, and the
+    operating condition.
 
-    A machine is watched from its first day, and machines differ: the change tells more than the level. The first
-    snapshot is the earliest of the life in the subset, so that nothing of the future is used.
+    A machine is watched from its first day, and machines differ: the change tells more than the
+    level. The first snapshot is the earliest of the life in the subset, so that nothing of the
+    future is used.
     """
     table = feature_table(task, segments, features=features, cache=cache)
     first = np.empty(segments.record.size, dtype=np.int64)
@@ -75,14 +80,18 @@ def with_age(table: Table, lives: Lives) -> Table:
 
 
 def constant_regression(target: FloatArray, name: NDArray[Any]) -> float:
-    """Mean of (record,) targets in which every life counts the same: what is said without looking."""
+    """Mean of (record,) targets in which every life counts the same.
+
+    What is said without looking.
+    """
     return float(np.average(target, weights=balanced_weights(name)))
 
 
 def fit_regression(
     train: Table, validation: Table, lives: Lives, target: FloatArray
 ) -> tuple[str, Callable[[Table], FloatArray]]:
-    """Ridge regression or gradient boosting, the one of least squared error on the validation lives.
+    """Ridge regression or gradient boosting, the one of least squared error on the validation
+    lives.
 
     Parameters
     ----------

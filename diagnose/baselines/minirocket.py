@@ -64,9 +64,9 @@ def fit_minirocket(windows: FloatArray, *, n_features: int, rng: np.random.Gener
     n_features : rounded down to a multiple of 84
     rng : draws channels and the windows that give the thresholds
 
-    Source: Dempster, Schmidt & Webb (2021), "MiniRocket: a very fast (almost) deterministic transform for time series
-    classification", KDD; several channels as in the authors' later code: each kernel sees a drawn set of channels, the
-    logarithm of whose number is uniform.
+    Source: Dempster, Schmidt & Webb (2021), "MiniRocket: a very fast (almost) deterministic
+    transform for time series classification", KDD; several channels as in the authors' later
+    code: each kernel sees a drawn set of channels, the logarithm of whose number is uniform.
     """
     import torch
 
@@ -101,9 +101,11 @@ def fit_minirocket(windows: FloatArray, *, n_features: int, rng: np.random.Gener
 
 
 def minirocket_features(windows: FloatArray, banks: list[Bank]) -> FloatArray:
-    """(window, feature) share of positive values of every convolution less its threshold, of float32 windows.
+    """(window, feature) share of positive values of every convolution less its threshold, of
+    float32 windows.
 
-    Two windows at a time stay in the cache of a processor; sums of bytes are ten times as fast in numpy as in torch.
+    Two windows at a time stay in the cache of a processor; sums of bytes are ten times as fast in
+    numpy as in torch.
     """
     import torch
 
@@ -132,7 +134,9 @@ def _shares(windows: torch.Tensor, bank: Bank) -> FloatArray:
 
 
 def _dilations(n_samples: int, per_kernel: int) -> list[tuple[int, int]]:
-    """Dilations, spread evenly on a logarithmic scale up to the whole window, and features a kernel at each."""
+    """Dilations, spread evenly on a logarithmic scale up to the whole window, and features a
+    kernel at each.
+    """
     n_exponents = min(per_kernel, MAX_DILATIONS)
     longest = max((n_samples - 1) / (KERNEL_LENGTH - 1), 1)
     values = np.floor(np.logspace(0, np.log2(longest), n_exponents, base=2)).astype(int)

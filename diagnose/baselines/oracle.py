@@ -1,4 +1,7 @@
-"""The oracle: what a classifier finds that is given the healthy twin of every record, in as much noise."""
+"""The oracle.
+
+What a classifier finds that is given the healthy twin of every record, in as much noise.
+"""
 
 from __future__ import annotations
 
@@ -30,10 +33,11 @@ def has_twin(dataset: Dataset) -> bool:
 def oracle_windows(
     task: Task, segments: Segments, inputs: NetworkInput, *, training: bool = False
 ) -> WindowSet:
-    """Inputs of a network (2 x channel, sample): the record, then the record less its twin, both by the same divisor.
+    """Inputs of a network (2 x channel, sample): the record, then the record less its twin, both
+    by the same divisor.
 
-    Under ``normalise=rms`` that is the twin's RMS over the stretch, channel by channel. Record and difference say what
-    record and twin say; no kernel has to learn to subtract.
+    Under ``normalise=rms`` that is the twin's RMS over the stretch, channel by channel. Record
+    and difference say what record and twin say; no kernel has to learn to subtract.
     """
     windows = inputs.load(task, segments, training=training, read=_record_and_difference)
     return replace(windows, normalise="none")
@@ -53,8 +57,9 @@ def _record_and_difference(task: Task, record: int, start: int, stop: int) -> ND
 def oracle_table(task: Task, segments: Segments, cache: Cache) -> FeatureTable:
     """Indicators and band levels of stretches, (row, feature).
 
-    Of every channel: the indicators of record, twin and difference, the levels of the difference in bands, and those of
-    the record over the twin's. ``cache`` is filled and used, so that protocols share what they have in common.
+    Of every channel: the indicators of record, twin and difference, the levels of the difference
+    in bands, and those of the record over the twin's. ``cache`` is filled and used, so that
+    protocols share what they have in common.
     """
     speed, n_teeth = known_rotation(task)
     stretches = zip(

@@ -1,4 +1,7 @@
-"""What a record's row and place in the file tell of its class, without its signal: it must be nothing."""
+"""What a record's row and place in the file tell of its class, without its signal.
+
+It must be nothing.
+"""
 
 from __future__ import annotations
 
@@ -40,7 +43,10 @@ READ_OFF = ("speed_rpm", "mesh_frequency_hz")
 
 
 def probed_columns(dataset: Dataset, *, results: bool) -> list[str]:
-    """Names of the columns that tell of a record without its signal; with ``results`` what the simulation adds."""
+    """Names of the columns that tell of a record without its signal.
+
+    With ``results`` what the simulation adds.
+    """
     return [name for name in dataset.column_names if _is_probed(name, results)]
 
 
@@ -55,7 +61,8 @@ def _is_probed(name: str, results: bool) -> bool:
 def probe_values(
     dataset: Dataset, n_classes: int, *, results: bool
 ) -> tuple[FloatArray, tuple[str, ...]]:
-    """Values (record, feature) of all records and their names: columns, text as numbers, and the place in the file.
+    """Values (record, feature) of all records and their names: columns, text as numbers, and the
+    place in the file.
 
     All records are of one length, so that length tells nothing.
     """

@@ -1,6 +1,8 @@
-"""Records against a sound record of the same machine: which tooth changed, band by band; for machines with a history.
+"""Records against a sound record of the same machine: which tooth changed, band by band; for
+machines with a history.
 
-A model that is given what a monitored machine has and a new one has not. ``docs/howto/engine_faults.md``.
+A model that is given what a monitored machine has and a new one has not.
+``docs/howto/engine_faults.md``.
 """
 
 from __future__ import annotations
@@ -37,7 +39,8 @@ Levels = dict[
 
 
 def references(task: Task) -> IntArray:
-    """(record,) another sound record of the same unit, nearest in speed; -1 in units of fewer than two.
+    """(record,) another sound record of the same unit, nearest in speed; -1 in units of fewer
+    than two.
 
     Raises
     ------
@@ -67,7 +70,8 @@ def references(task: Task) -> IntArray:
 def reference_table(task: Task, segments: Segments, known: Levels) -> FeatureTable:
     """Changes of the teeth of both gears, stretch by stretch, columns as of `_names`.
 
-    The reference is the whole sound record, also where a stretch is a part of one. ``known`` is filled and used.
+    The reference is the whole sound record, also where a stretch is a part of one. ``known`` is
+    filled and used.
 
     Raises
     ------
@@ -166,7 +170,10 @@ def _measures(changes: FloatArray) -> FloatArray:
 
 
 def _levels(task: Task, known: Levels, record: int, start: int, stop: int) -> dict[str, FloatArray]:
-    """Levels (channel, band, tooth) of either gear, tooth 0 first; NaN for one that makes no turn in the stretch."""
+    """Levels (channel, band, tooth) of either gear, tooth 0 first.
+
+    NaN for one that makes no turn in the stretch.
+    """
     key = (task.channel_names, record, start, stop)
     if key not in known:
         column = {name: float(task.dataset.column(name)[record]) for name in NEEDED[2:]}

@@ -1,1 +1,4 @@
-"""The verbs of the command ``diagnose``, one module each; what is heavy is imported when a verb runs."""
+"""The verbs of the command ``diagnose``, one module each.
+
+What is heavy is imported when a verb runs.
+"""

@@ -73,7 +73,10 @@ def _channels(values: Mapping[str, str]) -> list[str] | None:
 
 
 def _key_values(words: Sequence[str]) -> dict[str, str]:
-    """Words of the form key=value as a dictionary; refuses others, unknown keys and missing ones."""
+    """Words of the form key=value as a dictionary.
+
+    Refuses others, unknown keys and missing ones.
+    """
     values: dict[str, str] = {}
     for word in words:
         key, equals, value = word.partition("=")

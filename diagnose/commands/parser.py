@@ -1,4 +1,7 @@
-"""What the verbs share: a parser that complains in one line, and the refusal of a folder that holds something."""
+"""What the verbs share.
+
+A parser that complains in one line, and the refusal of a folder that holds something.
+"""
 
 from __future__ import annotations
 
@@ -12,7 +15,10 @@ from gensig.terminal.program import Parser
 def verb_parser(
     verb: str, description: str, examples: str, exits: Mapping[int, str] | None = None
 ) -> Parser:
-    """Parser of a verb, to be given its arguments; ``exits`` says what exit statuses of its own mean."""
+    """Parser of a verb, to be given its arguments.
+
+    ``exits`` says what exit statuses of its own mean.
+    """
     return Parser(f"diagnose {verb}", description, examples, exits or {})
 
 

@@ -44,7 +44,10 @@ def add_arguments(parser: ArgumentParser) -> None:
 
 
 def run(words: Sequence[str]) -> int:
-    """Print the scores; a benchmark that differs from the frozen one is named on stderr and not compared."""
+    """Print the scores.
+
+    A benchmark that differs from the frozen one is named on stderr and not compared.
+    """
     arguments = parser().parse_args(words)
     from diagnose.studies.benchmark import score_file, score_table
     from gensig.dataset.reader import open_dataset

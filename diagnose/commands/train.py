@@ -76,7 +76,10 @@ def run(words: Sequence[str]) -> int:
 
 
 def _expand(overrides: Sequence[str], config_dir: str | None) -> list[Configuration]:
-    """Configurations of a multirun, each with its own ``out``; all composed before the first one runs."""
+    """Configurations of a multirun, each with its own ``out``.
+
+    All composed before the first one runs.
+    """
     from gensig.options.compose import compose, job_folders, sweep
 
     jobs = sweep(overrides)

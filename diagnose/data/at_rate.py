@@ -1,4 +1,7 @@
-"""A data set as one that was recorded slower: training at 5, 12.8 or 25.6 kHz on data of 51.2 kHz."""
+"""A data set as one that was recorded slower.
+
+Training at 5, 12.8 or 25.6 kHz on data of 51.2 kHz.
+"""
 
 from __future__ import annotations
 
@@ -88,7 +91,9 @@ class _Slower:
         channels: Sequence[int | str] | None = None,
         **which: Any,
     ) -> np.ndarray:
-        """Acceleration of one record, (channel, sample) float32 in m/s^2, start and stop counted at this rate."""
+        """Acceleration of one record, (channel, sample) float32 in m/s^2, start and stop counted
+        at this rate.
+        """
 
         def read(first: int, last: int) -> np.ndarray:
             return np.asarray(self._dataset.signals(record_index, first, last, channels, **which))

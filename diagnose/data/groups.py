@@ -1,4 +1,7 @@
-"""Records in a few groups by a value: what every curve over a condition or a severity is drawn from."""
+"""Records in a few groups by a value.
+
+What every curve over a condition or a severity is drawn from.
+"""
 
 from __future__ import annotations
 
@@ -34,7 +37,8 @@ class Group:
 
 
 def groups_of(values: NDArray[Any], *, most: int) -> list[Group]:
-    """Groups of numbers with about as many records each, equal values together; of names, one group a name.
+    """Groups of numbers with about as many records each, equal values together; of names, one
+    group a name.
 
     Parameters
     ----------

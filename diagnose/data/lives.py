@@ -1,4 +1,7 @@
-"""Records as snapshots of machines that run to failure: whose life, how old, how long it still runs."""
+"""Records as snapshots of machines that run to failure.
+
+Whose life, how old, how long it still runs.
+"""
 
 from __future__ import annotations
 
@@ -36,7 +39,10 @@ class Lives:
     failed: NDArray[np.bool_]
 
     def known(self, early_life: float) -> NDArray[np.bool_]:
-        """(record,) whether the remaining life, cut at ``early_life`` h, is known: a bound above the cut says it."""
+        """(record,) whether the remaining life, cut at ``early_life`` h, is known.
+
+        A bound above the cut says it.
+        """
         return (self.name != "") & (self.failed | (self.remaining >= early_life))
 
 
@@ -101,7 +107,8 @@ def choose_life_protocols(
     lives: Lives,
     wanted: Sequence[str] | None,
 ) -> tuple[tuple[str, ...], dict[str, str]]:
-    """Protocols that keep every life whole on one side, and of the others wanted, why they are left out.
+    """Protocols that keep every life whole on one side, and of the others wanted, why they are
+    left out.
 
     Raises
     ------
@@ -138,7 +145,8 @@ def _why_not(task: Task, lives: Lives, protocol: str) -> str | None:
 
 
 def early_level(lives: Lives, record: IntArray, *, level_h: float | None, share: float) -> float:
-    """Level in h at which the remaining life is cut: long before its failure a machine shows nothing of it.
+    """Level in h at which the remaining life is cut: long before its failure a machine shows
+    nothing of it.
 
     Parameters
     ----------
@@ -151,8 +159,8 @@ def early_level(lives: Lives, record: IntArray, *, level_h: float | None, share:
     ------
     DatasetError    for lives of no length
 
-    Source: the piecewise linear target of Heimes (2008), "Recurrent neural networks for remaining useful life
-    estimation", International Conference on Prognostics and Health Management.
+    Source: the piecewise linear target of Heimes (2008), "Recurrent neural networks for remaining
+    useful life estimation", International Conference on Prognostics and Health Management.
     """
     if level_h is not None:
         return float(level_h)
@@ -165,7 +173,9 @@ def early_level(lives: Lives, record: IntArray, *, level_h: float | None, share:
 
 
 def balanced_weights(name: NDArray[Any]) -> FloatArray:
-    """(record,) weights of mean 1 by which every life counts the same, from (record,) names of lives."""
+    """(record,) weights of mean 1 by which every life counts the same, from (record,) names of
+    lives.
+    """
     _, place, counts = np.unique(name, return_inverse=True, return_counts=True)
     weight = 1.0 / counts[place]
     return np.asarray(weight / weight.mean())

@@ -1,4 +1,6 @@
-"""Which protocols of a data set a study runs, why others are left out, and what a score on each says."""
+"""Which protocols of a data set a study runs, why others are left out, and what a score on each
+says.
+"""
 
 from __future__ import annotations
 
@@ -11,7 +13,8 @@ from gensig.errors import ConfigError
 if TYPE_CHECKING:
     from diagnose.data.windows import Task
 
-# Their training lacks classes that the test has: scores of novelty are judged there, not accuracy over classes.
+# Their training lacks classes that the test has: scores of novelty are judged there, not accuracy
+# over classes.
 HEALTHY_ONLY = "healthy_only"
 OPEN_PROTOCOLS = (HEALTHY_ONLY, "open_set")
 MEANING = {
@@ -68,11 +71,13 @@ def choose_protocols(
 def channels_to_cross(
     available: Sequence[str], channels: Sequence[str] | None, test_channels: Sequence[str] | None
 ) -> tuple[tuple[str, ...], tuple[str, ...]] | str:
-    """Channels that `CROSS_SENSOR` trains and tests on, the same number, or in one line why there are none.
+    """Channels that `CROSS_SENSOR` trains and tests on, the same number, or in one line why there
+    are none.
 
-    Without a word of the user the first half of the channels is trained on and as many of the second half are tested
-    on: data sets list the sensors of one place side by side, so that a pair of directions stays a pair. With `channels`
-    alone those are tested on that come first among the others.
+    Without a word of the user the first half of the channels is trained on and as many of the
+    second half are tested on: data sets list the sensors of one place side by side, so that a
+    pair of directions stays a pair. With `channels` alone those are tested on that come first
+    among the others.
 
     Raises
     ------

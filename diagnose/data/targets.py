@@ -1,4 +1,7 @@
-"""What a training knows of its records beside the class: how severe the fault is, on which gear, and at which tooth."""
+"""What a training knows of its records beside the class.
+
+How severe the fault is, on which gear, and at which tooth.
+"""
 
 from __future__ import annotations
 
@@ -48,7 +51,8 @@ def record_targets(dataset: Dataset, record: NDArray[np.integer]) -> dict[str, N
 def fault_places(
     dataset: Dataset, record: NDArray[np.integer], passages: FloatArray, n_teeth: Sequence[int]
 ) -> FloatArray:
-    """Where on its gear's turn a fault comes into mesh, in teeth from the first sample of the window.
+    """Where on its gear's turn a fault comes into mesh, in teeth from the first sample of the
+    window.
 
     Parameters
     ----------
@@ -75,7 +79,8 @@ def fault_places(
 def further_loss(
     answers: Mapping[str, torch.Tensor], label: torch.Tensor, targets: Mapping[str, torch.Tensor]
 ) -> torch.Tensor:
-    """Loss of the severity and gear heads of a batch, those that there are, each weighing as much as the other.
+    """Loss of the severity and gear heads of a batch, those that there are, each weighing as much
+    as the other.
 
     Parameters
     ----------
@@ -103,8 +108,9 @@ def place_loss(
 ) -> torch.Tensor:
     """How far the scores of a fault's own class are from pointing at its tooth.
 
-    A record says that somewhere on a gear one tooth is bad; a simulated one also says which. Without that a network has
-    to find out by itself which of all teeth made the label, and learns the sound teeth of its training gears by heart.
+    A record says that somewhere on a gear one tooth is bad; a simulated one also says which.
+    Without that a network has to find out by itself which of all teeth made the label, and learns
+    the sound teeth of its training gears by heart.
 
     Parameters
     ----------

@@ -1,4 +1,7 @@
-"""Data sets for torch: one window at a time, from files or from records made meanwhile, for loops of your own."""
+"""Data sets for torch.
+
+One window at a time, from files or from records made meanwhile, for loops of your own.
+"""
 
 from __future__ import annotations
 
@@ -29,7 +32,8 @@ if TYPE_CHECKING:
 class VibrationDataset(torch.utils.data.Dataset[tuple[torch.Tensor, int]]):
     """Windows of one subset of a split, read when asked for; safe in forked and spawned workers.
 
-    Windows are cut after the split: each lies inside the stretch that the split gives to its subset.
+    Windows are cut after the split: each lies inside the stretch that the split gives to its
+    subset.
 
     Parameters
     ----------
@@ -91,11 +95,13 @@ Item = tuple[torch.Tensor, int]
 
 
 class StreamingDataset(torch.utils.data.IterableDataset[Item]):
-    """Windows of records that are made while the network trains, nothing stored; safe in forked and spawned workers.
+    """Windows of records that are made while the network trains, nothing stored; safe in forked
+    and spawned workers.
 
-    The workers of a loader share the records out, each record to one of them; for several machines give each its
-    ``stream.shard(rank, n_machines)``. Without ``shuffle_buffer`` and workers, the items are those of
-    `VibrationDataset` on the stored data set, in the same order and with the same bits.
+    The workers of a loader share the records out, each record to one of them; for several
+    machines give each its ``stream.shard(rank, n_machines)``. Without ``shuffle_buffer`` and
+    workers, the items are those of `VibrationDataset` on the stored data set, in the same order
+    and with the same bits.
 
     Parameters
     ----------
@@ -195,7 +201,9 @@ class StreamingDataset(torch.utils.data.IterableDataset[Item]):
                         yield window, int(labels[index])
 
     def _plan(self, stream: Any) -> tuple[Task, dict[int, IntArray]]:
-        """The task of one epoch, and the first samples of the windows of each record that has any."""
+        """The task of one epoch, and the first samples of the windows of each record that has
+        any.
+        """
         task = task_of(stream, **self._options)
         protocol, subset = self._part
         if protocol is None or subset is None:
@@ -223,7 +231,10 @@ def _whole_records(task: Task) -> Segments:
 
 
 def _cut(task: Task, record: Any, starts: IntArray) -> Iterator[torch.Tensor]:
-    """Windows (channel, sample) of one record, normalised as those of a stored one; refuses what is not finite."""
+    """Windows (channel, sample) of one record, normalised as those of a stored one.
+
+    Refuses what is not finite.
+    """
     signal = record.signals["acceleration"][task.channels]
     if not np.isfinite(signal).all():
         raise DatasetError(

@@ -1,4 +1,7 @@
-"""Order tracking: a recording as the machine would have made it at one speed, by a tachometer or by the mesh."""
+"""Order tracking.
+
+A recording as the machine would have made it at one speed, by a tachometer or by the mesh.
+"""
 
 from __future__ import annotations
 
@@ -44,7 +47,8 @@ class Tracked:
 def track_by_tacho(
     recording: Recording, tacho: FloatArray, name: str, *, pulses_per_turn: int
 ) -> Tracked:
-    """Follow the pulses of a tachometer on the driving shaft; what lies before the first and after the last is lost.
+    """Follow the pulses of a tachometer on the driving shaft; what lies before the first and
+    after the last is lost.
 
     Parameters
     ----------
@@ -84,7 +88,8 @@ def track_by_tacho(
 
 
 def track_by_mesh(recording: Recording, teeth: Teeth, speed_rpm: float) -> Tracked:
-    """Follow the harmonics of the mesh of a speed that stays within 3 % of the stated one and changes in many turns.
+    """Follow the harmonics of the mesh of a speed that stays within 3 % of the stated one and
+    changes in many turns.
 
     Raises
     ------

@@ -1,4 +1,7 @@
-"""How long a window is where nobody says: long enough for the faulty tooth to pass, whatever the rate and the speed."""
+"""How long a window is where nobody says.
+
+Long enough for the faulty tooth to pass, whatever the rate and the speed.
+"""
 
 from __future__ import annotations
 
@@ -19,10 +22,11 @@ ROUNDING = 1e-6  # of a sample
 
 
 def chosen_window(dataset: Dataset) -> tuple[int, str | None]:
-    """Length of a window, in samples, that suits the records of a data set, and in one line why if it is not `LEAST`.
+    """Length of a window, in samples, that suits the records of a data set, and in one line why
+    if it is not `LEAST`.
 
-    It holds `TURNS` turns of the slowest gear that any record has a fault on, at the slowest speed of all, at least
-    `LEAST` and at most a record.
+    It holds `TURNS` turns of the slowest gear that any record has a fault on, at the slowest
+    speed of all, at least `LEAST` and at most a record.
 
     Parameters
     ----------
@@ -46,7 +50,9 @@ def chosen_window(dataset: Dataset) -> tuple[int, str | None]:
 
 
 def _slowest_turn(dataset: Dataset) -> tuple[str, float]:
-    """The gear that a fault passes most seldom on, and the longest time that it takes for a turn, s."""
+    """The gear that a fault passes most seldom on, and the longest time that it takes for a turn,
+    s.
+    """
     names = dataset.column_names
     if "speed_rpm" not in names:
         raise DatasetError(

@@ -1,4 +1,6 @@
-"""Which stretches of which records belong to a subset, and the windows cut from them, always after the split."""
+"""Which stretches of which records belong to a subset, and the windows cut from them, always
+after the split.
+"""
 
 from __future__ import annotations
 
@@ -225,7 +227,8 @@ Read = Callable[["Task", int, int, int], NDArray[np.float32]]
 
 
 def load_windows(task: Task, segments: Segments, *, read: Read | None = None) -> WindowSet:
-    """Read the stretches into memory (4 bytes a sample), by `read_signal` or ``read``, and plan their windows.
+    """Read the stretches into memory (4 bytes a sample), by `read_signal` or ``read``, and plan
+    their windows.
 
     Raises
     ------
@@ -262,7 +265,9 @@ def read_signal(
 
 
 def normalised(windows: NDArray[np.float32], how: str) -> NDArray[np.float32]:
-    """Windows (..., channel, sample) less their mean and, for ``"rms"``, divided by their RMS channel by channel."""
+    """Windows (..., channel, sample) less their mean and, for ``"rms"``, divided by their RMS
+    channel by channel.
+    """
     centered = windows - windows.mean(axis=-1, keepdims=True)
     if how == "none":
         return centered

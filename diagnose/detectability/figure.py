@@ -1,4 +1,7 @@
-"""The figure of `diagnose detectability`: a row an observer, the best map large, all channels and bandwidths small."""
+"""The figure of `diagnose detectability`.
+
+A row an observer, the best map large, all channels and bandwidths small.
+"""
 
 from __future__ import annotations
 
@@ -23,7 +26,10 @@ LEAST_TOP = (
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class _Row:
-    """One observer: values (speed, torque, channel, band), their scale, and what is written into a cell."""
+    """One observer.
+
+    Values (speed, torque, channel, band), their scale, and what is written into a cell.
+    """
 
     title: str
     label: str

@@ -1,4 +1,6 @@
-"""Maps of how well a fault can be told, over speed, torque, channel and bandwidth, by two observers."""
+"""Maps of how well a fault can be told, over speed, torque, channel and bandwidth, by two
+observers.
+"""
 
 from __future__ import annotations
 
@@ -32,8 +34,9 @@ BANDWIDTHS_HZ = (1000.0, 2000.0, 5000.0, 10000.0, 20000.0)
 class Cell:
     """One speed and torque as the observers see it.
 
-    ``energy`` (unit, channel, band) is the square of d' that each band brings, ``noise_power`` (unit, channel)
-    (m/s2)^2; the others (channel, band) tell of indicators, as `diagnose.detectability.observers.Seen` does.
+    ``energy`` (unit, channel, band) is the square of d' that each band brings, ``noise_power``
+    (unit, channel) (m/s2)^2; the others (channel, band) tell of indicators, as
+    `diagnose.detectability.observers.Seen` does.
     """
 
     energy: FloatArray
@@ -49,9 +52,10 @@ class Cell:
 class Maps:
     """Both observers' maps.
 
-    ``known`` is d' of the matched filter by bandwidth and ``known_band`` that of each band alone, both the median over
-    the machines; ``seen``, ``standard_error``, ``auroc``, ``indicator`` and ``raises`` are those of indicators. All are
-    (speed, torque, channel, band); ``noise_rms`` (speed, torque, channel) m/s2, ``n_failed`` pairs that have no signal.
+    ``known`` is d' of the matched filter by bandwidth and ``known_band`` that of each band alone,
+    both the median over the machines; ``seen``, ``standard_error``, ``auroc``, ``indicator`` and
+    ``raises`` are those of indicators. All are (speed, torque, channel, band); ``noise_rms``
+    (speed, torque, channel) m/s2, ``n_failed`` pairs that have no signal.
     """
 
     fault: dict[str, Any]
@@ -74,7 +78,8 @@ class Maps:
 
 
 def read_bandwidths(given: Sequence[float] | None, pairs: Pairs) -> tuple[float, ...]:
-    """Upper frequencies in Hz, rising; by default those of `BANDWIDTHS_HZ` that the signals have, and their highest.
+    """Upper frequencies in Hz, rising; by default those of `BANDWIDTHS_HZ` that the signals have,
+    and their highest.
 
     Raises
     ------
@@ -99,7 +104,8 @@ def read_bandwidths(given: Sequence[float] | None, pairs: Pairs) -> tuple[float,
 def make_maps(
     pairs: Pairs, bandwidths: Sequence[float], *, n_workers: int, on_done: Callable[[str], None]
 ) -> Maps:
-    """Simulate every cell and let both observers look at it; the same bits for any number of workers.
+    """Simulate every cell and let both observers look at it; the same bits for any number of
+    workers.
 
     Raises
     ------
@@ -175,7 +181,10 @@ def best_and_worst(values: FloatArray) -> tuple[tuple[int, ...], tuple[int, ...]
 
 
 def confirm_best(maps: Maps, others: Pairs) -> Seen:
-    """The best test of the indicators on machines that had no part in choosing it; ``others`` of the same map."""
+    """The best test of the indicators on machines that had no part in choosing it.
+
+    ``others`` of the same map.
+    """
     speed, torque, channel, band = place = best_and_worst(maps.seen)[0]
     cell = others.cell(speed * len(maps.torques_nm) + torque)
     sound, faulty = (

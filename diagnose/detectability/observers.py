@@ -1,7 +1,8 @@
-"""Two observers of the same fault: one that knows what it adds, one that knows indicators of other machines.
+"""Two observers of the same fault: one that knows what it adds, one that knows indicators of
+other machines.
 
-Both answer with d': how far apart sound and faulty lie, in standard deviations. A share Phi(d' / sqrt(2)) of pairs of
-a sound and a faulty record is then ranked right.
+Both answer with d': how far apart sound and faulty lie, in standard deviations. A share Phi(d' /
+sqrt(2)) of pairs of a sound and a faulty record is then ranked right.
 """
 
 from __future__ import annotations
@@ -34,7 +35,8 @@ def residual_energy(
     sampling_rate: float,
     bandwidths: Sequence[float],
 ) -> FloatArray:
-    """Square of d' that every band of a known residual brings against Gaussian noise of a known spectrum.
+    """Square of d' that every band of a known residual brings against Gaussian noise of a known
+    spectrum.
 
     Parameters
     ----------
@@ -48,8 +50,8 @@ def residual_energy(
     (..., band)    independent bands, and records after one another, add up: d' grows with the root of the duration;
                    NaN without noise
 
-    Source: the matched filter of a known signal in Gaussian noise, whitened: Van Trees (1968), "Detection, estimation,
-    and modulation theory", part I, section 4.3.
+    Source: the matched filter of a known signal in Gaussian noise, whitened: Van Trees (1968),
+    "Detection, estimation, and modulation theory", part I, section 4.3.
     """
     n_samples = residual.shape[-1]
     frequency = np.fft.rfftfreq(n_samples, 1.0 / sampling_rate)
@@ -83,11 +85,12 @@ def band_indicators(
     gears: Mapping[str, tuple[int, float]],
     bandwidths: Sequence[float],
 ) -> FloatArray:
-    """Logarithms of the indicators of one record, as an analyst with a tachometer has them, by bandwidth.
+    """Logarithms of the indicators of one record, as an analyst with a tachometer has them, by
+    bandwidth.
 
-    ``band_rms`` and the envelope are those of the highest band of the bandwidth alone, all others of everything below.
-    The envelope is the amplitude of its first `ENVELOPE_HARMONICS` orders of the gear over its mean; averages are those
-    of all whole turns that there are.
+    ``band_rms`` and the envelope are those of the highest band of the bandwidth alone, all others
+    of everything below. The envelope is the amplitude of its first `ENVELOPE_HARMONICS` orders of
+    the gear over its mean; averages are those of all whole turns that there are.
 
     Parameters
     ----------
@@ -185,8 +188,9 @@ def _of_average(average: FloatArray, highest_order: int, n_teeth: int) -> list[F
 class Seen:
     """What indicators tell of a fault on machines that had no part in choosing one.
 
-    ``d_prime`` with its ``standard_error``, ``auroc`` of pairs of different machines, the ``indicator`` that most
-    choices fell on, by its place, and whether the fault ``raises`` it; NaN and -1 where too few machines have one.
+    ``d_prime`` with its ``standard_error``, ``auroc`` of pairs of different machines, the
+    ``indicator`` that most choices fell on, by its place, and whether the fault ``raises`` it;
+    NaN and -1 where too few machines have one.
     """
 
     d_prime: float
@@ -202,10 +206,12 @@ NOTHING_SEEN = Seen(
 
 
 def seen_by_indicators(sound: FloatArray, faulty: FloatArray) -> Seen:
-    """Choose the indicator that tells best on all machines but one, and judge it on that one; each in turn.
+    """Choose the indicator that tells best on all machines but one, and judge it on that one;
+    each in turn.
 
-    A machine's score is how many standard deviations of the sound ones it lies off their mean, in the direction in
-    which the faulty ones of the others do: what was chosen for different machines is then on one scale.
+    A machine's score is how many standard deviations of the sound ones it lies off their mean, in
+    the direction in which the faulty ones of the others do: what was chosen for different
+    machines is then on one scale.
 
     Parameters
     ----------
@@ -246,7 +252,8 @@ def seen_by_indicators(sound: FloatArray, faulty: FloatArray) -> Seen:
 
 
 def confirmed(sound: FloatArray, faulty: FloatArray, *, indicator: int, raises: bool) -> Seen:
-    """What one indicator, chosen on other machines, tells: the best of many tests is best by luck too.
+    """What one indicator, chosen on other machines, tells: the best of many tests is best by luck
+    too.
 
     Parameters
     ----------
@@ -280,12 +287,17 @@ def _judged(sound: FloatArray, faulty: FloatArray, *, indicator: int, raises: bo
 
 
 def _spread(groups: FloatArray) -> FloatArray:
-    """Root mean square of the standard deviations of two groups, (indicator,) from (group, unit, indicator)."""
+    """Root mean square of the standard deviations of two groups, (indicator,) from (group, unit,
+    indicator).
+    """
     return np.maximum(np.sqrt(np.mean(np.var(groups, axis=1, ddof=1), axis=0)), LEAST_SPREAD)
 
 
 def _auroc(sound: FloatArray, faulty: FloatArray) -> float:
-    """Share of pairs of different machines in which the faulty one scores higher; ties count half."""
+    """Share of pairs of different machines in which the faulty one scores higher.
+
+    Ties count half.
+    """
     higher = np.sign(faulty[:, None] - sound[None, :])
     others = ~np.eye(len(sound), dtype=bool)
     return float(0.5 + 0.5 * higher[others].mean())

@@ -13,7 +13,10 @@ Array = NDArray[np.float64]
 
 
 class Pairs(Protocol):
-    """Machines with and without a fault over a map; every member as `gensig.production.fault_pairs.FaultPairs` says."""
+    """Machines with and without a fault over a map.
+
+    Every member as `gensig.production.fault_pairs.FaultPairs` says.
+    """
 
     @property
     def config(self) -> Configuration:
@@ -60,7 +63,10 @@ class Pairs(Protocol):
 
 
 class PairCell(Protocol):
-    """Pairs of all units at one speed and torque; every member as `gensig.production.fault_pairs.PairCell` says."""
+    """Pairs of all units at one speed and torque.
+
+    Every member as `gensig.production.fault_pairs.PairCell` says.
+    """
 
     @property
     def residual(self) -> Array:

@@ -13,7 +13,10 @@ from diagnose.detectability.observers import Seen
 
 
 def summary(maps: Maps, again: Seen) -> list[str]:
-    """One line an observer: the best test, and the worst; ``again`` is the best one on other machines."""
+    """One line an observer: the best test, and the worst.
+
+    ``again`` is the best one on other machines.
+    """
     best, worst = best_and_worst(maps.seen)
     known_best, known_worst = best_and_worst(maps.known)
     others = f"{again.d_prime:.2f} +- {again.standard_error:.2f}, {again.auroc:.2f}"
@@ -43,7 +46,10 @@ def place_text(maps: Maps, place: Sequence[int]) -> str:
 
 
 def content(maps: Maps, again: Seen) -> dict[str, Any]:
-    """The keys of ``diagnose detectability --json``; ``tests`` has a row a speed, torque, channel and bandwidth."""
+    """The keys of ``diagnose detectability --json``.
+
+    ``tests`` has a row a speed, torque, channel and bandwidth.
+    """
     best = best_and_worst(maps.seen)[0]
     return {
         "fault": maps.fault,

@@ -1,9 +1,11 @@
-"""A trained network moved to a measured machine by its healthy recordings alone: healthy is matched to healthy.
+"""A trained network moved to a measured machine by its healthy recordings alone: healthy is
+matched to healthy.
 
-The statistics of the *healthy* training windows are stored with the network. What healthy windows of the machine have
-instead is taken for the effect of its path, sensors and noise, and undone; faulty windows are expected to be moved in
-the same way, which nothing here can check. Matching all classes of the training to healthy windows, as these methods
-are published for unlabelled mixtures, would take the faults themselves for a property of the simulation.
+The statistics of the *healthy* training windows are stored with the network. What healthy windows
+of the machine have instead is taken for the effect of its path, sensors and noise, and undone;
+faulty windows are expected to be moved in the same way, which nothing here can check. Matching
+all classes of the training to healthy windows, as these methods are published for unlabelled
+mixtures, would take the faults themselves for a property of the simulation.
 """
 
 from __future__ import annotations
@@ -153,14 +155,16 @@ def adapt_network(
 
 
 def _adapt_norms(model: nn.Module, source: Statistics, windows: WindowSet) -> None:
-    """Give each batch normalisation moments that make healthy inputs of the machine those of the training.
+    """Give each batch normalisation moments that make healthy inputs of the machine those of the
+    training.
 
-    With moments (m, v) of the network and (a, p) of healthy training inputs, healthy inputs of the machine with
-    (b, q) need the mean b - (a - m) sqrt(q / p) and the variance v q / p. For a = m and p = v, a mixture taken for
-    healthy, this is adaptive batch normalisation as published. Layer after layer, each behind those moved before.
+    With moments (m, v) of the network and (a, p) of healthy training inputs, healthy inputs of
+    the machine with (b, q) need the mean b - (a - m) sqrt(q / p) and the variance v q / p. For a
+    = m and p = v, a mixture taken for healthy, this is adaptive batch normalisation as published.
+    Layer after layer, each behind those moved before.
 
-    Source: Li, Wang, Shi, Liu & Hou (2016), "Revisiting batch normalization for practical domain adaptation",
-    arXiv:1603.04779, algorithm 1. Healthy for healthy is ours.
+    Source: Li, Wang, Shi, Liu & Hou (2016), "Revisiting batch normalization for practical domain
+    adaptation", arXiv:1603.04779, algorithm 1. Healthy for healthy is ours.
     """
     norms = _norms(model)
     if not norms:
@@ -189,12 +193,13 @@ def _adapt_norms(model: nn.Module, source: Statistics, windows: WindowSet) -> No
 def _align_features(model: nn.Module, source: Statistics, windows: WindowSet) -> None:
     """Bring mean and covariance of the machine's healthy features to those of the training's.
 
-    Rows x become (x - mean_t) C_t^(-1/2) C_s^(1/2) + mean_s, with C = cov + 1 of features divided by the standard
-    deviation of the training's: the inverse of the published map from source to target. What scores features is
-    linear, so that the map goes into its weights.
+    Rows x become (x - mean_t) C_t^(-1/2) C_s^(1/2) + mean_s, with C = cov + 1 of features divided
+    by the standard deviation of the training's: the inverse of the published map from source to
+    target. What scores features is linear, so that the map goes into its weights.
 
-    Source: Sun, Feng & Saenko (2016), "Return of frustratingly easy domain adaptation", AAAI, algorithm 1. There
-    sources are moved and a classifier is trained on them; healthy for healthy, and the means, are ours.
+    Source: Sun, Feng & Saenko (2016), "Return of frustratingly easy domain adaptation", AAAI,
+    algorithm 1. There sources are moved and a classifier is trained on them; healthy for healthy,
+    and the means, are ours.
     """
     head = _head(model)
     target = _observe(model, windows, [])[1]
@@ -223,8 +228,9 @@ METHODS: dict[str, Callable[[nn.Module, Statistics, WindowSet], None]] = {
 def adapt_domain(domain: Domain, source: Statistics, windows: WindowSet) -> Domain:
     """The known windows with their levels moved as healthy ones differ; the threshold stays.
 
-    A path multiplies a spectrum and so adds to its logarithm, to faulty windows what it adds to healthy ones. What
-    strays farther from them than held-out simulated units did is still unlike the training data.
+    A path multiplies a spectrum and so adds to its logarithm, to faulty windows what it adds to
+    healthy ones. What strays farther from them than held-out simulated units did is still unlike
+    the training data.
     """
     if source.levels.shape != domain.levels.shape[1:]:
         raise DatasetError("the healthy statistics belong to another out-of-distribution flag")
@@ -258,7 +264,9 @@ def _head(model: nn.Module) -> nn.Linear:
 def _observe(
     model: nn.Module, windows: WindowSet, names: list[str], *, batch_size: int = 32
 ) -> tuple[dict[str, tuple[FloatArray, FloatArray]], FloatArray]:
-    """Mean and variance of the input of the named layers, and (window, feature) input of the class scores."""
+    """Mean and variance of the input of the named layers, and (window, feature) input of the
+    class scores.
+    """
     sums: dict[str, Any] = {name: 0.0 for name in names}
     squares: dict[str, Any] = {name: 0.0 for name in names}
     counts = dict.fromkeys(names, 0)

@@ -16,14 +16,16 @@ N_DRAWS = 100
 
 
 def probabilities(log_probability: FloatArray, temperature: float = 1.0) -> FloatArray:
-    """Class probabilities (record, class) at a temperature; which class is the largest does not depend on it.
+    """Class probabilities (record, class) at a temperature; which class is the largest does not
+    depend on it.
 
     Parameters
     ----------
     log_probability : (record, class) mean over a record's windows; `diagnose.scoring.metrics.over_records`
     temperature : above 1 makes probabilities more equal, below 1 more different
 
-    Source: Guo, Pleiss, Sun & Weinberger (2017), "On calibration of modern neural networks", ICML, section 4.2.
+    Source: Guo, Pleiss, Sun & Weinberger (2017), "On calibration of modern neural networks",
+    ICML, section 4.2.
     """
     return np.exp(_scaled(log_probability, temperature))
 
@@ -31,8 +33,9 @@ def probabilities(log_probability: FloatArray, temperature: float = 1.0) -> Floa
 def fit_temperature(log_probability: FloatArray, label: IntArray) -> float:
     """Temperature with the least cross-entropy over records that took no part in the training.
 
-    Without more, a network that errs on none of few records would be certain of everything. So the logarithm of the
-    temperature has a normal prior, mean 0 and standard deviation 1, which weighs as much as one record. This is ours.
+    Without more, a network that errs on none of few records would be certain of everything. So
+    the logarithm of the temperature has a normal prior, mean 0 and standard deviation 1, which
+    weighs as much as one record. This is ours.
 
     Parameters
     ----------
@@ -53,7 +56,8 @@ def fit_temperature(log_probability: FloatArray, label: IntArray) -> float:
 
 
 def reliability(confidence: FloatArray, right: NDArray[np.bool_]) -> list[dict[str, float | int]]:
-    """Share of right predictions against the probability given to them, in `N_BINS` equal bins; empty ones left out.
+    """Share of right predictions against the probability given to them, in `N_BINS` equal bins;
+    empty ones left out.
 
     Parameters
     ----------
@@ -72,11 +76,13 @@ def reliability(confidence: FloatArray, right: NDArray[np.bool_]) -> list[dict[s
 
 
 def calibration_error(rows: Sequence[dict[str, float | int]]) -> float:
-    """Expected calibration error of the rows of `reliability`: mean distance of confidence and accuracy over records.
+    """Expected calibration error of the rows of `reliability`: mean distance of confidence and
+    accuracy over records.
 
     Few records make it large by chance alone, see `error_by_chance`.
 
-    Source: Naeini, Cooper & Hauskrecht (2015), "Obtaining well calibrated probabilities using Bayesian binning", AAAI.
+    Source: Naeini, Cooper & Hauskrecht (2015), "Obtaining well calibrated probabilities using
+    Bayesian binning", AAAI.
     """
     total = sum(row["n_records"] for row in rows)
     return float(
@@ -85,7 +91,9 @@ def calibration_error(rows: Sequence[dict[str, float | int]]) -> float:
 
 
 def error_by_chance(confidence: FloatArray) -> float:
-    """Calibration error that such probabilities (record,) have on average when every one of them is true."""
+    """Calibration error that such probabilities (record,) have on average when every one of them
+    is true.
+    """
     rng = np.random.default_rng(0)
     draws = rng.uniform(size=(N_DRAWS, confidence.size)) < confidence
     return float(np.mean([calibration_error(reliability(confidence, right)) for right in draws]))
@@ -96,7 +104,8 @@ def calibration_scores(
     labels: Sequence[IntArray],
     temperatures: Sequence[float],
 ) -> dict[str, Any]:
-    """Calibration over test records before and after scaling, one entry a seed; reliability of all seeds together.
+    """Calibration over test records before and after scaling, one entry a seed; reliability of
+    all seeds together.
 
     Parameters
     ----------

@@ -1,4 +1,7 @@
-"""What a network was trained on: how far the spectrum of a window lies from those of the training windows."""
+"""What a network was trained on.
+
+How far the spectrum of a window lies from those of the training windows.
+"""
 
 from __future__ import annotations
 
@@ -91,13 +94,13 @@ def domain_from(facts: Mapping[str, Any], tensors: Mapping[str, NDArray[Any]]) -
 def fit_domain(train: WindowSet, validation: WindowSet) -> Domain:
     """Levels of training windows, and the threshold from windows of units that were not trained on.
 
-    The distance is that to the fifth nearest training window, which asks for no distribution: speeds and loads make
-    the levels lie in several clouds. It is held on the input, not on the network's features: a network that was never
-    shown noise alone maps it beside quiet records.
+    The distance is that to the fifth nearest training window, which asks for no distribution:
+    speeds and loads make the levels lie in several clouds. It is held on the input, not on the
+    network's features: a network that was never shown noise alone maps it beside quiet records.
 
-    Source: Ramaswamy, Rastogi & Shim (2000), "Efficient algorithms for mining outliers from large data sets", SIGMOD,
-    section 3; threshold on held-out known data as in Sun, Ming, Zhu & Li (2022), "Out-of-distribution detection with
-    deep nearest neighbors", ICML, section 3.
+    Source: Ramaswamy, Rastogi & Shim (2000), "Efficient algorithms for mining outliers from large
+    data sets", SIGMOD, section 3; threshold on held-out known data as in Sun, Ming, Zhu & Li
+    (2022), "Out-of-distribution detection with deep nearest neighbors", ICML, section 3.
     """
     kept = np.unique(
         np.linspace(0, len(train) - 1, min(len(train), MOST_WINDOWS)).round().astype(int)
@@ -112,7 +115,8 @@ def fit_domain(train: WindowSet, validation: WindowSet) -> Domain:
 
 
 def distances(domain: Domain, windows: WindowSet) -> FloatArray:
-    """(window,) to the fifth nearest training window, root of the summed squares of nepers of power.
+    """(window,) to the fifth nearest training window, root of the summed squares of nepers of
+    power.
 
     Raises
     ------
@@ -129,7 +133,9 @@ def distances(domain: Domain, windows: WindowSet) -> FloatArray:
 def window_levels(
     windows: WindowSet, chosen: NDArray[np.integer], *, batch_size: int = 64
 ) -> FloatArray:
-    """(window, feature) `band_levels` of chosen windows at their planned starts, channel after channel."""
+    """(window, feature) `band_levels` of chosen windows at their planned starts, channel after
+    channel.
+    """
     blocks = np.array_split(chosen, -(-chosen.size // batch_size))
     return np.concatenate(
         [band_levels(windows.cut(block)).reshape(block.size, -1) for block in blocks]
@@ -137,7 +143,9 @@ def window_levels(
 
 
 def band_levels(windows: NDArray[np.floating]) -> FloatArray:
-    """(..., band) natural logarithm of the mean power in bands of equal ratio, of windows (..., sample)."""
+    """(..., band) natural logarithm of the mean power in bands of equal ratio, of windows (...,
+    sample).
+    """
     n = windows.shape[-1]
     power = np.abs(np.fft.rfft(windows * np.hanning(n), axis=-1)) ** 2
     lowest = max(min(LOWEST_BIN, n // 4), 1)
@@ -148,7 +156,9 @@ def band_levels(windows: NDArray[np.floating]) -> FloatArray:
 
 
 def neighbor_distance(levels: FloatArray, known: FloatArray) -> FloatArray:
-    """(window,) from each row to the fifth nearest of the known ones, the last where there are fewer."""
+    """(window,) from each row to the fifth nearest of the known ones, the last where there are
+    fewer.
+    """
     from sklearn.neighbors import NearestNeighbors
 
     neighbors = NearestNeighbors(n_neighbors=min(N_NEIGHBORS, len(known))).fit(known.astype(float))

@@ -1,4 +1,7 @@
-"""What the networks have in common: scaled inputs, features, class scores, and further heads on the same features."""
+"""What the networks have in common.
+
+Scaled inputs, features, class scores, and further heads on the same features.
+"""
 
 from __future__ import annotations
 
@@ -47,7 +50,9 @@ class Network(nn.Module, ABC):
 
     @abstractmethod
     def look(self, windows: torch.Tensor) -> tuple[torch.Tensor, torch.Tensor | None]:
-        """Features (window, feature) of scaled windows, and what they are the maximum of, (window, map, place)."""
+        """Features (window, feature) of scaled windows, and what they are the maximum of,
+        (window, map, place).
+        """
 
     def forward(self, windows: torch.Tensor) -> torch.Tensor:
         """Unnormalised class scores (window, class) of windows (window, channel, sample)."""

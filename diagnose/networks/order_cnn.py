@@ -1,4 +1,7 @@
-"""A network on the turns of both gears: the same filters look at every tooth, the most conspicuous one decides."""
+"""A network on the turns of both gears.
+
+The same filters look at every tooth, the most conspicuous one decides.
+"""
 
 from __future__ import annotations
 
@@ -17,11 +20,13 @@ from gensig.errors import ConfigError
 
 
 class OrderCnn(Network):
-    """Convolutions around the turn of either gear, compared with the gear's mean, and the maximum over its teeth.
+    """Convolutions around the turn of either gear, compared with the gear's mean, and the maximum
+    over its teeth.
 
-    The input is `diagnose.data.turns.Turns.packed`: what each tooth adds to the mean passage, gear by gear, and that
-    passage. It is the same at every speed but for the frequency response. Responses of the first filters are compressed
-    by the inverse hyperbolic sine: impacts of tooth engagement are 30 dB above what cracks and pits do between them.
+    The input is `diagnose.data.turns.Turns.packed`: what each tooth adds to the mean passage,
+    gear by gear, and that passage. It is the same at every speed but for the frequency response.
+    Responses of the first filters are compressed by the inverse hyperbolic sine: impacts of tooth
+    engagement are 30 dB above what cracks and pits do between them.
 
     Parameters
     ----------
@@ -80,7 +85,10 @@ class OrderCnn(Network):
         self.add_heads(heads, n_features, n_classes)
 
     def look(self, windows: torch.Tensor) -> tuple[torch.Tensor, torch.Tensor]:
-        """Maximum over the places of each gear's turn, one gear after the other; the maps of all turns."""
+        """Maximum over the places of each gear's turn, one gear after the other.
+
+        The maps of all turns.
+        """
         *turns, mesh = windows.split(self.n_points, dim=-1)
         looked_at = [(turns[gear], self.n_teeth[gear]) for gear in self.gears]
         parts = [

@@ -36,10 +36,12 @@ def log_spectrum(windows: torch.Tensor, floor: float) -> torch.Tensor:
 
 
 class SpectrumCnn(Network):
-    """Small convolutional network on the log-magnitude spectrum of the window: blind to phase and to where in time.
+    """Small convolutional network on the log-magnitude spectrum of the window: blind to phase and
+    to where in time.
 
-    The spectrum has the mean over its bins taken off, channel by channel, so that gain does not tell. The last map is
-    pooled to a fixed number of bands, mean and maximum of each: unlike time, frequency is not interchangeable.
+    The spectrum has the mean over its bins taken off, channel by channel, so that gain does not
+    tell. The last map is pooled to a fixed number of bands, mean and maximum of each: unlike
+    time, frequency is not interchangeable.
 
     Parameters
     ----------

@@ -16,15 +16,17 @@ FIRST_KERNEL, FIRST_STRIDE, FIRST_PADDING = 64, 16, 24
 
 
 class Wdcnn(Network):
-    """Deep convolutional network with a wide first kernel, as published; several channels enter side by side.
+    """Deep convolutional network with a wide first kernel, as published; several channels enter
+    side by side.
 
-    A first convolution of 64 samples with stride 16, then convolutions of 3 samples, the last one without padding. Each
-    is followed by batch normalisation, ReLU and a maximum over 2; a hidden layer and the class scores follow. The
-    weights start as torch starts them.
+    A first convolution of 64 samples with stride 16, then convolutions of 3 samples, the last one
+    without padding. Each is followed by batch normalisation, ReLU and a maximum over 2; a hidden
+    layer and the class scores follow. The weights start as torch starts them.
 
-    For one channel and the published 2048 samples, layers and sizes are those of the paper. Its hidden layer sees the
-    3 positions that such a window leaves. Other windows leave more or fewer: their last map is brought to the same
-    number of positions by the maximum over equal parts. This is ours, and does nothing at 2048 samples.
+    For one channel and the published 2048 samples, layers and sizes are those of the paper. Its
+    hidden layer sees the 3 positions that such a window leaves. Other windows leave more or
+    fewer: their last map is brought to the same number of positions by the maximum over equal
+    parts. This is ours, and does nothing at 2048 samples.
 
     Parameters
     ----------
@@ -35,8 +37,9 @@ class Wdcnn(Network):
     n_hidden : units of the hidden layer
     heads : see `diagnose.settings.HEADS`
 
-    Source: Zhang, Peng, Li, Chen & Zhang (2017), "A new deep learning model for fault diagnosis with good anti-noise
-    and domain adaptation ability on raw vibration signals", Sensors 17 (2), 425, table 2.
+    Source: Zhang, Peng, Li, Chen & Zhang (2017), "A new deep learning model for fault diagnosis
+    with good anti-noise and domain adaptation ability on raw vibration signals", Sensors 17 (2),
+    425, table 2.
     """
 
     inputs: ClassVar[type[NetworkInput]] = Windows

@@ -113,7 +113,10 @@ def fitting_channels(
     dataset: Dataset,
     channels: Sequence[str] | None,
 ) -> tuple[str, ...]:
-    """Channels of a data set for those of a network; refuses another format, a lower rate and what it has not."""
+    """Channels of a data set for those of a network.
+
+    Refuses another format, a lower rate and what it has not.
+    """
     where = f"{dataset.folder} does not fit the model"
     if schema_version(dataset) != description.data_schema_version:
         raise DatasetError(

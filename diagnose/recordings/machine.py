@@ -1,4 +1,7 @@
-"""One machine's healthy recordings and a stored network: the network as it should hear that machine."""
+"""One machine's healthy recordings and a stored network.
+
+The network as it should hear that machine.
+"""
 
 from __future__ import annotations
 
@@ -22,7 +25,8 @@ from gensig.errors import ConfigError, DatasetError
 def adapt_model(
     folder: str | Path, sources: Sequence[Source], method: str, out: str | Path
 ) -> dict[str, Any]:
-    """Adapt a stored network to a machine and store what comes out as another one, for ``diagnose predict``.
+    """Adapt a stored network to a machine and store what comes out as another one, for ``diagnose
+    predict``.
 
     Parameters
     ----------

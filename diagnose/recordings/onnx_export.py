@@ -151,7 +151,10 @@ def write_onnx(
 
 
 def describe_onnx(file: Path, description: ModelDescription, answers: Mapping[str, Any]) -> None:
-    """What the numbers mean, as text and JSON in the file's metadata; ``answers`` what is told of the output."""
+    """What the numbers mean, as text and JSON in the file's metadata.
+
+    ``answers`` what is told of the output.
+    """
     import onnx
 
     facts = {

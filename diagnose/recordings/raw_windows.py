@@ -56,7 +56,10 @@ def without_level(acceleration: torch.Tensor, normalise: str) -> torch.Tensor:
 
 
 class EqualParts(nn.Module):
-    """Mean or maximum over parts as of torch's adaptive pooling, for one length: ONNX has no operator that does it."""
+    """Mean or maximum over parts as of torch's adaptive pooling, for one length.
+
+    ONNX has no operator that does it.
+    """
 
     def __init__(self, n_samples: int, n_parts: int, *, maximum: bool) -> None:
         super().__init__()
@@ -76,7 +79,8 @@ class EqualParts(nn.Module):
 def raw_examples(model: nn.Module, description: ModelDescription) -> NDArray[np.float32]:
     """(window, channel, sample) m/s2: noise and tones beside an offset, and a silent channel.
 
-    Levels go from a tenth to ten times what the network divides its input by, the RMS of its training.
+    Levels go from a tenth to ten times what the network divides its input by, the RMS of its
+    training.
     """
     rng = np.random.default_rng(0)
     shape = (N_CHECKED, len(description.channel_names), description.window_samples)

@@ -203,7 +203,9 @@ def _read(
     description: ModelDescription,
     source: Source,
 ) -> tuple[Recording, tuple[str, ...], NDArray[Any] | None]:
-    """Recording with the network's channels in their order, what the file calls them, and the tachometer's."""
+    """Recording with the network's channels in their order, what the file calls them, and the
+    tachometer's.
+    """
     content = read_file(
         source.file,
         rate=source.sampling_rate,
@@ -236,7 +238,10 @@ def _channels(
     wanted: Sequence[str],
     given: Sequence[str] | None,
 ) -> tuple[str, ...]:
-    """Channels of the file for those of the network: as given, by name, or in order where no name says otherwise."""
+    """Channels of the file for those of the network.
+
+    As given, by name, or in order where no name says otherwise.
+    """
     needs = f"the model takes {len(wanted)}, {', '.join(wanted)}"
     if given is not None:
         if len(given) != len(wanted):
@@ -261,7 +266,10 @@ def _in_domain(
     description: ModelDescription,
     source: Source,
 ) -> NDArray[np.float32]:
-    """(channel, sample) at the network's rate and one speed; refuses what holds less bandwidth than that."""
+    """(channel, sample) at the network's rate and one speed.
+
+    Refuses what holds less bandwidth than that.
+    """
     found, rate, file = recording.sampling_rate, description.sampling_rate_hz, source.file
     if found < rate * (1 - RATE_TOLERANCE):
         raise ConfigError(

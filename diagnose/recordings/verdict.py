@@ -1,4 +1,7 @@
-"""How far the answer for a recording carries: the runner-up, and what the network scored on machines it never saw."""
+"""How far the answer for a recording carries.
+
+The runner-up, and what the network scored on machines it never saw.
+"""
 
 from __future__ import annotations
 

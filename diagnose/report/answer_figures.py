@@ -1,4 +1,7 @@
-"""Figures of the answers as PNG: score over a condition, found share over severity, score over length of signal."""
+"""Figures of the answers as PNG.
+
+Score over a condition, found share over severity, score over length of signal.
+"""
 
 from __future__ import annotations
 
@@ -17,7 +20,8 @@ Answers = Mapping[str, Any]
 
 
 def conditions_figure(path: Path, answers: Answers) -> None:
-    """Scores of the network and the best baseline over each condition; rings mark groups weaker than the rest.
+    """Scores of the network and the best baseline over each condition; rings mark groups weaker
+    than the rest.
 
     Parameters
     ----------
@@ -67,7 +71,8 @@ def conditions_figure(path: Path, answers: Answers) -> None:
 
 
 def detection_figure(path: Path, answers: Answers) -> None:
-    """Share found at 5 % false alarms against severity: groups, fitted curve, and the limits of the network.
+    """Share found at 5 % false alarms against severity: groups, fitted curve, and the limits of
+    the network.
 
     Parameters
     ----------
@@ -150,7 +155,10 @@ def _line_with_band(
     *,
     joined: bool,
 ) -> None:
-    """Values with their intervals: a line in a band where `joined`, else points with bars; open where unknown."""
+    """Values with their intervals: a line in a band where `joined`, else points with bars.
+
+    Open where unknown.
+    """
     mean, low, high = (
         np.array([np.nan if score[key] is None else score[key] for score in scores], dtype=float)
         for key in ("mean", "low", "high")

@@ -17,7 +17,8 @@ from gensig.text.page import Section, Table
 
 
 def answer_sections(folder: Path, clean: Mapping[str, Any]) -> list[Section]:
-    """Sections on detection, conditions, length and comparisons; draws their figures into the folder.
+    """Sections on detection, conditions, length and comparisons; draws their figures into the
+    folder.
 
     Parameters
     ----------

@@ -16,7 +16,8 @@ COMPARISONS = "comparisons.csv"
 
 
 def write_tables(folder: Path, metrics: Mapping[str, Any]) -> list[str]:
-    """Write the CSV files into the folder and return their names; a file that would have no row is left out.
+    """Write the CSV files into the folder and return their names; a file that would have no row
+    is left out.
 
     Parameters
     ----------

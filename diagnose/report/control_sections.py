@@ -1,4 +1,7 @@
-"""The controls in the report: what must be at chance, what may not be, and how near the network is to the oracle."""
+"""The controls in the report.
+
+What must be at chance, what may not be, and how near the network is to the oracle.
+"""
 
 from __future__ import annotations
 

@@ -35,7 +35,9 @@ def confusion_figure(
 
 
 def scores_figure(path: Path, metrics: Mapping[str, Any]) -> None:
-    """Balanced accuracy and interval of every method, one panel a protocol, leaky ones last and in grey."""
+    """Balanced accuracy and interval of every method, one panel a protocol, leaky ones last and
+    in grey.
+    """
     results = sorted(metrics["protocols"].items(), key=lambda item: item[1]["leaky"])
     named = dict.fromkeys(
         [metrics["model"], *(name for _, result in results for name in result["methods"])]
@@ -68,7 +70,10 @@ def scores_figure(path: Path, metrics: Mapping[str, Any]) -> None:
 
 
 def reliability_figure(path: Path, protocols: Mapping[str, Mapping[str, Any]]) -> None:
-    """Share of right predictions against their probability, one panel a protocol; `calibration.calibration_scores`."""
+    """Share of right predictions against their probability, one panel a protocol.
+
+    `calibration.calibration_scores`.
+    """
     figure, axes = subplots(len(protocols), size=(3.9 * len(protocols) + 0.6, 3.9))
     for panel, (protocol, calibration) in zip(axes, protocols.items(), strict=True):
         panel.plot([0, 1], [0, 1], color="0.6", linestyle="--", label="calibrated")

@@ -1,4 +1,7 @@
-"""The result of a study of remaining lives: ``metrics.json``, ``scores.csv``, figures and one HTML page."""
+"""The result of a study of remaining lives.
+
+``metrics.json``, ``scores.csv``, figures and one HTML page.
+"""
 
 from __future__ import annotations
 
@@ -54,7 +57,9 @@ MEANINGS = [
 def write_life_report(
     folder: Path, metrics: Mapping[str, Any], lives: Lives, predictions: Sequence[LifePrediction]
 ) -> Path:
-    """Write ``metrics.json``, ``scores.csv``, a figure a protocol and ``report.html``, and return the page."""
+    """Write ``metrics.json``, ``scores.csv``, a figure a protocol and ``report.html``, and return
+    the page.
+    """
     (folder / "metrics.json").write_text(
         json.dumps(metrics, indent=2, allow_nan=False) + "\n", encoding="utf-8"
     )

@@ -1,4 +1,7 @@
-"""The result of a study: ``metrics.json`` for programs, figures, and one HTML page that is understood in a minute."""
+"""The result of a study.
+
+``metrics.json`` for programs, figures, and one HTML page that is understood in a minute.
+"""
 
 from __future__ import annotations
 
@@ -50,7 +53,10 @@ def write_report(folder: Path, metrics: Mapping[str, Any]) -> Path:
 
 
 def result_table(metrics: Mapping[str, Any]) -> list[str]:
-    """Markdown table of protocol x method: balanced accuracy with its 95 % interval, leaky protocols last."""
+    """Markdown table of protocol x method.
+
+    Balanced accuracy with its 95 % interval, leaky protocols last.
+    """
     if not metrics["protocols"]:
         return []
     table = _score_table(metrics)

@@ -1,4 +1,7 @@
-"""Which condition fails: scores against noise, speed, load, gearbox and whatever else varies from record to record."""
+"""Which condition fails.
+
+Scores against noise, speed, load, gearbox and whatever else varies from record to record.
+"""
 
 from __future__ import annotations
 
@@ -31,7 +34,8 @@ LEAST_UNITS_TESTED = 4  # on both sides of a comparison; the spread of fewer is 
 
 
 def condition_columns(dataset: Dataset, record: NDArray[np.integer]) -> dict[str, NDArray[Any]]:
-    """Columns that say under which condition a record was taken and differ among the records, (record,) each.
+    """Columns that say under which condition a record was taken and differ among the records,
+    (record,) each.
 
     The parameters of faults, seeds and columns that only repeat an earlier one are left out.
     """
@@ -68,10 +72,11 @@ def by_condition(
     n_bootstrap: int,
     rng: np.random.Generator,
 ) -> dict[str, Any]:
-    """Scores of groups of test records, and the groups that the first method finds harder than the rest.
+    """Scores of groups of test records, and the groups that the first method finds harder than
+    the rest.
 
-    Balanced accuracy where every group of a column has `LEAST_A_CLASS` records of each class of the test part, else
-    the share of records that are right.
+    Balanced accuracy where every group of a column has `LEAST_A_CLASS` records of each class of
+    the test part, else the share of records that are right.
 
     Parameters
     ----------
@@ -91,12 +96,14 @@ def by_condition(
     Looking at many groups, one is always the lowest. A group is named only if the upper end of its difference from the
     rest lies below 0, where the ends hold for all the groups at once.
 
-    The standard error is that of the resamples, and no smaller than that of independent records which are as often
-    right as all are: a group that is low by luck shows too small a spread of its own.
+    The standard error is that of the resamples, and no smaller than that of independent records
+    which are as often right as all are: a group that is low by luck shows too small a spread of
+    its own.
 
-    Source: standard error of resampled units with Student's t of as many degrees of freedom as the group has units,
-    less one, as Cameron, Gelbach & Miller (2008), "Bootstrap-based improvements for inference with clustered errors",
-    Review of Economics and Statistics 90 (3), discuss for few clusters; Bonferroni's correction over the groups.
+    Source: standard error of resampled units with Student's t of as many degrees of freedom as
+    the group has units, less one, as Cameron, Gelbach & Miller (2008), "Bootstrap-based
+    improvements for inference with clustered errors", Review of Economics and Statistics 90 (3),
+    discuss for few clusters; Bonferroni's correction over the groups.
     """
     network = methods[0]
     drawn = units_drawn(network.n_units, n_bootstrap, rng)

@@ -1,4 +1,7 @@
-"""Share of faults found against their size: a curve through hits and misses, and where it passes 50 and 90 %."""
+"""Share of faults found against their size.
+
+A curve through hits and misses, and where it passes 50 and 90 %.
+"""
 
 from __future__ import annotations
 
@@ -14,11 +17,13 @@ N_STEPS = 30
 
 
 def fit_curves(size: FloatArray, found: FloatArray, weight: FloatArray) -> FloatArray:
-    """Logistic curves of the share found over the logarithm of the size, (resample, 2) intercept and slope.
+    """Logistic curves of the share found over the logarithm of the size, (resample, 2) intercept
+    and slope.
 
-    The log size is taken less its mean and over its standard deviation. A normal prior of standard deviation 5 on both
-    coefficients keeps curves finite where sizes part what is found from what is not. A falling curve is replaced by a
-    level one: a fault does not become harder to find as it grows.
+    The log size is taken less its mean and over its standard deviation. A normal prior of
+    standard deviation 5 on both coefficients keeps curves finite where sizes part what is found
+    from what is not. A falling curve is replaced by a level one: a fault does not become harder
+    to find as it grows.
 
     Parameters
     ----------
@@ -26,9 +31,10 @@ def fit_curves(size: FloatArray, found: FloatArray, weight: FloatArray) -> Float
     found : (resample, record) share of the trainings that find each record, 0 to 1
     weight : (resample, record) how often each record was drawn
 
-    Source: hit/miss model with logit link over log size of MIL-HDBK-1823A (2009), "Nondestructive evaluation system
-    reliability assessment", appendix G; Newton steps as for any logistic regression. The prior is ours. Written here,
-    not taken from scikit-learn, because thousands of resamples are fitted at once.
+    Source: hit/miss model with logit link over log size of MIL-HDBK-1823A (2009), "Nondestructive
+    evaluation system reliability assessment", appendix G; Newton steps as for any logistic
+    regression. The prior is ours. Written here, not taken from scikit-learn, because thousands of
+    resamples are fitted at once.
     """
     from scipy.special import expit
 
@@ -69,8 +75,8 @@ def curve_at(coefficients: FloatArray, at: FloatArray, size: FloatArray) -> Floa
 def limits(coefficients: FloatArray, size: FloatArray, share: float) -> FloatArray:
     """(resample,) smallest size within those tested from which a share is found.
 
-    The smallest size tested where all of them are found as often, infinite where none of them is: nothing is said of
-    sizes that were not tested.
+    The smallest size tested where all of them are found as often, infinite where none of them is:
+    nothing is said of sizes that were not tested.
     """
     ends = curve_at(coefficients, np.array([size.min(), size.max()]), size)
     rising = np.maximum(coefficients[:, 1], 1e-12)

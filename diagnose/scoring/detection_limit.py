@@ -41,7 +41,9 @@ SIZE_FOLLOWS_SEVERITY = 0.95  # least rank correlation of a fault parameter that
 
 
 def detection_score(log_probability: FloatArray, healthy: int) -> FloatArray:
-    """(...) log P(any fault) - log P(healthy), from log-probabilities (..., class) of any common offset."""
+    """(...) log P(any fault) - log P(healthy), from log-probabilities (..., class) of any common
+    offset.
+    """
     from scipy.special import logsumexp
 
     faulty = np.delete(log_probability, healthy, axis=-1)
@@ -51,15 +53,17 @@ def detection_score(log_probability: FloatArray, healthy: int) -> FloatArray:
 def alarm_threshold(scores: FloatArray, weight: NDArray[np.int64], *, new: bool) -> FloatArray:
     """(resample,) score above which at most 5 % of healthy records lie.
 
-    With `new`, of healthy records like these but not among them: the score of rank ceil(0.95 (n + 1)), for which n must
-    be at least 19, else the highest one. Without it, of these records themselves: rank ceil(0.95 n).
+    With `new`, of healthy records like these but not among them: the score of rank ceil(0.95 (n +
+    1)), for which n must be at least 19, else the highest one. Without it, of these records
+    themselves: rank ceil(0.95 n).
 
     Parameters
     ----------
     scores : (record,) of healthy records
     weight : (resample, record) how often each was drawn
 
-    Source: Vovk, Gammerman & Shafer (2005), "Algorithmic learning in a random world", chapter 2 (conformal prediction).
+    Source: Vovk, Gammerman & Shafer (2005), "Algorithmic learning in a random world", chapter 2
+    (conformal prediction).
     """
     order = np.argsort(scores, kind="stable")
     below = np.cumsum(weight[:, order], axis=1)
@@ -69,7 +73,8 @@ def alarm_threshold(scores: FloatArray, weight: NDArray[np.int64], *, new: bool)
 
 
 def size_columns(dataset: Dataset, record: IntArray, severity: FloatArray) -> dict[str, FloatArray]:
-    """Parameters of one fault class that grow with its severity, (record,) each: its size in physical units.
+    """Parameters of one fault class that grow with its severity, (record,) each: its size in
+    physical units.
 
     Parameters
     ----------
@@ -106,10 +111,11 @@ def detection(
     n_bootstrap: int,
     rng: np.random.Generator,
 ) -> dict[str, Any]:
-    """How many faults one method finds at 5 % false alarms: by class, by size, and from what size on.
+    """How many faults one method finds at 5 % false alarms: by class, by size, and from what size
+    on.
 
-    The threshold of each training is set on the healthy validation records; on the healthy test records where there
-    are fewer than 19 of the former, which is said under ``threshold_from``.
+    The threshold of each training is set on the healthy validation records; on the healthy test
+    records where there are fewer than 19 of the former, which is said under ``threshold_from``.
 
     Parameters
     ----------
@@ -228,8 +234,9 @@ def _area(
 ) -> FloatArray:
     """(1 + resample,) area under the ROC curve, mean over the trainings drawn.
 
-    The share of pairs, one faulty and one healthy record, in which the faulty one scores higher, ties counting half:
-    counted once for each pair of units, then weighted by how often both were drawn.
+    The share of pairs, one faulty and one healthy record, in which the faulty one scores higher,
+    ties counting half: counted once for each pair of units, then weighted by how often both were
+    drawn.
     """
     pairs = np.zeros((judged.n_units, judged.n_units))
     np.add.at(pairs, (judged.unit[healthy][:, None], judged.unit[faulty][None]), 1.0)
@@ -254,7 +261,10 @@ def _area(
 def _by_severity(
     severity: FloatArray | None, member: NDArray[np.bool_], judged: Judged, share: Any
 ) -> list[dict[str, Any]]:
-    """Share found and share given the right class in groups of severity; empty where it does not vary."""
+    """Share found and share given the right class in groups of severity.
+
+    Empty where it does not vary.
+    """
     if severity is None or np.unique(severity).size < 2:
         return []
     rows = []

@@ -1,4 +1,6 @@
-"""What a method said of the test records of a protocol, and its scores on resampled units, alike for every question."""
+"""What a method said of the test records of a protocol, and its scores on resampled units, alike
+for every question.
+"""
 
 from __future__ import annotations
 
@@ -20,7 +22,10 @@ NO_INTERVAL = "[too few machines]"
 
 
 def share_right(confusion: NDArray[np.integer]) -> FloatArray:
-    """(...) share of records given their own class, from counts (..., true, predicted); NaN where there is none."""
+    """(...) share of records given their own class, from counts (..., true, predicted).
+
+    NaN where there is none.
+    """
     total = confusion.sum(axis=(-2, -1))
     right = np.trace(confusion, axis1=-2, axis2=-1).astype(float)
     return np.divide(right, total, out=np.full(total.shape, np.nan), where=total > 0)
@@ -80,9 +85,11 @@ class Judged:
 
 
 def units_drawn(n_units: int, n_bootstrap: int, rng: np.random.Generator) -> NDArray[np.int64]:
-    """How often each resample holds each unit, (resample, unit): as many draws with replacement as there are units.
+    """How often each resample holds each unit, (resample, unit): as many draws with replacement
+    as there are units.
 
-    Source: Efron & Tibshirani (1993), "An introduction to the bootstrap", section 8.3 (units, not records, are drawn).
+    Source: Efron & Tibshirani (1993), "An introduction to the bootstrap", section 8.3 (units, not
+    records, are drawn).
     """
     return rng.multinomial(n_units, np.full(n_units, 1 / n_units), size=n_bootstrap)
 
@@ -90,7 +97,8 @@ def units_drawn(n_units: int, n_bootstrap: int, rng: np.random.Generator) -> NDA
 def resampled_score(
     judged: Judged, measure: str, drawn: NDArray[np.int64], rng: np.random.Generator
 ) -> FloatArray:
-    """(resample,) score of `MEASURES`, mean over seeds that are drawn anew too; NaN where no record was drawn.
+    """(resample,) score of `MEASURES`, mean over seeds that are drawn anew too; NaN where no
+    record was drawn.
 
     Parameters
     ----------
@@ -110,7 +118,8 @@ def score(judged: Judged, measure: str) -> float:
 
 
 def with_interval(value: float, resampled: FloatArray, n_units: int) -> Interval:
-    """Value with its 95 % percentile interval; None for fewer units than `diagnose.scoring.metrics.LEAST_UNITS`.
+    """Value with its 95 % percentile interval; None for fewer units than
+    `diagnose.scoring.metrics.LEAST_UNITS`.
 
     Parameters
     ----------
@@ -130,11 +139,11 @@ def with_interval(value: float, resampled: FloatArray, n_units: int) -> Interval
 def share_with_interval(value: float, resampled: FloatArray, n_units: int) -> Interval:
     """A share with its interval; none or all of few units do not show that it is 0 or 1.
 
-    As `with_interval`, and for a share of 0 or 1, which no resample can leave, also what so many units say if each of
-    them is one trial.
+    As `with_interval`, and for a share of 0 or 1, which no resample can leave, also what so many
+    units say if each of them is one trial.
 
-    Source: Clopper & Pearson (1934), "The use of confidence or fiducial limits illustrated in the case of the
-    binomial", Biometrika 26 (4).
+    Source: Clopper & Pearson (1934), "The use of confidence or fiducial limits illustrated in the
+    case of the binomial", Biometrika 26 (4).
     """
     from scipy.stats import binomtest
 
@@ -152,7 +161,9 @@ def finite(value: float) -> float | None:
 
 
 def interval_text(scored: Mapping[str, Any], form: str = ".2f") -> str:
-    """Value and interval in words, as ``0.53 [0.46, 0.59]``, or `NO_INTERVAL` behind a value that has none."""
+    """Value and interval in words, as ``0.53 [0.46, 0.59]``, or `NO_INTERVAL` behind a value that
+    has none.
+    """
     mean, low, high = (scored[key] for key in ("mean", "low", "high"))
     if mean is None:
         return "unknown"

@@ -1,4 +1,7 @@
-"""Scores of predicted remaining lives: errors, the PHM 2008 score, horizons and intervals, life by life."""
+"""Scores of predicted remaining lives.
+
+Errors, the PHM 2008 score, horizons and intervals, life by life.
+"""
 
 from __future__ import annotations
 
@@ -50,34 +53,44 @@ class Snapshots:
 def interval(
     said: FloatArray, half_width: float, early_life: float
 ) -> tuple[FloatArray, FloatArray]:
-    """Lower and upper ends in h about what is said, (...) each; the early level stands for itself and all above it."""
+    """Lower and upper ends in h about what is said, (...) each.
+
+    The early level stands for itself and all above it.
+    """
     return np.maximum(said - half_width, 0.0), np.minimum(said + half_width, early_life)
 
 
 def intervals_hold(n_lives: int, coverage: float) -> bool:
-    """Whether so many calibration lives are enough for intervals of a coverage, see `conformal_half_width`."""
+    """Whether so many calibration lives are enough for intervals of a coverage, see
+    `conformal_half_width`.
+    """
     return bool((n_lives + 1) * (1 - coverage) >= 1 - 1e-9)
 
 
 def phm_score(error: FloatArray, early_life: float) -> FloatArray:
-    """Asymmetric score of PHM 2008, (...) for errors (...) in h: exp(-d/13) - 1 if d < 0, else exp(d/10) - 1.
+    """Asymmetric score of PHM 2008, (...) for errors (...) in h: exp(-d/13) - 1 if d < 0, else
+    exp(d/10) - 1.
 
-    d is what is predicted less what is true, so that d > 0, too late a warning, costs more. The score was made for
-    cycles of engines; here its unit is 1/125 of the early level, which is cut at 125 cycles in most studies of them.
+    d is what is predicted less what is true, so that d > 0, too late a warning, costs more. The
+    score was made for cycles of engines; here its unit is 1/125 of the early level, which is cut
+    at 125 cycles in most studies of them.
 
-    Source: Saxena, Goebel, Simon & Eklund (2008), "Damage propagation modeling for aircraft engine run-to-failure
-    simulation", International Conference on Prognostics and Health Management, in the form of the challenge of that
-    conference. There it is the sum over lives, each stopped at one snapshot. The unit is ours.
+    Source: Saxena, Goebel, Simon & Eklund (2008), "Damage propagation modeling for aircraft
+    engine run-to-failure simulation", International Conference on Prognostics and Health
+    Management, in the form of the challenge of that conference. There it is the sum over lives,
+    each stopped at one snapshot. The unit is ours.
     """
     d = np.asarray(error, dtype=float) * (UNITS / early_life)
     return np.where(d < 0, np.expm1(-np.minimum(d, 0) / EARLY), np.expm1(np.maximum(d, 0) / LATE))
 
 
 def prognostic_horizon(true: FloatArray, said: FloatArray, band: float) -> float:
-    """Remaining life in h from which on everything said of a life stays within ``band`` h of it; 0 if not at its end.
+    """Remaining life in h from which on everything said of a life stays within ``band`` h of it;
+    0 if not at its end.
 
-    Source: Saxena, Celaya, Saha, Saha & Goebel (2010), "Metrics for offline evaluation of prognostic performance",
-    International Journal of Prognostics and Health Management 1 (1). Their band is a share of the whole life.
+    Source: Saxena, Celaya, Saha, Saha & Goebel (2010), "Metrics for offline evaluation of
+    prognostic performance", International Journal of Prognostics and Health Management 1 (1).
+    Their band is a share of the whole life.
     """
     order = np.argsort(true, kind="stable")
     outside = np.abs(said - true)[order] > band
@@ -86,10 +99,12 @@ def prognostic_horizon(true: FloatArray, said: FloatArray, band: float) -> float
 
 
 def conformal_half_width(error: FloatArray, life: NDArray[Any], coverage: float) -> float:
-    """Half width of intervals that hold a random snapshot of a new life with at least the probability ``coverage``.
+    """Half width of intervals that hold a random snapshot of a new life with at least the
+    probability ``coverage``.
 
-    Every calibration life has the same weight 1/(n + 1), shared by its snapshots, and the new life the last one at
-    infinity: where n lives are too few, n + 1 < 1/(1 - coverage), the half width is infinite.
+    Every calibration life has the same weight 1/(n + 1), shared by its snapshots, and the new
+    life the last one at infinity: where n lives are too few, n + 1 < 1/(1 - coverage), the half
+    width is infinite.
 
     Parameters
     ----------
@@ -97,8 +112,9 @@ def conformal_half_width(error: FloatArray, life: NDArray[Any], coverage: float)
     life : (record,) which life
     coverage : from 0 to 1
 
-    Source: Lee, Barber & Willett (2023), "Distribution-free inference with hierarchical data", arXiv:2306.06342. It
-    assumes lives that are exchangeable with the calibration lives; snapshots of one life may be as alike as they are.
+    Source: Lee, Barber & Willett (2023), "Distribution-free inference with hierarchical data",
+    arXiv:2306.06342. It assumes lives that are exchangeable with the calibration lives; snapshots
+    of one life may be as alike as they are.
     """
     names, place, counts = np.unique(life, return_inverse=True, return_counts=True)
     weight = 1.0 / ((names.size + 1) * counts[place])
@@ -108,7 +124,10 @@ def conformal_half_width(error: FloatArray, life: NDArray[Any], coverage: float)
 
 
 def by_life(snapshots: Snapshots) -> dict[str, NDArray[Any]]:
-    """What `MEASURES` are made of, (life,) each: means over the snapshots of a life, squared errors for the RMSE."""
+    """What `MEASURES` are made of, (life,) each.
+
+    Means over the snapshots of a life, squared errors for the RMSE.
+    """
     error = snapshots.said - snapshots.true
     inside = (snapshots.low <= snapshots.true) & (snapshots.true <= snapshots.high)
     rows = {
@@ -158,7 +177,8 @@ def life_scores(
 def gain(
     values: FloatArray, against: FloatArray, *, n_bootstrap: int, rng: np.random.Generator
 ) -> dict[str, float]:
-    """RMSE of ``against`` less that of ``values``, (seed, life) squared errors each, in h: above 0 is better.
+    """RMSE of ``against`` less that of ``values``, (seed, life) squared errors each, in h: above
+    0 is better.
 
     Both on the same resamples of the lives; `low` and `high` are the 95 % interval.
     """
@@ -177,7 +197,8 @@ def drawn(
 ) -> tuple[Any, Any]:
     """How often each life is drawn, (draw, life), and which seeds, (draw, seed).
 
-    Source: percentile interval of Efron & Tibshirani (1993), "An introduction to the bootstrap", section 13.3.
+    Source: percentile interval of Efron & Tibshirani (1993), "An introduction to the bootstrap",
+    section 13.3.
     """
     lives = rng.multinomial(n_lives, np.full(n_lives, 1 / n_lives), size=n_bootstrap)
     return lives, rng.integers(n_seeds, size=(n_bootstrap, n_seeds))

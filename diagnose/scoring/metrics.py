@@ -1,4 +1,7 @@
-"""Scores over records with intervals over units: windows of one machine are no independent witnesses."""
+"""Scores over records with intervals over units.
+
+Windows of one machine are no independent witnesses.
+"""
 
 from __future__ import annotations
 
@@ -14,14 +17,17 @@ IntArray = NDArray[np.integer]
 FloatArray = NDArray[np.floating]
 CountArray = NDArray[np.integer]
 
-# Of n units one resample in n^n holds the worst alone: of three or fewer more than 2.5 % do, and a 95 % interval would
+# Of n units one resample in n^n holds the worst alone: of three or fewer more than 2.5 % do, and
+# a 95 % interval would
 # end at the worst and the best unit, of zero width where they agree.
 LEAST_UNITS = 4
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Score:
-    """Mean over seeds, its 95 % interval over units (None for fewer than `LEAST_UNITS`), and each seed's own value."""
+    """Mean over seeds, its 95 % interval over units (None for fewer than `LEAST_UNITS`), and each
+    seed's own value.
+    """
 
     mean: float
     low: float | None
@@ -51,7 +57,9 @@ def over_records(log_probability: FloatArray, record: IntArray) -> tuple[IntArra
 def confusion_by_unit(
     label: IntArray, predicted: IntArray, unit: NDArray, n_classes: int
 ) -> NDArray[np.int64]:
-    """Counts (unit, true class, predicted class) from three (record,) arrays, units in sorted order."""
+    """Counts (unit, true class, predicted class) from three (record,) arrays, units in sorted
+    order.
+    """
     names, position = np.unique(unit, return_inverse=True)
     counts = np.zeros((names.size, n_classes, n_classes), dtype=np.int64)
     np.add.at(counts, (position, label, predicted), 1)
@@ -59,7 +67,10 @@ def confusion_by_unit(
 
 
 def recall(confusion: CountArray) -> FloatArray:
-    """(..., class) share of each true class found, from counts (..., true, predicted); NaN for an absent class."""
+    """(..., class) share of each true class found, from counts (..., true, predicted).
+
+    NaN for an absent class.
+    """
     totals = confusion.sum(axis=-1)
     hits = np.diagonal(confusion, axis1=-2, axis2=-1).astype(float)
     return np.divide(hits, totals, out=np.full(totals.shape, np.nan), where=totals > 0)
@@ -100,8 +111,9 @@ def score_with_interval(
     rng : source of the resamples
     shuffled : whether the labels of the training were shuffled; the interval then covers the luck of the shuffle too
 
-    Source: percentile interval of Efron & Tibshirani (1993), "An introduction to the bootstrap", section 13.3. With few
-    units it is too narrow: it is no wider than what the units at hand show. Fewer than `LEAST_UNITS` give none.
+    Source: percentile interval of Efron & Tibshirani (1993), "An introduction to the bootstrap",
+    section 13.3. With few units it is too narrow: it is no wider than what the units at hand
+    show. Fewer than `LEAST_UNITS` give none.
     """
     score = SCORES[name]
     per_seed = score(confusion.sum(axis=1))
@@ -142,7 +154,8 @@ def ratio_with_interval(
     n_bootstrap: int,
     rng: np.random.Generator,
 ) -> dict[str, float | None]:
-    """Score over that of a reference on the same units, each a mean over its seeds, with a 95 % interval.
+    """Score over that of a reference on the same units, each a mean over its seeds, with a 95 %
+    interval.
 
     Parameters
     ----------
@@ -176,10 +189,12 @@ def _over_drawn_seeds(resampled: FloatArray, rng: np.random.Generator) -> FloatA
 def _renaming_luck(
     name: str, confusion: NDArray[np.int64], n_draws: int, rng: np.random.Generator
 ) -> NDArray[np.floating]:
-    """How far a score strays, (draw, seed), when the predicted classes (last axis) are renamed at random.
+    """How far a score strays, (draw, seed), when the predicted classes (last axis) are renamed at
+    random.
 
-    A network that finds the groups but was told nothing of their names scores by luck: all of a class right or wrong.
-    Without a leak every naming is as likely, so that the namings not seen show the spread of the one that was.
+    A network that finds the groups but was told nothing of their names scores by luck: all of a
+    class right or wrong. Without a leak every naming is as likely, so that the namings not seen
+    show the spread of the one that was.
     """
     n_seeds, n_classes = confusion.shape[:2]
     names = rng.permuted(np.tile(np.arange(n_classes), (n_draws, n_seeds, 1)), axis=2)

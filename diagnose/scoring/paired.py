@@ -19,10 +19,11 @@ def compare(
 ) -> list[dict[str, Any]]:
     """Difference of balanced accuracy, network less another method, one row a method.
 
-    The interval comes of resampled units (the same for both) and seeds. The p-value is that of a permutation test over
-    units: if the two were alike, swapping what they say of all records of a unit would change nothing. McNemar's test
-    would count every record as a witness of its own, and records of one unit are none. The p-values are of the
-    trainings at hand, corrected for the number of rows.
+    The interval comes of resampled units (the same for both) and seeds. The p-value is that of a
+    permutation test over units: if the two were alike, swapping what they say of all records of a
+    unit would change nothing. McNemar's test would count every record as a witness of its own,
+    and records of one unit are none. The p-values are of the trainings at hand, corrected for the
+    number of rows.
 
     Parameters
     ----------
@@ -31,9 +32,9 @@ def compare(
     rng : source of the resamples and of the permutations
 
     Source: paired bootstrap as Efron & Tibshirani (1993), section 8.3; permutation test as in
-    `scipy.stats.permutation_test`, Ernst (2004), "Permutation methods: a basis for exact inference", Statistical
-    Science 19 (4); correction Holm (1979), "A simple sequentially rejective multiple test procedure", Scandinavian
-    Journal of Statistics 6 (2).
+    `scipy.stats.permutation_test`, Ernst (2004), "Permutation methods: a basis for exact
+    inference", Statistical Science 19 (4); correction Holm (1979), "A simple sequentially
+    rejective multiple test procedure", Scandinavian Journal of Statistics 6 (2).
     """
     drawn = units_drawn(network.n_units, n_bootstrap, rng)
     mine = resampled_score(network, "balanced_accuracy", drawn, rng)
@@ -57,10 +58,12 @@ def compare(
 
 
 def permutation_p_value(first: Judged, second: Judged, rng: np.random.Generator) -> float:
-    """Two-sided p-value that two methods have the same balanced accuracy, by swapping them unit by unit.
+    """Two-sided p-value that two methods have the same balanced accuracy, by swapping them unit
+    by unit.
 
-    Balanced accuracy is a sum over units (each class counts by its records in the whole test part), so that swapping
-    two methods in a unit changes the sign of the unit's part of the difference. 1 for a single unit.
+    Balanced accuracy is a sum over units (each class counts by its records in the whole test
+    part), so that swapping two methods in a unit changes the sign of the unit's part of the
+    difference. 1 for a single unit.
     """
     from scipy.stats import permutation_test
 

@@ -1,4 +1,7 @@
-"""What each method said of each test record, of which every score is made; ``predictions.csv`` for other programs."""
+"""What each method said of each test record, of which every score is made.
+
+``predictions.csv`` for other programs.
+"""
 
 from __future__ import annotations
 
@@ -30,7 +33,10 @@ CONDITION_COLUMNS = (
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Rows:
-    """What a method says of records, or of windows in time order: record (row,) and log-probabilities (row, class)."""
+    """What a method says of records, or of windows in time order.
+
+    Record (row,) and log-probabilities (row, class).
+    """
 
     record: NDArray[np.integer]
     log_probability: NDArray[np.floating]
@@ -77,7 +83,10 @@ class Prediction:
 
 
 def write_predictions(path: Path, task: Task, predictions: Sequence[Prediction]) -> None:
-    """Write one row a prediction: protocol, method, seed, record, its true class and condition, log-probabilities."""
+    """Write one row a prediction.
+
+    Protocol, method, seed, record, its true class and condition, log-probabilities.
+    """
     dataset, labels = task.dataset, task.labels()
     known = [name for name in CONDITION_COLUMNS if name in dataset.column_names]
     columns = {name: np.asarray(dataset.column(name)) for name in ("record_id", *known)}

@@ -1,4 +1,7 @@
-"""How much a longer signal helps: records judged by their first windows only, with the networks as trained."""
+"""How much a longer signal helps.
+
+Records judged by their first windows only, with the networks as trained.
+"""
 
 from __future__ import annotations
 

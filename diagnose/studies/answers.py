@@ -1,4 +1,7 @@
-"""What a study answers beside its scores: which condition fails, from what severity, with how much signal, who wins."""
+"""What a study answers beside its scores.
+
+Which condition fails, from what severity, with how much signal, who wins.
+"""
 
 from __future__ import annotations
 
@@ -27,7 +30,8 @@ ANSWERS_SEED = 20240608
 def protocol_answers(
     task: Task, settings: TrainSettings, predictions: Sequence[Prediction]
 ) -> dict[str, Any]:
-    """The part ``answers`` of one clean protocol in ``metrics.json``; docs/howto/report.md explains every key.
+    """The part ``answers`` of one clean protocol in ``metrics.json``; docs/howto/report.md
+    explains every key.
 
     Parameters
     ----------
@@ -133,7 +137,9 @@ def _accuracy(judged: Judged) -> float:
 
 
 def _sizes(task: Task, record: NDArray[np.integer]) -> dict[str, dict[str, NDArray[np.floating]]]:
-    """Severity of the records of each faulty class, where it is above 0, and what grows with it in physical units."""
+    """Severity of the records of each faulty class, where it is above 0, and what grows with it
+    in physical units.
+    """
     label = task.labels()[record]
     severity = np.asarray(task.dataset.column("severity"), dtype=float)[record]
     sizes = {}

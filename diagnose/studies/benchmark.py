@@ -1,4 +1,6 @@
-"""Scores of somebody's predictions on a data set's own split, beside the frozen results where it is a benchmark."""
+"""Scores of somebody's predictions on a data set's own split, beside the frozen results where it
+is a benchmark.
+"""
 
 from __future__ import annotations
 
@@ -137,7 +139,9 @@ def score_file(dataset: Dataset, path: Path, *, protocol: str | None = None) -> 
 
 
 def _runs(task: Task, path: Path, protocol: str | None) -> dict[tuple[str, str], list[Run]]:
-    """(protocol, method) -> for each seed the records of the test part, sorted, and their labels, (record,) both."""
+    """(protocol, method) -> for each seed the records of the test part, sorted, and their labels,
+    (record,) both.
+    """
     number_of = {str(name): index for index, name in enumerate(task.dataset.column("record_id"))}
     class_of = {name: index for index, name in enumerate(task.class_names)}
     said: dict[tuple[str, str, str], dict[int, int]] = {}

@@ -70,7 +70,9 @@ def sham_methods(
     predictions: Sequence[Prediction],
     score: Callable[[Task, Pairs], dict[str, Any]],
 ) -> dict[str, dict[str, Any]]:
-    """Protocol -> method -> scores of the trainings on the sham data set, as ``score`` makes them of a task."""
+    """Protocol -> method -> scores of the trainings on the sham data set, as ``score`` makes them
+    of a task.
+    """
     found: dict[str, dict[str, Any]] = {}
     if settings.sham is None:
         return found

@@ -1,4 +1,5 @@
-"""The independent pieces of a study, run on every core: same results whatever their number and order.
+"""The independent pieces of a study, run on every core: same results whatever their number and
+order.
 
 Each piece runs with one thread, in a spawned process or, when there is one core, in this one.
 """
@@ -49,10 +50,12 @@ LABEL_SHUFFLE, ORACLE_NETWORK = "label_shuffle", "oracle_network"
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Job:
-    """One training (with or without shuffled labels), or with seed None the baselines of all the protocols.
+    """One training (with or without shuffled labels), or with seed None the baselines of all the
+    protocols.
 
-    One of `OPEN_PROTOCOLS` is a job of its own: with seed None the scores that are fitted, else those of a network.
-    ``control`` is "" or one of the controls, which then takes the place of the training or of the baselines.
+    One of `OPEN_PROTOCOLS` is a job of its own: with seed None the scores that are fitted, else
+    those of a network. ``control`` is "" or one of the controls, which then takes the place of
+    the training or of the baselines.
     """
 
     protocols: tuple[str, ...]
@@ -73,7 +76,8 @@ def run_jobs(
     on_done: Callable[[list[Any]], None],
     run: Callable[[Task, TrainSettings, Job], list[Any]] | None = None,
 ) -> list[Any]:
-    """Run all jobs, each by `run_job` or ``run``, and collect what they give in the order of the jobs.
+    """Run all jobs, each by `run_job` or ``run``, and collect what they give in the order of the
+    jobs.
 
     Raises
     ------
@@ -108,7 +112,9 @@ def run_jobs(
 
 
 def _forget_inputs() -> None:
-    """Drop what the jobs of one study share, so that the next study in this process loads its own."""
+    """Drop what the jobs of one study share, so that the next study in this process loads its
+    own.
+    """
     _loaded.clear()
     _domains.clear()
     _shams.clear()

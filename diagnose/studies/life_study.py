@@ -1,4 +1,7 @@
-"""A study of remaining lives: what each method says of each snapshot, and the numbers that come of it."""
+"""A study of remaining lives.
+
+What each method says of each snapshot, and the numbers that come of it.
+"""
 
 from __future__ import annotations
 
@@ -158,7 +161,10 @@ def run_life_study(
 
 
 def scored_snapshots(lives: Lives, prediction: LifePrediction) -> Snapshots:
-    """The snapshots of lives that failed: how long a censored one would have run on is not known."""
+    """The snapshots of lives that failed.
+
+    How long a censored one would have run on is not known.
+    """
     chosen = lives.failed[prediction.record]
     record = prediction.record[chosen]
     return Snapshots(
@@ -229,7 +235,10 @@ def _result(
 
 
 def below_bound(lives: Lives, prediction: LifePrediction) -> float:
-    """Share of the censored test snapshots of which less is said than they have run on; 0 where there are none."""
+    """Share of the censored test snapshots of which less is said than they have run on.
+
+    0 where there are none.
+    """
     censored = ~lives.failed[prediction.record]
     bound = np.minimum(lives.remaining[prediction.record], prediction.early_life)[censored]
     return float(np.mean(prediction.said[censored] < bound)) if bound.size else 0.0
@@ -246,7 +255,10 @@ def write_life_predictions(
     lives: Lives,
     predictions: Sequence[LifePrediction],
 ) -> None:
-    """Write one row a prediction; ``scored`` is 0 for a censored life, whose remaining life is a lower bound."""
+    """Write one row a prediction.
+
+    ``scored`` is 0 for a censored life, whose remaining life is a lower bound.
+    """
     ids = np.asarray(task.dataset.column("record_id"))
     head = [
         "protocol",

@@ -1,7 +1,9 @@
-"""Scores of novelty, for protocols whose training lacks classes: the more, the less like what was trained on.
+"""Scores of novelty, for protocols whose training lacks classes: the more, the less like what was
+trained on.
 
-``healthy_only`` knows healthy records alone and asks whether a fault is noticed. ``open_set`` knows all classes but one
-and asks whether a network that tells them apart notices the one it was never shown.
+``healthy_only`` knows healthy records alone and asks whether a fault is noticed. ``open_set``
+knows all classes but one and asks whether a network that tells them apart notices the one it was
+never shown.
 """
 
 from __future__ import annotations
@@ -44,7 +46,8 @@ SCORE_LABELS = {
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class NoveltyRun:
-    """Scores of the test records of a protocol by one method and seed, larger for what is less like the training.
+    """Scores of the test records of a protocol by one method and seed, larger for what is less
+    like the training.
 
     Attributes
     ----------
@@ -66,7 +69,8 @@ class NoveltyRun:
 def fitted_runs(
     task: Task, settings: TrainSettings, protocol: str, sets: Mapping[str, WindowSet]
 ) -> list[NoveltyRun]:
-    """Scores that need no training by steps: distance of band levels, and of healthy records those of indicators.
+    """Scores that need no training by steps: distance of band levels, and of healthy records
+    those of indicators.
 
     Parameters
     ----------
@@ -96,9 +100,11 @@ def fitted_runs(
 def _indicator_runs(
     protocol: str, tables: Mapping[str, FeatureTable], suffix: str, with_level: bool
 ) -> list[NoveltyRun]:
-    """Distance to the fifth nearest training record, and an isolation forest, on standardised indicators.
+    """Distance to the fifth nearest training record, and an isolation forest, on standardised
+    indicators.
 
-    Source: Liu, Ting & Zhou (2008), "Isolation forest", ICDM; the distance as in `diagnose.networks.domain`.
+    Source: Liu, Ting & Zhou (2008), "Isolation forest", ICDM; the distance as in
+    `diagnose.networks.domain`.
     """
     from sklearn.ensemble import IsolationForest
     from sklearn.impute import SimpleImputer
@@ -132,7 +138,10 @@ def _indicator_runs(
 def trained_runs(
     settings: TrainSettings, protocol: str, seed: int, sets: Mapping[str, WindowSet]
 ) -> list[NoveltyRun]:
-    """Scores of a network trained on the known classes: an autoencoder of healthy windows, else a classifier."""
+    """Scores of a network trained on the known classes.
+
+    An autoencoder of healthy windows, else a classifier.
+    """
     if protocol != "healthy_only":
         return _classifier_runs(settings, protocol, seed, sets)
     model = fit_autoencoder(sets["train"], sets["validation"], settings=settings, seed=seed)
@@ -150,13 +159,14 @@ def _classifier_runs(
 ) -> list[NoveltyRun]:
     """Three scores of one classifier of the known classes.
 
-    The largest probability is that of a record's calibrated class probabilities. Energy and distance are means over the
-    record's windows, the energy at temperature 1.
+    The largest probability is that of a record's calibrated class probabilities. Energy and
+    distance are means over the record's windows, the energy at temperature 1.
 
-    Source: Hendrycks & Gimpel (2017), "A baseline for detecting misclassified and out-of-distribution examples in
-    neural networks", ICLR (probability); Liu, Wang, Owens & Li (2020), "Energy-based out-of-distribution detection",
-    NeurIPS, equation 4; Sun, Ming, Zhu & Li (2022), "Out-of-distribution detection with deep nearest neighbors", ICML,
-    section 3 (distance of features of unit length).
+    Source: Hendrycks & Gimpel (2017), "A baseline for detecting misclassified and
+    out-of-distribution examples in neural networks", ICLR (probability); Liu, Wang, Owens & Li
+    (2020), "Energy-based out-of-distribution detection", NeurIPS, equation 4; Sun, Ming, Zhu & Li
+    (2022), "Out-of-distribution detection with deep nearest neighbors", ICML, section 3 (distance
+    of features of unit length).
     """
     classes = np.unique(sets["train"].label)
     known = {
@@ -201,7 +211,9 @@ def _classifier_runs(
 def network_outputs(
     model: nn.Module, windows: WindowSet, chosen: IntArray
 ) -> tuple[FloatArray, FloatArray]:
-    """Features (window, feature) that the last layer of the class scores reads, and its output (window, class)."""
+    """Features (window, feature) that the last layer of the class scores reads, and its output
+    (window, class).
+    """
     heads = [
         part for name, part in model.named_modules() if name == "head" or name.startswith("head.")
     ]

@@ -1,4 +1,7 @@
-"""How well a score tells what was never trained on from what was: AUROC, FPR95, alarms; intervals over units."""
+"""How well a score tells what was never trained on from what was: AUROC, FPR95, alarms.
+
+Intervals over units.
+"""
 
 from __future__ import annotations
 
@@ -32,11 +35,13 @@ LEAST_VALIDATION = 19  # records: with fewer no threshold promises the share
 def alarm_threshold(validation_score: FloatArray) -> float:
     """Score that a new known record exceeds with a probability of at most `FALSE_ALARMS`.
 
-    Of n validation scores the one of rank (n + 1) (1 - share), rounded up, from below. Fewer than `LEAST_VALIDATION`
-    cannot promise the share: then it is the largest. Records of one unit resemble each other, so that the promise is
-    weaker than it reads; the share on test units says what came of it.
+    Of n validation scores the one of rank (n + 1) (1 - share), rounded up, from below. Fewer than
+    `LEAST_VALIDATION` cannot promise the share: then it is the largest. Records of one unit
+    resemble each other, so that the promise is weaker than it reads; the share on test units says
+    what came of it.
 
-    Source: Shafer & Vovk (2008), "A tutorial on conformal prediction", Journal of Machine Learning Research 9.
+    Source: Shafer & Vovk (2008), "A tutorial on conformal prediction", Journal of Machine
+    Learning Research 9.
     """
     n = validation_score.size
     rank = min(int(np.ceil((n + 1) * (1 - FALSE_ALARMS) - 1e-9)), n)
@@ -46,10 +51,11 @@ def alarm_threshold(validation_score: FloatArray) -> float:
 def false_positive_rate_95(
     novel: Mask, score: FloatArray, weight: FloatArray | None = None
 ) -> float:
-    """Share of the novel records taken for known by the threshold that takes `TRUE_POSITIVES` of the known for known.
+    """Share of the novel records taken for known by the threshold that takes `TRUE_POSITIVES` of
+    the known for known.
 
-    Known is the positive class, as in Liu, Wang, Owens & Li (2020), "Energy-based out-of-distribution detection",
-    NeurIPS, section 4.1.
+    Known is the positive class, as in Liu, Wang, Owens & Li (2020), "Energy-based
+    out-of-distribution detection", NeurIPS, section 4.1.
     """
     from sklearn.metrics import roc_curve
 
@@ -60,7 +66,8 @@ def false_positive_rate_95(
 
 
 def check_open_protocol(task: Task, protocol: str) -> None:
-    """Refuse a protocol whose test has nothing new, or nothing known, or where there are no two classes to tell apart.
+    """Refuse a protocol whose test has nothing new, or nothing known, or where there are no two
+    classes to tell apart.
 
     Raises
     ------
@@ -133,7 +140,9 @@ def _accuracy_on_known(
     n_bootstrap: int,
     rng: np.random.Generator,
 ) -> dict[str, Any]:
-    """Balanced accuracy over the test records of known classes, every one of them given a known class."""
+    """Balanced accuracy over the test records of known classes, every one of them given a known
+    class.
+    """
     record = runs[0].record
     mine = np.isin(task.labels()[record], known)
     label, unit = (
@@ -149,7 +158,10 @@ def _accuracy_on_known(
 
 
 def write_novelty(path: Path, task: Task, runs: Sequence[NoveltyRun]) -> None:
-    """Write one row a score: protocol, method, seed, record, its class and unit, the score and the threshold."""
+    """Write one row a score.
+
+    Protocol, method, seed, record, its class and unit, the score and the threshold.
+    """
     labels = task.labels()
     columns = [np.asarray(task.dataset.column(name)) for name in ("record_id", "unit_id")]
     with path.open("w", newline="", encoding="utf-8") as file:
@@ -227,7 +239,10 @@ def novelty_result(
 def _area(
     scores: FloatArray, novel: Mask, unit: IntArray, drawn: IntArray, seeds: IntArray
 ) -> Score:
-    """Area under the ROC curve of (seed, record) scores; resamples from the won comparisons of each pair of units."""
+    """Area under the ROC curve of (seed, record) scores.
+
+    Resamples from the won comparisons of each pair of units.
+    """
     from sklearn.metrics import roc_auc_score
 
     won = np.stack([_won_by_units(score, novel, unit, drawn.shape[1]) for score in scores])
@@ -243,7 +258,9 @@ def _area(
 
 
 def _won_by_units(score: FloatArray, novel: Mask, unit: IntArray, n_units: int) -> FloatArray:
-    """(unit of novel, unit of known) pairs of records in which the novel one has the larger score, equal ones half."""
+    """(unit of novel, unit of known) pairs of records in which the novel one has the larger
+    score, equal ones half.
+    """
     won = np.zeros((n_units, n_units))
     for other in np.unique(unit[~novel]):
         known = np.sort(score[~novel & (unit == other)])

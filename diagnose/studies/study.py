@@ -69,7 +69,10 @@ BOOTSTRAP_SEED = 20240607
 
 
 def is_leaky(protocol: str) -> bool:
-    """Whether a protocol has the same record on both sides; such a score is no measure of diagnosis."""
+    """Whether a protocol has the same record on both sides.
+
+    Such a score is no measure of diagnosis.
+    """
     return "leaky" in protocol
 
 
@@ -270,7 +273,8 @@ def score_predictions(
     *,
     shuffled: bool = False,
 ) -> dict[str, Any]:
-    """Scores with intervals over units, confusion counts (true, predicted) and recall of one method.
+    """Scores with intervals over units, confusion counts (true, predicted) and recall of one
+    method.
 
     Parameters
     ----------
@@ -299,7 +303,10 @@ def score_predictions(
 
 
 def test_score(task: Task, prediction: Prediction, n_bootstrap: int) -> dict[str, Any]:
-    """What is stored with a network of what it scored: balanced accuracy with its interval, chance, and on how much."""
+    """What is stored with a network of what it scored.
+
+    Balanced accuracy with its interval, chance, and on how much.
+    """
     scores = score_predictions(task, [(prediction.record, prediction.predicted)], n_bootstrap)[
         "balanced_accuracy"
     ]
@@ -388,7 +395,10 @@ def _protocol_result(
 def _last_epoch(
     task: Task, settings: TrainSettings, network: Sequence[Prediction]
 ) -> dict[str, Any]:
-    """Epochs run and the scores of the weights of the last one: what choosing the best epoch brought."""
+    """Epochs run and the scores of the weights of the last one.
+
+    What choosing the best epoch brought.
+    """
     pairs = [(run.record, run.last_predicted) for run in network if run.last_predicted is not None]
     scores = score_predictions(task, pairs, settings.n_bootstrap)
     return {
@@ -398,7 +408,9 @@ def _last_epoch(
 
 
 def _calibration(task: Task, network: Sequence[Prediction]) -> dict[str, Any]:
-    """Calibration of the probabilities of test records, see `diagnose.networks.calibration.calibration_scores`."""
+    """Calibration of the probabilities of test records, see
+    `diagnose.networks.calibration.calibration_scores`.
+    """
     labels = task.labels()
     runs = [(run.log_probability, labels[run.record], run.temperature) for run in network]
     return calibration_scores(*(list(column) for column in zip(*runs, strict=True)))

@@ -1,4 +1,7 @@
-"""A small convolutional autoencoder of windows: what it cannot rebuild is unlike what it was trained on."""
+"""A small convolutional autoencoder of windows.
+
+What it cannot rebuild is unlike what it was trained on.
+"""
 
 from __future__ import annotations
 
@@ -29,14 +32,15 @@ MOST_WINDOWS = 1000  # drawn an epoch
 
 
 class WindowAutoencoder(nn.Module):
-    """Three strided convolutions, and three transposed ones that mirror them; batch normalisation and ReLU between.
+    """Three strided convolutions, and three transposed ones that mirror them; batch normalisation
+    and ReLU between.
 
     Parameters
     ----------
     scale : (channel,) what the input is divided by
 
-    Source: Masci, Meier, Ciresan & Schmidhuber (2011), "Stacked convolutional auto-encoders for hierarchical feature
-    extraction", ICANN, with strides in place of pooling, trained as one.
+    Source: Masci, Meier, Ciresan & Schmidhuber (2011), "Stacked convolutional auto-encoders for
+    hierarchical feature extraction", ICANN, with strides in place of pooling, trained as one.
     """
 
     scale: torch.Tensor
@@ -67,7 +71,8 @@ class WindowAutoencoder(nn.Module):
         )
 
     def forward(self, windows: torch.Tensor) -> torch.Tensor:
-        """Squared error (window, sample) of the rebuilt windows (window, channel, sample), mean over the channels.
+        """Squared error (window, sample) of the rebuilt windows (window, channel, sample), mean
+        over the channels.
 
         Samples past the last whole step of the code are left out.
         """
@@ -101,7 +106,8 @@ def check_window_for_autoencoder(window_samples: int) -> None:
 def fit_autoencoder(
     train: WindowSet, validation: WindowSet, *, settings: TrainSettings, seed: int
 ) -> Autoencoder:
-    """Train on windows of known kind; the weights kept are those of the least error on other units of that kind.
+    """Train on windows of known kind; the weights kept are those of the least error on other
+    units of that kind.
 
     Parameters
     ----------
@@ -144,13 +150,14 @@ def fit_autoencoder(
 def reconstruction_error(
     autoencoder: Autoencoder, windows: WindowSet, *, batch_size: int = 64
 ) -> FloatArray:
-    """(window,) largest mean squared error over a stretch of `STRETCH` samples, at the planned starts.
+    """(window,) largest mean squared error over a stretch of `STRETCH` samples, at the planned
+    starts.
 
-    A fault of one tooth shows for a moment once a turn: the mean over the window drowns it in the noise, which no
-    autoencoder rebuilds. The largest in place of the mean is ours.
+    A fault of one tooth shows for a moment once a turn: the mean over the window drowns it in the
+    noise, which no autoencoder rebuilds. The largest in place of the mean is ours.
 
-    Source of the error as novelty: Japkowicz, Myers & Gluck (1995), "A novelty detection approach to classification",
-    IJCAI.
+    Source of the error as novelty: Japkowicz, Myers & Gluck (1995), "A novelty detection approach
+    to classification", IJCAI.
     """
     every = np.arange(len(windows))
     found = []

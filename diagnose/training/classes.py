@@ -93,7 +93,10 @@ class Classes(LearningTarget[Network]):
 
 
 def predict_windows(model: nn.Module, windows: WindowSet, *, batch_size: int = 64) -> FloatArray:
-    """(window, class) log-probabilities at the planned starts; the batch size changes speed only."""
+    """(window, class) log-probabilities at the planned starts.
+
+    The batch size changes speed only.
+    """
     every = np.arange(len(windows))
     blocks = np.array_split(every, -(-every.size // batch_size))
     signals = (torch.from_numpy(windows.cut(block)) for block in blocks)

@@ -1,4 +1,6 @@
-"""What a network says beside the class, how severe a fault is and on which gear, and how far that is right."""
+"""What a network says beside the class, how severe a fault is and on which gear, and how far that
+is right.
+"""
 
 from __future__ import annotations
 
@@ -33,7 +35,8 @@ BOOTSTRAP_SEED = 20240608
 def predict_heads(
     model: Network, windows: WindowSet, *, batch_size: int = 64
 ) -> dict[str, FloatArray]:
-    """What the further heads say of records, in the order of `diagnose.scoring.metrics.over_records`.
+    """What the further heads say of records, in the order of
+    `diagnose.scoring.metrics.over_records`.
 
     Returns
     -------
@@ -146,7 +149,10 @@ def _severity_error(
 
 
 def heads_notes(clean: Mapping[str, Any]) -> list[tuple[str, str]]:
-    """Title and sentence on the further heads, by clean protocol of ``metrics.json``; empty where there are none."""
+    """Title and sentence on the further heads, by clean protocol of ``metrics.json``.
+
+    Empty where there are none.
+    """
     notes = []
     for name, result in clean.items():
         said = [

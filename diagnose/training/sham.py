@@ -1,4 +1,7 @@
-"""The sham control: the same training on a data set whose faults were left out and whose labels were kept."""
+"""The sham control.
+
+The same training on a data set whose faults were left out and whose labels were kept.
+"""
 
 from __future__ import annotations
 

@@ -1,4 +1,7 @@
-"""Trained networks on disk: ``model.safetensors`` for the weights, ``model.json`` for what they mean. Never pickle."""
+"""Trained networks on disk.
+
+``model.safetensors`` for the weights, ``model.json`` for what they mean. Never pickle.
+"""
 
 from __future__ import annotations
 
@@ -68,7 +71,9 @@ class ModelDescription:
 
     @property
     def network(self) -> Section:
-        """Kind and parameters of the network, as `diagnose.networks.registry.build_model` takes them."""
+        """Kind and parameters of the network, as `diagnose.networks.registry.build_model` takes
+        them.
+        """
         return Section("model", self.model)
 
     @property
@@ -224,7 +229,8 @@ def load_domain(folder: str | Path, description: ModelDescription) -> Domain | N
 
 
 def load_statistics(folder: str | Path) -> Statistics | None:
-    """What healthy training windows look like inside the network of a folder; None for one that does not tell.
+    """What healthy training windows look like inside the network of a folder; None for one that
+    does not tell.
 
     Raises
     ------
@@ -260,7 +266,10 @@ def schema_version(dataset: Dataset) -> int | None:
 
 
 def data_fingerprint(dataset: Dataset) -> str:
-    """Hash over identity, label, unit and measured speed of every record: the same data set, the same text."""
+    """Hash over identity, label, unit and measured speed of every record.
+
+    The same data set, the same text.
+    """
     digest = hashlib.sha256()
     for name in ("record_id", "unit_id", "label"):
         digest.update("\n".join(str(value) for value in dataset.column(name)).encode())

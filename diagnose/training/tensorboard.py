@@ -1,4 +1,7 @@
-"""What TensorBoard can show of a study: losses epoch by epoch while it runs, and the scores at its end."""
+"""What TensorBoard can show of a study.
+
+Losses epoch by epoch while it runs, and the scores at its end.
+"""
 
 from __future__ import annotations
 
@@ -27,7 +30,8 @@ def need_tensorboard() -> None:
 
 @contextmanager
 def epoch_log(out: str | Path, name: str, *, wanted: bool) -> Iterator[OnEpoch]:
-    """What `diagnose.training.train.train_network` calls after each epoch; it writes below ``out/tensorboard/<name>``.
+    """What `diagnose.training.train.train_network` calls after each epoch; it writes below
+    ``out/tensorboard/<name>``.
 
     Parameters
     ----------

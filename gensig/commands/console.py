@@ -1,4 +1,7 @@
-"""What commands print while they work: a progress bar on a terminal, plain lines elsewhere, warnings as one line."""
+"""What commands print while they work.
+
+A progress bar on a terminal, plain lines elsewhere, warnings as one line.
+"""
 
 from __future__ import annotations
 
@@ -23,7 +26,10 @@ LONG_SECONDS = 10.0  # without a record: time to say what may take so long
 
 @contextmanager
 def one_line_warnings(program: str) -> Iterator[None]:
-    """Print each different warning once, as one line; of a category with ``once`` only the first."""
+    """Print each different warning once, as one line.
+
+    Of a category with ``once`` only the first.
+    """
     seen: set[object] = set()
 
     def show(message: Warning | str, category: type[Warning], *_details: Any, **_more: Any) -> None:
@@ -46,10 +52,11 @@ def note(*texts: str) -> None:
 
 
 class ShardProgress:
-    """Progress over records: a bar on a terminal, a line every few seconds elsewhere, nothing when quiet.
+    """Progress over records: a bar on a terminal, a line every few seconds elsewhere, nothing
+    when quiet.
 
-    Records count when their shard is whole. Until the first is, ``n_at_work`` of ``n_shards`` that are to be made
-    tell what is going on.
+    Records count when their shard is whole. Until the first is, ``n_at_work`` of ``n_shards``
+    that are to be made tell what is going on.
     """
 
     def __init__(self, *, quiet: bool, n_records: int, n_shards: int, n_at_work: int) -> None:
@@ -99,7 +106,10 @@ class ShardProgress:
             self._print_line()
 
     def _tick(self) -> None:
-        """Show the time pass, also where no shard is finished yet; lines come less often in a long run."""
+        """Show the time pass, also where no shard is finished yet.
+
+        Lines come less often in a long run.
+        """
         while not self._ended.wait(1.0 if self._bar is not None else self._pause()):
             if self._bar is not None:
                 self._show_bar()
@@ -150,7 +160,10 @@ def _duration(seconds: float) -> str:
 
 @contextmanager
 def replaced_file(path: str | Path) -> Iterator[Path]:
-    """A temporary name beside ``path`` that takes its place when the block ends well: nothing is half written."""
+    """A temporary name beside ``path`` that takes its place when the block ends well.
+
+    Nothing is half written.
+    """
     target = Path(path)
     if not target.parent.is_dir():
         raise ConfigError(f"{target}: there is no folder {target.parent}; make it first")

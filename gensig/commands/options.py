@@ -125,7 +125,10 @@ def _cut(text: str) -> str:
 
 
 def _table(head: Sequence[str], rows: Sequence[Sequence[str]]) -> list[str]:
-    """Aligned columns; on a terminal the last one is cut to its width, so that every row is one line."""
+    """Aligned columns.
+
+    On a terminal the last one is cut to its width, so that every row is one line.
+    """
     widths = [max(len(row[place]) for row in (head, *rows)) for place in range(len(head) - 1)]
     lines = []
     for row in (head, *rows):

@@ -1,4 +1,7 @@
-"""What the verbs write: numbers as JSON, a figure, an option of a group. Refused before anything is computed for it."""
+"""What the verbs write.
+
+Numbers as JSON, a figure, an option of a group. Refused before anything is computed for it.
+"""
 
 from __future__ import annotations
 
@@ -19,7 +22,10 @@ FIGURE_TYPES = (".png", ".svg", ".pdf")
 
 
 def check_file(flag: str, name: str | None, types: tuple[str, ...] = ()) -> None:
-    """Refuse a file name that cannot be written: another type than ``types`` (where given), or no such folder."""
+    """Refuse a file name that cannot be written.
+
+    Another type than ``types`` (where given), or no such folder.
+    """
     if name is None:
         return
     path = Path(name)
@@ -38,7 +44,10 @@ def check_outputs(arguments: Namespace) -> None:
 
 
 def check_new(flag: str, name: str | None, *, force: bool) -> None:
-    """Refuse to replace data or options, which may be all there is of them; figures and JSON are made again."""
+    """Refuse to replace data or options, which may be all there is of them.
+
+    Figures and JSON are made again.
+    """
     if name is not None and Path(name).exists() and not force:
         raise ConfigError(
             f"{flag} {name} is there already; choose another name, or add --force to replace it"
@@ -72,7 +81,9 @@ def write_option(target: Path, text: str) -> None:
 def write_outputs(
     arguments: Namespace, content: Mapping[str, Any], draw: Callable[[Path], None]
 ) -> None:
-    """Write ``content`` to ``--json`` and let ``draw`` make the figure of ``--plot``, each only where asked for."""
+    """Write ``content`` to ``--json`` and let ``draw`` make the figure of ``--plot``, each only
+    where asked for.
+    """
     if arguments.json is not None:
         with replaced_file(arguments.json) as path:
             text = json.dumps(plain(content), indent=1, allow_nan=False)

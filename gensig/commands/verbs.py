@@ -1,4 +1,7 @@
-"""What ``gensig`` can do: every verb, its arguments and an example. Imports nothing that is slow."""
+"""What ``gensig`` can do.
+
+Every verb, its arguments and an example. Imports nothing that is slow.
+"""
 
 from __future__ import annotations
 
@@ -13,10 +16,11 @@ from gensig.commands import arguments
 class Verb:
     """One verb: what it does, an example, its own arguments, and ``module:function`` that runs it.
 
-    ``one`` is the meaning of exit status 1, where the verb has it. Verbs that look at one machine have
-    ``instead``: keys that they do not read, each with the flag that does its work or an empty text.
-    ``reads`` are the sections of the configuration that such a verb reads, by the kind of machine (the
-    empty kind stands for all others). None reads all of them. A typed key outside is named on stderr.
+    ``one`` is the meaning of exit status 1, where the verb has it. Verbs that look at one machine
+    have ``instead``: keys that they do not read, each with the flag that does its work or an
+    empty text. ``reads`` are the sections of the configuration that such a verb reads, by the
+    kind of machine (the empty kind stands for all others). None reads all of them. A typed key
+    outside is named on stderr.
     """
 
     summary: str
@@ -28,7 +32,8 @@ class Verb:
     reads: Mapping[str, tuple[str, ...]] | None = None
 
 
-# Sections of the configuration that make a machine: at rest, with its flanks in slices, and running.
+# Sections of the configuration that make a machine: at rest, with its flanks in slices, and
+# running.
 GEARS = ("system", "gear", "material", "modification", "heat", "mesh", "operating", "fault")
 RUNNING = (*GEARS, "sensing", "quality", "solver", "excitation")
 TABLES = ("system", "material")

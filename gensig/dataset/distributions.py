@@ -117,7 +117,10 @@ class LogUniform(Range):
 @final
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Normal(Range):
-    """Normal distribution cut off at both ends; levels are medians of parts of equal probability."""
+    """Normal distribution cut off at both ends.
+
+    Levels are medians of parts of equal probability.
+    """
 
     mean: float
     std: float
@@ -155,7 +158,10 @@ class Integers(Range):
 @final
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Choice(Distribution):
-    """Listed values of equal probability; they are its levels unless the file says ``levels: null``."""
+    """Listed values of equal probability.
+
+    They are its levels unless the file says ``levels: null``.
+    """
 
     values: tuple[Any, ...]
 
@@ -276,8 +282,9 @@ def _is_number(value: Any) -> bool:
 def design_points(design: str, n_points: int, n_dimensions: int, rng: np.random.Generator) -> Array:
     """Space-filling points of the unit cube, (point, dimension), in random order.
 
-    The order of a Sobol sequence is structure: point by point two of them are alike in their first digits, and so is
-    each with the number of the point. What belongs to a grid but has no levels is drawn as a Latin hypercube.
+    The order of a Sobol sequence is structure: point by point two of them are alike in their
+    first digits, and so is each with the number of the point. What belongs to a grid but has no
+    levels is drawn as a Latin hypercube.
     """
     if design not in DESIGNS:
         raise ConfigError(f"plan.design = {design!r}; allowed: {', '.join(DESIGNS)}")

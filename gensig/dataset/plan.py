@@ -220,7 +220,8 @@ def read_plan(path: Path) -> Plan:
 
 
 class PlanRows:
-    """Rows of a `plan.csv` without the others: where its lines begin is all that is kept of a plan of millions.
+    """Rows of a `plan.csv` without the others: where its lines begin is all that is kept of a
+    plan of millions.
 
     Parameters
     ----------

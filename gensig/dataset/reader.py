@@ -57,7 +57,8 @@ def open_dataset(path: str | Path, *, allow_incomplete: bool = False) -> "Datase
 
 
 class Dataset:
-    """A data set on disk. Made by `open_dataset`; can be pickled, forked and used by several processes.
+    """A data set on disk. Made by `open_dataset`; can be pickled, forked and used by several
+    processes.
 
     Attributes
     ----------
@@ -214,10 +215,12 @@ class Dataset:
     def trace(
         self, record_index: int, name: str, start: int = 0, stop: int | None = None
     ) -> np.ndarray:
-        """Another signal of one record, where the data set holds it: shaft sensors and the mesh state.
+        """Another signal of one record, where the data set holds it: shaft sensors and the mesh
+        state.
 
-        'tacho', 'encoder_angle', 'shaft_angle', 'mesh_force', 'contact_lost' and 'fault_engaged' are (sample,),
-        'mesh_pinion_tooth', 'mesh_wheel_tooth' and 'mesh_load_share' (pair, sample).
+        'tacho', 'encoder_angle', 'shaft_angle', 'mesh_force', 'contact_lost' and 'fault_engaged'
+        are (sample,), 'mesh_pinion_tooth', 'mesh_wheel_tooth' and 'mesh_load_share' (pair,
+        sample).
         """
         stop = self.n_samples if stop is None else stop
         traces = [known for known in self.signal_names if known not in SCALES]
@@ -276,7 +279,10 @@ class Dataset:
         return {name: reasons.get(name, made_by) for name in absent}
 
     def split(self, protocol: str) -> SplitRows:
-        """subset -> list of (record_index, start_fraction, stop_fraction); failed records are in it, see `usable`."""
+        """subset -> list of (record_index, start_fraction, stop_fraction).
+
+        Failed records are in it, see `usable`.
+        """
         if protocol not in self.protocols:
             if protocol in PROTOCOLS:
                 raise DatasetError(
@@ -337,7 +343,10 @@ class Dataset:
         )
 
     def _file(self, shard: int) -> h5py.File:
-        """The open shard; at most `MAX_OPEN_SHARDS` stay open, and none is shared with a forked process."""
+        """The open shard.
+
+        At most `MAX_OPEN_SHARDS` stay open, and none is shared with a forked process.
+        """
         if self._pid != os.getpid():
             self._files, self._pid = OrderedDict(), os.getpid()
         if shard in self._files:

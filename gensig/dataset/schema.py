@@ -1,4 +1,7 @@
-"""The columns of a data set, version 1: names, types, units, meaning. `docs/format.md` is written from these tables."""
+"""The columns of a data set, version 1.
+
+Names, types, units, meaning. `docs/format.md` is written from these tables.
+"""
 
 from collections.abc import Mapping
 from dataclasses import dataclass
@@ -52,7 +55,10 @@ class Column:
 
     @property
     def storage_dtype(self) -> np.dtype:
-        """Type of the HDF5 data set; text is marked as ASCII, because Octave reads none that is marked as UTF-8."""
+        """Type of the HDF5 data set.
+
+        Text is marked as ASCII, because Octave reads none that is marked as UTF-8.
+        """
         return (
             np.dtype(f"S{self.n_bytes}") if self.is_text else np.dtype(self.dtype).newbyteorder("<")
         )
@@ -307,7 +313,8 @@ SCALES = {
     "healthy_twin": "healthy_twin_scale",
 }
 
-# What a reader of version 1 may rely on; this list never grows, so that adding a column is no new version.
+# What a reader of version 1 may rely on; this list never grows, so that adding a column is no new
+# version.
 REQUIRED = (
     "acceleration", "record_id", "label", "label_name", "severity", "gearbox_id", "specimen_id", "unit_id",
     "condition_id", "speed_rpm", "torque_nm", "status",
@@ -333,7 +340,10 @@ ACCELERATION = "m/s^2"
 
 
 def kind_of(name: str) -> str | None:
-    """The kind of values a named column holds: 'str', 'int', 'float', or None for a name the schema does not know."""
+    """The kind of values a named column holds.
+
+    'str', 'int', 'float', or None for a name the schema does not know.
+    """
     if name.startswith(f"{PARAMS}/"):
         return "float"
     column = COLUMNS.get(name)
@@ -352,7 +362,10 @@ def stored_reason(reason: str | float) -> str:
 
 
 def unit_in_file(column: Column, attributes: Mapping[str, Any]) -> str:
-    """Unit of a column in a data set with these root attributes: rotations among the channels are in rad/s^2."""
+    """Unit of a column in a data set with these root attributes.
+
+    Rotations among the channels are in rad/s^2.
+    """
     units = (
         set(attributes.get("channel_units") or [ACCELERATION])
         if {"channel", "source"} & set(column.axes)

@@ -111,7 +111,9 @@ class Selection:
     def signals(
         self, place: int, start: int = 0, stop: int | None = None, **options: Any
     ) -> np.ndarray:
-        """Acceleration of the record at a place of this selection, (channel, sample) float32 in m/s^2."""
+        """Acceleration of the record at a place of this selection, (channel, sample) float32 in
+        m/s^2.
+        """
         return self.dataset.signals(self._record(place), start, stop, **options)
 
     def array(
@@ -129,7 +131,10 @@ class Selection:
         return block
 
     def table(self, names: Sequence[str] | None = None) -> np.ndarray:
-        """Columns as one structured array, (record,); all those with one value a record where `names` is None."""
+        """Columns as one structured array, (record,).
+
+        All those with one value a record where `names` is None.
+        """
         if names is None:
             names = [
                 name for name in self.dataset.column_names if self.dataset.column(name).ndim == 1
@@ -245,7 +250,10 @@ def _in_range(name: str, values: np.ndarray, wanted: tuple) -> np.ndarray:
 def _check_choices(
     dataset: RecordSource, name: str, values: np.ndarray, choices: Sequence[Any]
 ) -> None:
-    """Refuse text that no record has: it is a slip of the pen. Classes and states may be absent, and so may ''."""
+    """Refuse text that no record has.
+
+    It is a slip of the pen. Classes and states may be absent, and so may ''.
+    """
     column = ALIASES.get(name, name)
     possible = {*values.tolist(), ""}
     possible |= {"label_name": {*dataset.class_names}, "status": {*_STATES}}.get(column, set())

@@ -1,7 +1,8 @@
 """What a motion that does not repeat has in common from cycle to cycle of the crank.
 
-A drive that rattles is chaotic: its extremes over a run grow with the run and hang on the last bit. What is told of it
-are medians over the cycles and amplitudes at the half orders, which a run of some cycles gives to a few per cent.
+A drive that rattles is chaotic: its extremes over a run grow with the run and hang on the last
+bit. What is told of it are medians over the cycles and amplitudes at the half orders, which a run
+of some cycles gives to a few per cent.
 """
 
 from __future__ import annotations
@@ -39,7 +40,9 @@ def whole_cycles(crank_angle: Array) -> list[slice]:
 
 
 def fluctuations(signals: Array, crank_angle: Array) -> Array:
-    """Half the peak to peak of each signal in each whole cycle, (signal, cycle), of signals (signal, sample)."""
+    """Half the peak to peak of each signal in each whole cycle, (signal, cycle), of signals
+    (signal, sample).
+    """
     return (
         0.5 * np.array([np.ptp(signals[:, cycle], axis=1) for cycle in whole_cycles(crank_angle)]).T
     )
@@ -58,9 +61,11 @@ def typical_extremes(signals: Array, crank_angle: Array) -> tuple[Array, Array]:
 
 
 def order_amplitudes(signals: Array, crank_angle: Array, n_orders: int) -> Array:
-    """Amplitudes of signals (signal, sample) at the orders 0.5, 1, ... over their whole cycles, (signal, order).
+    """Amplitudes of signals (signal, sample) at the orders 0.5, 1, ... over their whole cycles,
+    (signal, order).
 
-    Straight trends are taken off first. Fourier's integral over the crank's angle, so that the speed may change.
+    Straight trends are taken off first. Fourier's integral over the crank's angle, so that the
+    speed may change.
     """
     cycles = whole_cycles(crank_angle)
     used = slice(0, cycles[-1].stop)

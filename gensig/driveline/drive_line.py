@@ -36,10 +36,11 @@ from gensig.systems.run import Run
 class DriveLine:
     """A line with what its tables say beyond its matrices.
 
-    ``numbers`` (node,) as the table counts them, rings of dampers on from there; ``pairs`` (mesh,) the driving gear as
-    pinion; ``record_mesh`` the numbers of the nodes whose mesh records are made of; ``slices_helical`` whether helical
-    meshes in time are sliced teeth; ``motor_node``, ``load_node`` those of a motor and its load; ``support_force`` N is
-    that for which the one support of all gears is taken, None without lateral motion.
+    ``numbers`` (node,) as the table counts them, rings of dampers on from there; ``pairs``
+    (mesh,) the driving gear as pinion; ``record_mesh`` the numbers of the nodes whose mesh
+    records are made of; ``slices_helical`` whether helical meshes in time are sliced teeth;
+    ``motor_node``, ``load_node`` those of a motor and its load; ``support_force`` N is that for
+    which the one support of all gears is taken, None without lateral motion.
     """
 
     name: str
@@ -55,7 +56,10 @@ class DriveLine:
     support_force: float | None = None
 
     def matrices(self, *, merge_rigid: bool = False) -> LineMatrices:
-        """Mass, damping and stiffness, the meshes apart; merged for integration, as the table has them for modes."""
+        """Mass, damping and stiffness, the meshes apart.
+
+        Merged for integration, as the table has them for modes.
+        """
         return line_matrices(self.line, merge_rigid=merge_rigid, lateral=self.lateral)
 
     def modes(self) -> Modes:
@@ -74,7 +78,10 @@ class DriveLine:
 
     @property
     def campbell_orders(self) -> tuple[float, ...]:
-        """Orders of the Campbell diagram: as given, or the turn, its double, every mesh and its double."""
+        """Orders of the Campbell diagram.
+
+        As given, or the turn, its double, every mesh and its double.
+        """
         if self.campbell.orders is not None:
             return self.campbell.orders
         return tuple(
@@ -146,7 +153,8 @@ def read_drive_line(config: Configuration) -> DriveLine:
 
 
 def drive_line_of_pair(system: GearPairMachine, name: str) -> DriveLine:
-    """A single pair, with its motor and load, as the line of two to four nodes that it is; without the soft drive.
+    """A single pair, with its motor and load, as the line of two to four nodes that it is;
+    without the soft drive.
 
     The mesh is held at the mean stiffness of sound teeth under the set torque.
     """

@@ -1,4 +1,7 @@
-"""Dampers on an engine's drive line: tooth force of one mesh, root stress under it, and their tuning."""
+"""Dampers on an engine's drive line.
+
+Tooth force of one mesh, root stress under it, and their tuning.
+"""
 
 from __future__ import annotations
 
@@ -34,7 +37,9 @@ CYCLE_POINTS = 5760  # over which forces are looked at
 
 @dataclass(frozen=True, slots=True, kw_only=True, eq=False)
 class ToothLoad:
-    """Force of one mesh along its line of action over a cycle of the crank, (point,) N, at a speed in rad/s."""
+    """Force of one mesh along its line of action over a cycle of the crank, (point,) N, at a
+    speed in rad/s.
+    """
 
     speed: float
     force: Array
@@ -131,7 +136,10 @@ def seen_by_dampers(
 
 
 def read_mesh_strength(config: Configuration, line: EngineLine, mesh: int) -> RootStrength:
-    """Pair and strength of one mesh of a line, without load; flanks, material and strength of the configuration."""
+    """Pair and strength of one mesh of a line, without load.
+
+    Flanks, material and strength of the configuration.
+    """
     own = config.section("mesh")
     # the mesh code knows gears by their sides, the tables by the names of the machine
     pair = named_by_side(line.drive.pairs[mesh])
@@ -182,7 +190,9 @@ def dynamic_root_stress(
 
 
 def passes_of_a_cycle(line: EngineLine, mesh: int) -> int:
-    """Tooth pairs that meet in a mesh during a cycle of the crank, counting one that is cut as whole."""
+    """Tooth pairs that meet in a mesh during a cycle of the crank, counting one that is cut as
+    whole.
+    """
     driving = _driving(line, mesh)
     ratio = line.ratios[line.drive.numbers[driving.node]]
     return math.ceil(CYCLE * ratio * driving.n_teeth / (2.0 * math.pi) - 1e-9)
@@ -191,7 +201,9 @@ def passes_of_a_cycle(line: EngineLine, mesh: int) -> int:
 def crank_of_passes(
     strength: RootStrength, line: EngineLine, mesh: int, roll: Array, passes: Iterable[int]
 ) -> Array:
-    """Crank angles at which pairs, counted from crank angle 0 on, are at ``roll`` (point,) m, (pass, point) rad."""
+    """Crank angles at which pairs, counted from crank angle 0 on, are at ``roll`` (point,) m,
+    (pass, point) rad.
+    """
     pinion = strength.pair.pinion
     ratio = line.ratios[line.drive.numbers[_driving(line, mesh).node]]
     start = float(start_rolls(line.drive)[mesh])

@@ -1,4 +1,7 @@
-"""An engine or a motor on its drive line: the group ``excitation`` on nodes of the tables, and the steady answer."""
+"""An engine or a motor on its drive line.
+
+The group ``excitation`` on nodes of the tables, and the steady answer.
+"""
 
 from __future__ import annotations
 
@@ -38,9 +41,11 @@ SEEN_CYCLES = 6
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class EngineLine:
-    """A drive line and the engine that turns it; degrees of freedom are the nodes, then lateral motion if any.
+    """A drive line and the engine that turns it; degrees of freedom are the nodes, then lateral
+    motion if any.
 
-    ``engine`` may be a motor with its load: the crank is then the motor's shaft, the brake torque what the load takes.
+    ``engine`` may be a motor with its load: the crank is then the motor's shaft, the brake torque
+    what the load takes.
     """
 
     drive: DriveLine
@@ -93,7 +98,9 @@ class EngineLine:
         return motor_torques(self.engine, speed, torque, self.ratios)
 
     def load_at(self, torque: float | Array, speed_share: float | Array) -> Any:
-        """The brake torque at a share of the speed at which it is ``torque`` N m, by the law of the load."""
+        """The brake torque at a share of the speed at which it is ``torque`` N m, by the law of
+        the load.
+        """
         return torque * speed_share**self.engine.load_exponent
 
     def on_line(self, torques: LineTorques) -> Array:
@@ -109,7 +116,9 @@ class EngineLine:
     def seen_by(
         self, wheel: ToothedWheel, response: SteadyResponse, rng: np.random.Generator
     ) -> Array:
-        """Speed that a toothed wheel of this machine shows, over `SEEN_CYCLES` cycles, (sample,) rad/s."""
+        """Speed that a toothed wheel of this machine shows, over `SEEN_CYCLES` cycles, (sample,)
+        rad/s.
+        """
         place = self._place(wheel.node, "toothed_wheels")
         one = over_cycle(response.angle[place], SAMPLES_PER_CYCLE)
         crank = CYCLE / SAMPLES_PER_CYCLE * np.arange(SEEN_CYCLES * SAMPLES_PER_CYCLE)

@@ -31,10 +31,11 @@ GOVERNOR = Governor(
 class TimeResponse:
     """Motion over some time, teeth free to part.
 
-    ``speed`` (node, sample) rad/s and ``angle`` (node, sample) rad, less the nominal ones, of the nodes asked for;
-    ``fluctuation`` (node,) rad/s is half the peak to peak, ``cycle_fluctuation`` (node,) that of the mean over the
-    cycles, which what does not repeat leaves. ``mesh_force`` (mesh, sample) N, flat to 4 kHz, with its extremes.
-    ``contact_loss`` and ``back_contact`` (mesh,) are shares of the time. ``crank_angle`` (sample,) rad is nominal.
+    ``speed`` (node, sample) rad/s and ``angle`` (node, sample) rad, less the nominal ones, of the
+    nodes asked for; ``fluctuation`` (node,) rad/s is half the peak to peak, ``cycle_fluctuation``
+    (node,) that of the mean over the cycles, which what does not repeat leaves. ``mesh_force``
+    (mesh, sample) N, flat to 4 kHz, with its extremes. ``contact_loss`` and ``back_contact``
+    (mesh,) are shares of the time. ``crank_angle`` (sample,) rad is nominal.
     """
 
     time: Array
@@ -54,7 +55,9 @@ class TimeResponse:
 def own_meshes(
     machine: EngineLine, config: Configuration, speed: float, torque: float
 ) -> dict[int, OwnMesh]:
-    """Tables of sound teeth of the meshes that have any, by their place, each under its mean force."""
+    """Tables of sound teeth of the meshes that have any, by their place, each under its mean
+    force.
+    """
     mesh = config["mesh"]
     law = ToothLaw(
         material=read_material(config),

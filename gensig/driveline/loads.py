@@ -20,7 +20,8 @@ LEAST_TORQUE = 1e-6  # N m, of a mesh that passes without touching: laws take ro
 
 
 def greatest_loads(pair: GearPair, angle: Array, force: Array) -> Array:
-    """Greatest load of every pair of teeth that is seen from its entry to its exit, as torque of the pinion.
+    """Greatest load of every pair of teeth that is seen from its entry to its exit, as torque of
+    the pinion.
 
     Parameters
     ----------
@@ -31,8 +32,8 @@ def greatest_loads(pair: GearPair, angle: Array, force: Array) -> Array:
     -------
     (pair of teeth,) N m
 
-    A tooth has the whole force where its pair is alone, ``SHARED`` of it where another one carries too; the back flanks
-    close cracks and are left out.
+    A tooth has the whole force where its pair is alone, ``SHARED`` of it where another one
+    carries too; the back flanks close cracks and are left out.
     """
     roll = pair.pinion.base_radius * angle
     entered = (

@@ -1,4 +1,5 @@
-"""The machine of an engine or a motor on its drive line, one mesh of which records follow tooth by tooth.
+"""The machine of an engine or a motor on its drive line, one mesh of which records follow tooth
+by tooth.
 
 Its ``pair`` is the driving and the driven gear of that mesh. ``operating`` is the motion of the
 driving gear's shaft.
@@ -90,7 +91,10 @@ class LineMachine(Machine):
 
     @property
     def gears(self) -> dict[str, Gear]:
-        """All gears of the line: pinion and wheel of the followed mesh, the others as in the tables."""
+        """All gears of the line.
+
+        Pinion and wheel of the followed mesh, the others as in the tables.
+        """
         return line_gears(self.engine.drive, self.place)
 
     @property
@@ -135,7 +139,8 @@ class LineMachine(Machine):
 
     @property
     def channels(self) -> tuple[str, ...]:
-        """Rotation of both gears of the followed mesh, their bearings', and the toothed wheels' speeds.
+        """Rotation of both gears of the followed mesh, their bearings', and the toothed wheels'
+        speeds.
 
         Bearings move only with lateral motion.
         """
@@ -185,7 +190,10 @@ class LineMachine(Machine):
     def stiffness_curves(
         self, faults: Sequence[Fault] = (), *, n_positions: int = 201, points_per_tooth: int = 100
     ) -> StiffnessCurves:
-        """Curves of the followed mesh under its mean force; ConfigError where its gears are helical."""
+        """Curves of the followed mesh under its mean force.
+
+        ConfigError where its gears are helical.
+        """
         table = self.mesh_table(faults)
         if not isinstance(table, PairTable):
             raise ConfigError(
@@ -279,7 +287,8 @@ class LineMachine(Machine):
         return tuple(draw_wheel(rng, wheel) for wheel in self.engine.wheels.values())
 
     def mesh_torques(self, speed: float, torque: float) -> Array:
-        """Loads that a tooth of the record mesh meets at a set-point, one a mesh, as torques of the pinion.
+        """Loads that a tooth of the record mesh meets at a set-point, one a mesh, as torques of
+        the pinion.
 
         Parameters
         ----------
@@ -290,9 +299,9 @@ class LineMachine(Machine):
         -------
         (mesh,) N m      all equally likely
 
-        The sound, nominal machine runs ``loads.SECONDS`` s at the set-point. Every pair of teeth that
-        meets gives one load, as ISO 6336-6 counts damage. The mean load alone would miss the impacts of
-        a mesh that rattles.
+        The sound, nominal machine runs ``loads.SECONDS`` s at the set-point. Every pair of teeth
+        that meets gives one load, as ISO 6336-6 counts damage. The mean load alone would miss the
+        impacts of a mesh that rattles.
 
         Raises
         ------
@@ -402,9 +411,9 @@ class LineMachine(Machine):
         """Angle of the crank in its cycle when given teeth of the mesh are at a phase, rad.
 
         The driving gear's teeth are tied to the crank: the same tooth meets the same cylinder's
-        firing in every record. Where its shaft turns more than once a cycle, the driven gear's tooth
-        chooses the turn. A motor has no cycle: its turns are counted on, so that the other meshes
-        stand as the teeth allow.
+        firing in every record. Where its shaft turns more than once a cycle, the driven gear's
+        tooth chooses the turn. A motor has no cycle: its turns are counted on, so that the other
+        meshes stand as the teeth allow.
         """
         pitches = start.tooth_pinion + start.phase - start_phase(self.engine.drive, self.place)
         if not isinstance(self.engine.engine, Engine):

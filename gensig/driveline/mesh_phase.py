@@ -1,7 +1,9 @@
-"""Where each mesh of a line stands when the line starts: the meshes of one gear are not in phase by chance.
+"""Where each mesh of a line stands when the line starts: the meshes of one gear are not in phase
+by chance.
 
-A gear has one set of teeth, so that its meshes follow from each other by the directions of its mates. Angles are those
-of tooth centres in the common plane, counted against the clock; ``docs/theory/shaft_line.md``.
+A gear has one set of teeth, so that its meshes follow from each other by the directions of its
+mates. Angles are those of tooth centres in the common plane, counted against the clock;
+``docs/theory/shaft_line.md``.
 """
 
 from __future__ import annotations
@@ -19,11 +21,13 @@ Array = NDArray[np.float64]
 
 
 def tooth_angles(line: DriveLine, turned: float = 0.0) -> Array:
-    """Angle of a tooth's centre of every gear, (gear,) rad, when the first node has turned by ``turned`` rad.
+    """Angle of a tooth's centre of every gear, (gear,) rad, when the first node has turned by
+    ``turned`` rad.
 
-    At 0 the gears of the first node, or those nearest to it, have a tooth at angle 0. Mates take up all backlash on the
-    driving side. Gears on one shaft have a tooth at one angle (assumed: how they are keyed is not in the tables), and
-    so has a gear that closes a loop, whatever the loop says.
+    At 0 the gears of the first node, or those nearest to it, have a tooth at angle 0. Mates take
+    up all backlash on the driving side. Gears on one shaft have a tooth at one angle (assumed:
+    how they are keyed is not in the tables), and so has a gear that closes a loop, whatever the
+    loop says.
     """
     gears, ratio = line.line.gears, line.line.speed_ratio
     by_node: list[float | None] = [None] * len(line.line.nodes)
@@ -51,10 +55,12 @@ def tooth_angles(line: DriveLine, turned: float = 0.0) -> Array:
 
 
 def start_rolls(line: DriveLine, turned: float = 0.0) -> Array:
-    """Distance of a pair of every mesh from A along the line of action, (mesh,) m, within one base pitch from A on.
+    """Distance of a pair of every mesh from A along the line of action, (mesh,) m, within one
+    base pitch from A on.
 
-    In the middle of the face, when the first node has turned by ``turned`` rad. Gears on one shaft have the middles of
-    their faces in one plane (assumed: the tables have no place along the shaft).
+    In the middle of the face, when the first node has turned by ``turned`` rad. Gears on one
+    shaft have the middles of their faces in one plane (assumed: the tables have no place along
+    the shaft).
     """
     angles = tooth_angles(line, turned)
     rolls = []
@@ -66,12 +72,17 @@ def start_rolls(line: DriveLine, turned: float = 0.0) -> Array:
 
 
 def first_slice_lead(pair: GearPair) -> float:
-    """How far the slice that enters first is ahead of the middle of the face, where teeth are told, m; spur: 0."""
+    """How far the slice that enters first is ahead of the middle of the face, where teeth are
+    told, m; spur: 0.
+    """
     return 0.5 * pair.face_width * math.tan(pair.base_helix_angle)
 
 
 def start_phase(line: DriveLine, place: int, turned: float = 0.0) -> float:
-    """Pitches that the first slice of a pair of one mesh is past A; what a mesh table takes as its start."""
+    """Pitches that the first slice of a pair of one mesh is past A.
+
+    What a mesh table takes as its start.
+    """
     pair = line.pairs[place]
     return float(start_rolls(line, turned)[place] + first_slice_lead(pair)) / pair.base_pitch
 
@@ -85,7 +96,10 @@ def _spread(by_node: list[float | None], one: int, other: int) -> None:
 
 
 def _half_teeth(pair: GearPair) -> tuple[float, float]:
-    """Half tooth angles on the working pitch circles; together with the other's they fill a pitch."""
+    """Half tooth angles on the working pitch circles.
+
+    Together with the other's they fill a pitch.
+    """
     cosine = math.cos(pair.working_pressure_angle)
     first, second = (
         gear.half_tooth_angle_at(gear.base_radius / cosine) for gear in (pair.pinion, pair.wheel)
@@ -94,7 +108,9 @@ def _half_teeth(pair: GearPair) -> tuple[float, float]:
 
 
 def _past_pitch_point(mesh: GearMesh, pair: GearPair, sense: float, angle: float) -> float:
-    """Base pitches by which the driving flank of the tooth at ``angle`` has passed the pitch point."""
+    """Base pitches by which the driving flank of the tooth at ``angle`` has passed the pitch
+    point.
+    """
     flank = angle + sense * _half_teeth(pair)[0]
     return sense * (flank - mesh.center_line) * pair.pinion.n_teeth / (2.0 * math.pi)
 

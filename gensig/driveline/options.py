@@ -36,7 +36,10 @@ class LossFactors:
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Campbell:
-    """Speeds of the first node and orders of it that the Campbell diagram shows; None takes those of the meshes."""
+    """Speeds of the first node and orders of it that the Campbell diagram shows.
+
+    None takes those of the meshes.
+    """
 
     low_speed: float = unit("rpm")
     high_speed: float = unit("rpm")
@@ -55,7 +58,10 @@ class Campbell:
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class GearHolding:
-    """What holds every gear of a line sideways: two bearings, a shaft, one static force on it, a damping ratio."""
+    """What holds every gear of a line sideways.
+
+    Two bearings, a shaft, one static force on it, a damping ratio.
+    """
 
     bearing: BallBearing
     shaft: BearingShaft

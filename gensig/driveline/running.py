@@ -1,4 +1,5 @@
-"""An engine's drive line in time: one-sided meshes with backlash, some from tables of their teeth; steady and run-up.
+"""An engine's drive line in time: one-sided meshes with backlash, some from tables of their
+teeth; steady and run-up.
 
 ``docs/theory/shaft_line_records.md``.
 """
@@ -40,13 +41,17 @@ MOST_STEPS = 64  # per sample, that are tried where steps turn out to be too lon
 LEAD_SAMPLES = 256  # before time 0: more than the low-pass looks back
 ROUNDED = 1e-12  # of the largest torque, below which a course of it over the cycle is constant
 
-# More threads of the linear algebra sum in another order; a line that rattles makes another motion of the last digit.
+# More threads of the linear algebra sum in another order; a line that rattles makes another
+# motion of the last digit.
 one_thread = threadpool_limits.wrap(limits=1)
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Governor:
-    """What holds the mean speed: a spring and a damper on the rigid motion alone, so that no vibration feels it."""
+    """What holds the mean speed.
+
+    A spring and a damper on the rigid motion alone, so that no vibration feels it.
+    """
 
     frequency: float
     damping_ratio: float
@@ -54,7 +59,8 @@ class Governor:
 
 @dataclass(frozen=True, slots=True, kw_only=True, eq=False)
 class OwnMesh:
-    """A mesh by its own teeth: table, errors of the teeth (tooth,) m, and teeth that enter at the start.
+    """A mesh by its own teeth: table, errors of the teeth (tooth,) m, and teeth that enter at the
+    start.
 
     ``start_phase`` in pitches must agree with where the crank stands; None follows from it.
     """
@@ -67,7 +73,10 @@ class OwnMesh:
 
 @dataclass(frozen=True, slots=True, kw_only=True, eq=False)
 class EngineCourse:
-    """Speed of the crank and brake torque over time: ``time`` (knot,) s, ``speed`` rad/s, ``torque`` N m."""
+    """Speed of the crank and brake torque over time.
+
+    ``time`` (knot,) s, ``speed`` rad/s, ``torque`` N m.
+    """
 
     time: Array
     speed: Array
@@ -91,8 +100,8 @@ def steady_course(speed: float, torque: float) -> EngineCourse:
 class RunningLine:
     """A line ready to be integrated; ``turned`` rad is where the crank stands at time 0.
 
-    ``linear`` is the steady vibration at the first speed if no mesh parts, on the same degrees of freedom;
-    ``mesh_force`` (mesh,) N are the mean forces in it.
+    ``linear`` is the steady vibration at the first speed if no mesh parts, on the same degrees of
+    freedom; ``mesh_force`` (mesh,) N are the mean forces in it.
     """
 
     machine: EngineLine
@@ -117,9 +126,11 @@ class RunningLine:
         channels: Sequence[tuple[str, int]],
         settling: float,
     ) -> LineMotion:
-        """Integrate, from the static place with the linear vibration on it, at least ``settling`` s before time 0.
+        """Integrate, from the static place with the linear vibration on it, at least ``settling``
+        s before time 0.
 
-        What turns out to be too long a step is halved, as a gear pair's, up to ``MOST_STEPS`` a sample.
+        What turns out to be too long a step is halved, as a gear pair's, up to ``MOST_STEPS`` a
+        sample.
         """
         lead = max(settling, LEAD_SAMPLES / solver.sampling_rate)
         lead = math.ceil(lead * solver.sampling_rate) / solver.sampling_rate
@@ -203,7 +214,10 @@ def named_by_side(pair: GearPair) -> GearPair:
 
 
 def reference_force(machine: EngineLine, place: int, force: float) -> float:
-    """The force at which a mesh's contact and damping are taken, N: its mean, and what closes it by 2 um at least."""
+    """The force at which a mesh's contact and damping are taken, N.
+
+    Its mean, and what closes it by 2 um at least.
+    """
     return max(abs(force), machine.drive.line.meshes[place].stiffness * LEAST_APPROACH)
 
 

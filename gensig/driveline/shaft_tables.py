@@ -1,6 +1,8 @@
-"""The two CSV tables of a drive line: every header with its unit, every mistake with its row and column.
+"""The two CSV tables of a drive line: every header with its unit, every mistake with its row and
+column.
 
-A row number is that of the line in the file, the header's included. Lines that begin with # are notes.
+A row number is that of the line in the file, the header's included. Lines that begin with # are
+notes.
 """
 
 from __future__ import annotations

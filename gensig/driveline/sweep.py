@@ -1,4 +1,7 @@
-"""A run-up and a run-down of an engine's drive line in time, its teeth free to part: orders, spectra, tooth forces."""
+"""A run-up and a run-down of an engine's drive line in time, its teeth free to part.
+
+Orders, spectra, tooth forces.
+"""
 
 from __future__ import annotations
 
@@ -32,9 +35,10 @@ APART = 3.0  # standard errors of the difference, beyond which up and down are t
 class SweepWay:
     """One way of a sweep by ascending speed of the crank, in bins.
 
-    ``speeds`` (bin,) rad/s; ``angle`` (node, bin, order) rad at the orders 0.5, 1, ...; ``fluctuation`` (node, bin)
-    rad/s half the peak to peak in a cycle, the mean of the bin's cycles, ``scatter`` its standard error;
-    ``greatest_force`` (mesh, bin) N typical of a cycle. ``spectra`` (node, bin, frequency) rad at ``frequencies`` Hz.
+    ``speeds`` (bin,) rad/s; ``angle`` (node, bin, order) rad at the orders 0.5, 1, ...;
+    ``fluctuation`` (node, bin) rad/s half the peak to peak in a cycle, the mean of the bin's
+    cycles, ``scatter`` its standard error; ``greatest_force`` (mesh, bin) N typical of a cycle.
+    ``spectra`` (node, bin, frequency) rad at ``frequencies`` Hz.
     """
 
     speeds: Array
@@ -70,7 +74,9 @@ class Sweep:
 
 
 def sweep_course(low: float, high: float, seconds: float, torque: float) -> EngineCourse:
-    """From ``low`` rad/s straight to ``high`` in ``seconds`` and straight back, under one brake torque in N m."""
+    """From ``low`` rad/s straight to ``high`` in ``seconds`` and straight back, under one brake
+    torque in N m.
+    """
     n_steps = 2 * math.ceil(0.5 * seconds / KNOT)  # the turn is a knot
     way: Array = seconds / n_steps * np.arange(-1.0, 2 * n_steps + 2)
     speed = np.interp(way, [0.0, seconds, 2.0 * seconds], [low, high, low])
@@ -88,7 +94,8 @@ def sweep_response(
     nodes: Sequence[int],
     n_orders: int,
 ) -> Sweep:
-    """Integrate a sweep of the crank's speed, ``low`` to ``high`` rad/s and back, ``seconds`` each way.
+    """Integrate a sweep of the crank's speed, ``low`` to ``high`` rad/s and back, ``seconds``
+    each way.
 
     Raises
     ------
@@ -176,7 +183,8 @@ def _way(
 
 
 def amplitude_spectra(signals: Array, highest: float = SPECTRUM_HZ) -> tuple[Array, Array]:
-    """Frequencies (frequency,) Hz up to the highest and amplitudes (signal, frequency) of signals (signal, sample).
+    """Frequencies (frequency,) Hz up to the highest and amplitudes (signal, frequency) of signals
+    (signal, sample).
 
     Under Hann's window, straight trends taken off; a steady line has its amplitude.
     """

@@ -75,7 +75,10 @@ def _disc(gear: Gear, material: Material) -> tuple[float, float]:
 
 
 def gear_of(row: TableRow) -> Gear:
-    """Geometry of one gear; what the table leaves out is an ISO 53 rack, no shift, a bore of half the pitch radius."""
+    """Geometry of one gear.
+
+    What the table leaves out is an ISO 53 rack, no shift, a bore of half the pitch radius.
+    """
     helix, module = (row.given(key, row.number(key)) for key in ("helix_angle", "normal_module"))
     n_teeth = round(row.given("n_teeth", row.whole("n_teeth")))
     row.given("face_width", row.positive("face_width"))
@@ -114,7 +117,9 @@ def gear_of(row: TableRow) -> Gear:
 def line_gear(
     row: TableRow, shape: Gear, numbers: tuple[int, ...], options: LineOptions, material: Material
 ) -> LineGear:
-    """A gear on its node, with its mass (of a solid disc where it is empty) and, for lateral motion, its support."""
+    """A gear on its node, with its mass (of a solid disc where it is empty) and, for lateral
+    motion, its support.
+    """
     number = round(row.given("node", row.whole("node")))
     if number not in numbers:
         raise ConfigError(f"{row.place('node')}: {options.shafting_csv} has no node {number}")
@@ -185,7 +190,10 @@ def mesh_of(
     shapes: list[Gear],
     options: LineOptions,
 ) -> tuple[GearPair, GearMesh]:
-    """Two gears in mesh; a torsional stiffness k stands for k / (r_b1 r_b2) along the line of action."""
+    """Two gears in mesh.
+
+    A torsional stiffness k stands for k / (r_b1 r_b2) along the line of action.
+    """
     driving, driven = (
         _gear_at(row, node, numbers[node], end, gears, options)
         for node, end in zip(ends, ("from", "to"), strict=True)
@@ -240,7 +248,10 @@ def _mesh_stiffness(row: TableRow, pair: GearPair) -> float:
 def _gear_at(
     row: TableRow, node: int, number: int, end: str, gears: list[LineGear], options: LineOptions
 ) -> int:
-    """Place of the gear on a node that the row means; ConfigError where the tables contradict each other."""
+    """Place of the gear on a node that the row means.
+
+    ConfigError where the tables contradict each other.
+    """
     n_teeth = row.whole(f"teeth_{end}")
     there = [place for place, gear in enumerate(gears) if gear.node == node]
     if options.gears_csv is None:

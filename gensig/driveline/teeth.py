@@ -1,4 +1,5 @@
-"""The teeth of the meshes of a line: tables of spur and helical pairs, and what a gear takes along from mesh to mesh.
+"""The teeth of the meshes of a line: tables of spur and helical pairs, and what a gear takes
+along from mesh to mesh.
 
 ``docs/theory/shaft_line_records.md``.
 """
@@ -47,7 +48,9 @@ class ToothLaw:
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class ToothStart:
-    """The teeth of a mesh that are in place at time 0, and how far the middle of their faces is past A, pitches."""
+    """The teeth of a mesh that are in place at time 0, and how far the middle of their faces is
+    past A, pitches.
+    """
 
     teeth: tuple[int, int]
     phase: float
@@ -57,7 +60,10 @@ class ToothStart:
 def tooth_table(
     law: ToothLaw, pair: GearPair, faults: tuple[Fault, ...], force: float
 ) -> PairTable | SlicedTable:
-    """Table of a pair under a mean force in N: of spur teeth as they are, of helical ones in slices."""
+    """Table of a pair under a mean force in N.
+
+    Of spur teeth as they are, of helical ones in slices.
+    """
     teeth = faulty_teeth(pair, faults)
     if pair.pinion.helix_angle == 0.0:
         return loaded_pair_table(pair, law.material, law.options, teeth, force=force)
@@ -65,7 +71,9 @@ def tooth_table(
 
 
 def require_drive(pair: GearPair, slices: SliceOptions) -> None:
-    """Raise unless at least one pair of teeth is always in contact, by the overlap of the face too."""
+    """Raise unless at least one pair of teeth is always in contact, by the overlap of the face
+    too.
+    """
     if pair.pinion.helix_angle == 0.0:
         pair.require_continuous_drive()
     elif slices.slices_in_phase:
@@ -111,7 +119,10 @@ def _table_in_line(
 
 
 def neighbours(drive: DriveLine, place: int) -> dict[int, tuple[int, int]]:
-    """Other meshes of the two gears of a mesh: by place, the side of the gear in this mesh and in the other one."""
+    """Other meshes of the two gears of a mesh.
+
+    By place, the side of the gear in this mesh and in the other one.
+    """
     found, own = {}, (drive.line.meshes[place].driving, drive.line.meshes[place].driven)
     for other, mesh in enumerate(drive.line.meshes):
         for there, gear in enumerate((mesh.driving, mesh.driven)):
@@ -131,11 +142,13 @@ def neighbour_meshes(
     specimen: Specimen,
     turned: float,
 ) -> dict[int, OwnMesh]:
-    """The other meshes of the two gears of a mesh with what these gears have, sound or not, by their place.
+    """The other meshes of the two gears of a mesh with what these gears have, sound or not, by
+    their place.
 
-    A gear that drives in both meshes, or is driven in both, is met on the same flanks: its faults and errors come
-    along, but for misalignment, which is a pair's. Else its other flanks are met, which are without errors, and feel of
-    the faults what ``Fault.on_other_flank`` says. Mates are perfect.
+    A gear that drives in both meshes, or is driven in both, is met on the same flanks: its faults
+    and errors come along, but for misalignment, which is a pair's. Else its other flanks are met,
+    which are without errors, and feel of the faults what ``Fault.on_other_flank`` says. Mates are
+    perfect.
     """
     found = {}
     for other, (here, there) in neighbours(machine.drive, place).items():
@@ -164,7 +177,8 @@ def tooth_there(
     start: ToothStart,
     turned: float,
 ) -> int:
-    """The tooth of a gear that is in place in another of its meshes when ``turned`` rad of the first node.
+    """The tooth of a gear that is in place in another of its meshes when ``turned`` rad of the
+    first node.
 
     ``here``, ``there`` are the place of a mesh and the gear's side in it, 0 driving and 1 driven.
     """
@@ -184,7 +198,8 @@ def tooth_there(
         pitch_point=_pitch_point(drive, there[0]),
     )
     place, pair = there[0], drive.pairs[there[0]]
-    # where the line says that a tooth is; play and profile shift move it by some hundredths of a pitch
+    # where the line says that a tooth is; play and profile shift move it by some hundredths of a
+    # pitch
     in_place = float(start_rolls(drive, turned)[place]) / pair.base_pitch
     return round(tooth + phase - in_place) % n_teeth
 

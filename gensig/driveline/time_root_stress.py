@@ -1,4 +1,6 @@
-"""Root stress of a mesh under the tooth force that a simulation in time found, teeth free to part."""
+"""Root stress of a mesh under the tooth force that a simulation in time found, teeth free to
+part.
+"""
 
 from __future__ import annotations
 
@@ -24,9 +26,9 @@ def root_stress_in_time(
 ) -> DynamicRootStress:
     """Root stress of every pair that meets in the whole cycles of a run.
 
-    ISO's stress and the load shares are those under the typical greatest force, the median over the cycles of the
-    greatest in a cycle; single impacts are harder. A force on the back flanks bends the teeth the other way and is
-    left out.
+    ISO's stress and the load shares are those under the typical greatest force, the median over
+    the cycles of the greatest in a cycle; single impacts are harder. A force on the back flanks
+    bends the teeth the other way and is left out.
 
     Returns
     -------

@@ -1,6 +1,7 @@
 """Compiled core: the machine around the gear mesh, several records side by side.
 
-``q`` and ``v`` are the first rows of a state: deviations and their rates, one row a degree of freedom.
+``q`` and ``v`` are the first rows of a state: deviations and their rates, one row a degree of
+freedom.
 """
 
 from __future__ import annotations
@@ -22,7 +23,8 @@ from gensig.dynamics._layout import (
 )
 from gensig.dynamics._vector import at, get_row, inlined, set_row, spread, where_above, width
 
-# degrees of freedom of the two gears that every machine begins with; helical gears have more behind them
+# degrees of freedom of the two gears that every machine begins with; helical gears have more
+# behind them
 P_X, P_Y, P_TURN, W_X, W_Y, W_TURN, N_IN_PLANE = range(7)
 N_GEARS = 12
 EARLIEST, LATEST = 0.02, 0.98  # share of a step at which it may be cut in two
@@ -53,10 +55,11 @@ def motion(group, q, v, work):
 
 @inlined
 def set_out(group, time, q, drive, forces, work, wide):
-    """Write what stays the same over a step: nominal motion, the roll at its begin, and every force but the mesh's.
+    """Write what stays the same over a step: nominal motion, the roll at its begin, and every
+    force but the mesh's.
 
-    Rows ``drive`` take the nominal speed, its change, the share of the set torque and the pinion's turn; rows
-    ``forces`` the forces.
+    Rows ``drive`` take the nominal speed, its change, the share of the set torque and the
+    pinion's turn; rows ``forces`` the forces.
     """
     n = width(work)
     n_dof = len(group.force) // n
@@ -131,7 +134,10 @@ def accelerate(group, law, q, v, torque, forces, a, work):
 
 @inlined
 def recenter(group, q, n_dof, work, wide):
-    """Take the pinion's turn out of all rotations together, into ``CENTER``; no spring but the drive's sees it."""
+    """Take the pinion's turn out of all rotations together, into ``CENTER``.
+
+    No spring but the drive's sees it.
+    """
     n = width(work)
     turn = get_row(work, q + P_TURN)
     for lane in range(n):
@@ -149,7 +155,9 @@ def _crossing(before, after, zero, one):
 
 @inlined
 def event(group, first, last, work):
-    """Share of the step at which the first pair takes up or lets go of its load, from the margins at both ends."""
+    """Share of the step at which the first pair takes up or lets go of its load, from the margins
+    at both ends.
+    """
     zero, one = spread(work, 0.0), spread(work, 1.0)
     earliest = one
     for k in range(first, last):

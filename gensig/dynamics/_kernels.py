@@ -1,7 +1,9 @@
-"""Compiled core: a fixed-step fourth-order Runge-Kutta integrator and its low-pass, several records side by side.
+"""Compiled core: a fixed-step fourth-order Runge-Kutta integrator and its low-pass, several
+records side by side.
 
-Every number of a record lies in its own lane of a vector, and no instruction mixes lanes or reorders sums: a record's
-bits depend on nothing but its own numbers. Arrays are flat; a row is one number for every record of the group.
+Every number of a record lies in its own lane of a vector, and no instruction mixes lanes or
+reorders sums: a record's bits depend on nothing but its own numbers. Arrays are flat; a row is
+one number for every record of the group.
 """
 
 from __future__ import annotations
@@ -59,10 +61,11 @@ def integrate(
 ):  # fmt: skip
     """Advance every lane by ``n_steps`` of classical RK4.
 
-    The tables are read once a step, at the roll where it will end; the middle follows from both ends, and what little
-    the stages differ from there by the slope of the gap. A step in which a pair takes up or lets go of its load is
-    taken again in two parts that meet there, in the lanes where it does: the force has a kink there, which would
-    otherwise set the accuracy of everything.
+    The tables are read once a step, at the roll where it will end; the middle follows from both
+    ends, and what little the stages differ from there by the slope of the gap. A step in which a
+    pair takes up or lets go of its load is taken again in two parts that meet there, in the lanes
+    where it does: the force has a kink there, which would otherwise set the accuracy of
+    everything.
 
     Parameters
     ----------
@@ -291,7 +294,9 @@ def integrate(
 
 @inlined
 def keep_begin(work, wide, near):
-    """Copy what was read at the begin of the next step from the slot ``ODD`` to ``EVEN``, where a call begins."""
+    """Copy what was read at the begin of the next step from the slot ``ODD`` to ``EVEN``, where a
+    call begins.
+    """
     n = width(work)
     for i in range(layout.SLOT_ROWS):
         set_row(work, pair_rows(EVEN, 0) + i, get_row(work, pair_rows(ODD, 0) + i))
@@ -321,9 +326,10 @@ def tell(seen, row, normal, work, near):
 def low_pass(means, first, taps, factor, n_channels, n_samples, out, out_row):
     """Every ``factor``-th value of the filtered series of every channel.
 
-    ``means`` (step, channel, lane) and, from row ``out_row`` on, ``out`` (sample, channel, lane), flat; ``first`` is
-    the step under the first tap of the first sample. ``TOGETHER`` samples at a time share what they read: before and
-    behind ``taps`` stand as many zeros as the first and the last of them lie apart.
+    ``means`` (step, channel, lane) and, from row ``out_row`` on, ``out`` (sample, channel, lane),
+    flat; ``first`` is the step under the first tap of the first sample. ``TOGETHER`` samples at a
+    time share what they read: before and behind ``taps`` stand as many zeros as the first and the
+    last of them lie apart.
     """
     apart = (TOGETHER - 1) * factor
     n_taps = len(taps) - 2 * apart
@@ -354,8 +360,9 @@ def record(
 ):  # fmt: skip
     """Integrate and decimate block by block, so that nothing at the internal rate leaves the cache.
 
-    ``out`` (lane, channel, sample) float64 takes ``n_samples``; the first tap of the first stands on the step after
-    ``first_step``. ``means`` is a scratch of ``mean_rows`` rows of channels, of which the last ``BLOCK`` take samples.
+    ``out`` (lane, channel, sample) float64 takes ``n_samples``; the first tap of the first stands
+    on the step after ``first_step``. ``means`` is a scratch of ``mean_rows`` rows of channels, of
+    which the last ``BLOCK`` take samples.
     """
     n, n_channels, n_kept = width(work), len(channels), len(taps) - (2 * TOGETHER - 1) * factor
     angle_row, now, done = 0, first_step, 0
@@ -392,9 +399,11 @@ def record(
 
 @compiled
 def law_at(group, motion, work, wide, near, found):
-    """Every lane's law at one instant; rows of ``motion`` are roll, approach, its rate, the roll's rate.
+    """Every lane's law at one instant; rows of ``motion`` are roll, approach, its rate, the
+    roll's rate.
 
-    ``found`` takes the rows of the law. For tests: the integrator reads the tables, and chooses chords, less often.
+    ``found`` takes the rows of the law. For tests: the integrator reads the tables, and chooses
+    chords, less often.
     """
     n = width(work)
     approach, rate, roll_rate = get_row(motion, 1), get_row(motion, 2), get_row(motion, 3)

@@ -1,7 +1,8 @@
 """Compiled core: the rows of its arrays by name.
 
-Arrays are flat, and a row is one number for every record of the group: ``get_row``, ``set_row`` and ``at`` of
-``_vector`` turn a row into a place. A slot is an instant at which the tables were read.
+Arrays are flat, and a row is one number for every record of the group: ``get_row``, ``set_row``
+and ``at`` of ``_vector`` turn a row into a place. A slot is an instant at which the tables were
+read.
 """
 
 from __future__ import annotations
@@ -15,7 +16,8 @@ from gensig.dynamics._vector import FOUR, inlined
 from gensig.mesh.pair_table import N_PAIRS
 
 MOST_PAIRS = 8  # that may be followed at once; spur gears have 4
-# pairs this much further apart than the approach are followed through a step, m: none comes closer as fast
+# pairs this much further apart than the approach are followed through a step, m: none comes
+# closer as fast
 NEAR = 2e-5
 FAR, YIELDING = 1.0, 1e30  # gap in m and compliance in m/N of a pair that is not there
 FAR_NEAR = 1e-4  # approaches below are asked of the pairs between FIRST_NEAR and LAST_NEAR only, m
@@ -25,7 +27,8 @@ FAR_NEAR = 1e-4  # approaches below are asked of the pairs between FIRST_NEAR an
     PINION_RADIUS, WHEEL_RADIUS, PATH, PITCH_POINT, START_CURVATURE, TANGENT_LENGTH, SHARED, DAMPING, FRICTION,
     PER_FRICTION_WIDTH, PER_SWITCH_WIDTH, BACKLASH, MEAN_FORCE, REST_APPROACH, HALF_LAG, MIDDLE_POINT, N_NUMBERS,
 ) = range(17)  # fmt: skip
-# rows of Group.exact, float64 whatever the precision: where pairs stand must not be lost in a long roll
+# rows of Group.exact, float64 whatever the precision: where pairs stand must not be lost in a
+# long roll
 (
     EXACT_RADIUS, PITCH, PER_PITCH, NODES_PER_METER, START_ROLL, FIRST_NEAR, LAST_NEAR, TABLE_START, N_EXACT,
 ) = range(9)  # fmt: skip
@@ -60,7 +63,8 @@ N_LAW = 8
 LAW = MOTION_ROLL_RATE + 1  # fields of ``Law``
 RAW = LAW + N_LAW  # table rows as they are read, lane by lane
 PAIR_FORCE = RAW + MOST_PAIRS * COLUMNS
-# of chords only: the force that bends what pairs share, the same at the last step's end, the approach less that
+# of chords only: the force that bends what pairs share, the same at the last step's end, the
+# approach less that
 # deflection in the middle of the step, table rows as they are read, and the same by slot and pair
 TOTAL = PAIR_FORCE + MOST_PAIRS
 LAST_TOTAL, LOCAL, RAW_BESIDE = TOTAL + 1, TOTAL + 2, TOTAL + 3
@@ -68,8 +72,10 @@ BESIDE = RAW_BESIDE + MOST_PAIRS * COLUMNS
 LEFT_OUT, LEFT_OUT_SLOPE, TOUCH, TOUCH_SLOPE = range(COLUMNS)
 BESIDE_ROWS = MOST_PAIRS * COLUMNS
 N_MESH = BESIDE + N_SLOTS * BESIDE_ROWS
-# blocks of the machine behind the rows of the mesh, in rows per degree of freedom: five states, each q and then v; the
-# accelerations of a stage and their sums for q and v. Behind them the rows of the drive, the forces, and the mean
+# blocks of the machine behind the rows of the mesh, in rows per degree of freedom: five states,
+# each q and then v; the
+# accelerations of a stage and their sums for q and v. Behind them the rows of the drive, the
+# forces, and the mean
 # accelerations of a step and of its first part
 NOW, SINGLE, PARTED, TRIAL_A, TRIAL_B, ACCELERATIONS, SUM_Q, SUM_V, BEHIND = (
     0,
@@ -82,9 +88,11 @@ NOW, SINGLE, PARTED, TRIAL_A, TRIAL_B, ACCELERATIONS, SUM_Q, SUM_V, BEHIND = (
     12,
     13,
 )
-# rows of the drive at the begin of a step: nominal speed, its change, share of the set torque, the pinion's turn
+# rows of the drive at the begin of a step: nominal speed, its change, share of the set torque,
+# the pinion's turn
 DRIVE_SPEED, DRIVE_GAIN, DRIVE_TORQUE, DRIVE_CENTER, N_DRIVE = range(5)
-# what is told of the mesh at an output sample: the newest pair, the normal force, and that of every pair
+# what is told of the mesh at an output sample: the newest pair, the normal force, and that of
+# every pair
 SEEN_NEWEST, SEEN_FORCE, SEEN_PAIRS, N_SEEN = 0, 1, 2, 2 + MOST_PAIRS
 # rows of the float64 scratch
 BASE, CENTER, NOMINAL, ROLL, N_WIDE = 0, 1, 2, 3, 3 + N_SLOTS
@@ -123,24 +131,27 @@ class Law(NamedTuple):
 class Group(NamedTuple):
     """Gear meshes of the same kind side by side, with the machines around them.
 
-    ``numbers``, ``exact`` and ``places`` hold rows as named above. ``table`` holds, lane after lane, the pairs of
-    distinct teeth (pinion's times wheel's, node, [c, c', g, g']), or where those are many the distinct teeth of the
-    pinion and then those of the wheel, whose ``WHEEL_ROWS`` is then not 0. Helical pairs have ``n_chords`` of them, one
-    behind the other, ``depth`` (lane, chord) m says from which bite on each holds, and ``beside`` has the places of the
-    table and holds [energy in J that the chord's spring leaves out, its slope, gap of the first touch, its slope].
-    ``n_pairs`` are followed at once. ``bend`` (lane, 4) is half the distance of nodes where a column is followed by its
-    slope, else 0: values bend between nodes as their slopes say.
-    ``tooth_row`` is the row of every tooth (-1 for a missing one), ``tooth_error`` its gap in m at the pitch point,
-    ``tooth_tilt`` how fast that grows along the path in m/m.
+    ``numbers``, ``exact`` and ``places`` hold rows as named above. ``table`` holds, lane after
+    lane, the pairs of distinct teeth (pinion's times wheel's, node, [c, c', g, g']), or where
+    those are many the distinct teeth of the pinion and then those of the wheel, whose
+    ``WHEEL_ROWS`` is then not 0. Helical pairs have ``n_chords`` of them, one behind the other,
+    ``depth`` (lane, chord) m says from which bite on each holds, and ``beside`` has the places of
+    the table and holds [energy in J that the chord's spring leaves out, its slope, gap of the
+    first touch, its slope]. ``n_pairs`` are followed at once. ``bend`` (lane, 4) is half the
+    distance of nodes where a column is followed by its slope, else 0: values bend between nodes
+    as their slopes say. ``tooth_row`` is the row of every tooth (-1 for a missing one),
+    ``tooth_error`` its gap in m at the pitch point, ``tooth_tilt`` how fast that grows along the
+    path in m/m.
 
-    The machine is M q'' + C q' + K q = f + mesh forces; q is the deviation from nominal rotation and begins with pinion
-    x, y, rotation, wheel x, y, rotation. The state is q less ``rest`` (dof, lane), a static equilibrium, so that it
-    stays small. K and C stand as diagonals and as rows of what else there is (``other_first`` (dof + 1,),
-    ``other_column``). ``set_force`` is f and the mean mesh force, ``force`` the same less what holds the rest; the mean
-    mesh force is taken off the mesh force again: large forces and torques balance before they are rounded. ``held`` is
-    K times, and ``carried`` M times, how far each degree of freedom turns with the pinion (``rotation``). ``reach``
-    (dof, lane) is the gradient of the approach. ``profile`` (cell, 5, lane) tells the nominal motion and the torque,
-    cell ``profile_first`` first.
+    The machine is M q'' + C q' + K q = f + mesh forces; q is the deviation from nominal rotation
+    and begins with pinion x, y, rotation, wheel x, y, rotation. The state is q less ``rest``
+    (dof, lane), a static equilibrium, so that it stays small. K and C stand as diagonals and as
+    rows of what else there is (``other_first`` (dof + 1,), ``other_column``). ``set_force`` is f
+    and the mean mesh force, ``force`` the same less what holds the rest; the mean mesh force is
+    taken off the mesh force again: large forces and torques balance before they are rounded.
+    ``held`` is K times, and ``carried`` M times, how far each degree of freedom turns with the
+    pinion (``rotation``). ``reach`` (dof, lane) is the gradient of the approach. ``profile``
+    (cell, 5, lane) tells the nominal motion and the torque, cell ``profile_first`` first.
     """
 
     numbers: Any
@@ -177,7 +188,10 @@ class Group(NamedTuple):
 
 
 class HelicalGroup(Group):
-    """Helical gears: a type of its own, so that spur gears are compiled without what these alone need."""
+    """Helical gears.
+
+    A type of its own, so that spur gears are compiled without what these alone need.
+    """
 
 
 _intrinsic: Any = intrinsic
@@ -214,7 +228,9 @@ def chord_rows(slot, pair):
 
 @inlined
 def raw_place(block, pair, lane, n):
-    """Place of the table row that was read for a pair of one record, in ``RAW`` or ``RAW_BESIDE``."""
+    """Place of the table row that was read for a pair of one record, in ``RAW`` or
+    ``RAW_BESIDE``.
+    """
     return block * n + (pair * n + lane) * COLUMNS
 
 

@@ -103,9 +103,11 @@ def _rubbed(numbers, position, load_of_pair):
 
 @inlined
 def _total_load(numbers, rounds, first, last, slot, work):
-    """Load of all pairs, and the sum of their stiffnesses; those that the shared deflection lifts off get a bite of 0.
+    """Load of all pairs, and the sum of their stiffnesses; those that the shared deflection lifts
+    off get a bite of 0.
 
-    Each that leaves raises the total, so the loop ends after at most as many rounds as there are pairs.
+    Each that leaves raises the total, so the loop ends after at most as many rounds as there are
+    pairs.
     """
     zero, shared = spread(work, 0.0), get_row(numbers, SHARED)
     total, stiffness = zero, zero
@@ -132,11 +134,13 @@ def _total_load(numbers, rounds, first, last, slot, work):
 def one_sided_law(
     numbers, consistent, helical, first, last, slot, margin, ahead, approach, approach_rate, roll_rate, work
 ):  # fmt: skip
-    """One-sided contact of the gathered pairs, ``ahead`` m of roll after the instant they were gathered at.
+    """One-sided contact of the gathered pairs, ``ahead`` m of roll after the instant they were
+    gathered at.
 
-    Rows ``margin`` take how deep every pair bites into the body that the others deflect, negative where it does not,
-    and ``PAIR_FORCE`` its normal force; none if negative. Helical teeth are damped by the gap of their first touch,
-    for those of chords jump from one to the next, and the energy that the springs of chords leave out is stored too.
+    Rows ``margin`` take how deep every pair bites into the body that the others deflect, negative
+    where it does not, and ``PAIR_FORCE`` its normal force; none if negative. Helical teeth are
+    damped by the gap of their first touch, for those of chords jump from one to the next, and the
+    energy that the springs of chords leave out is stored too.
     """
     zero, one = spread(work, 0.0), spread(work, 1.0)
     shared, damping = get_row(numbers, SHARED), get_row(numbers, DAMPING)
@@ -214,7 +218,8 @@ def one_sided_law(
 def papers_law(numbers, first, last, slot, margin, ahead, approach, approach_rate, work):
     """F = k(t) delta + c_m delta': two-sided, no gap, pairs in and out over one integration step.
 
-    Rows ``margin`` take how far every pair is in, from 0 to 1 and beyond, ``PAIR_FORCE`` its force; none if negative.
+    Rows ``margin`` take how far every pair is in, from 0 to 1 and beyond, ``PAIR_FORCE`` its
+    force; none if negative.
     """
     zero, one = spread(work, 0.0), spread(work, 1.0)
     shared, damping, half_lag = (
@@ -259,9 +264,11 @@ def papers_law(numbers, first, last, slot, margin, ahead, approach, approach_rat
 
 @compiled
 def coast_law(group, lane, roll, approach, rate, roll_rate, work):
-    """Contact on the back flanks of one lane, written over its drive law; sound teeth without errors, no friction.
+    """Contact on the back flanks of one lane, written over its drive law; sound teeth without
+    errors, no friction.
 
-    Teeth count backwards along the mirrored roll. What is kept of the pairs goes to slot ``COAST`` and the bites.
+    Teeth count backwards along the mirrored roll. What is kept of the pairs goes to slot
+    ``COAST`` and the bites.
     """
     n = width(work)
     numbers, exact, places, table = group.numbers, group.exact, group.places, group.table
@@ -337,7 +344,9 @@ def coast_law(group, lane, roll, approach, rate, roll_rate, work):
 
 @inlined
 def mesh_law(group, first, last, slot, margin, turned, approach, rate, roll_rate, work, wide):
-    """The law of the chosen kind in every lane, on whichever flank it touches, ``turned`` m of roll after ``BASE``."""
+    """The law of the chosen kind in every lane, on whichever flank it touches, ``turned`` m of
+    roll after ``BASE``.
+    """
     n = width(work)
     numbers = group.numbers
     ahead = turned - get_row(work, AHEAD + slot)

@@ -115,11 +115,13 @@ def _meet(group, lane, newest, work, near):
 
 @compiled
 def gather(group, slot, renew, work, wide, near):
-    """Read the tables at the rolls of a slot; returns whether a newest pair or a chord is another than before.
+    """Read the tables at the rolls of a slot; returns whether a newest pair or a chord is another
+    than before.
 
-    Pairs keep their place, the newest first. ``renew`` looks who is newest and how deep they bite; otherwise that
-    stays, and only the lanes that ``FLAGS`` marks are read. The first span of a slot holds the pairs that were read in
-    any lane; rows outside of it are stale. The second holds those that come near their mates: the others carry nothing.
+    Pairs keep their place, the newest first. ``renew`` looks who is newest and how deep they
+    bite; otherwise that stays, and only the lanes that ``FLAGS`` marks are read. The first span
+    of a slot holds the pairs that were read in any lane; rows outside of it are stale. The second
+    holds those that come near their mates: the others carry nothing.
     """
     n = width(work)
     exact, n_pairs = group.exact, followed(group)
@@ -191,7 +193,10 @@ def gather(group, slot, renew, work, wide, near):
 
 @inlined
 def _choose(group, lane, k, pair, cell, part, position, work, near):
-    """Take the chord of how deep a pair bites into what the others deflect; whether it is another than before."""
+    """Take the chord of how deep a pair bites into what the others deflect.
+
+    Whether it is another than before.
+    """
     n = width(work)
     p = pair + cell * COLUMNS
     step = group.table[p + COLUMNS + GAP] - group.table[p + GAP]
@@ -273,7 +278,10 @@ def _spread_beside(group, slot, k, work):
 
 @inlined
 def cover(slot, first, last, work, near):
-    """Make the rows of a slot valid for the pairs ``first`` to ``last``: pairs that were not read are absent."""
+    """Make the rows of a slot valid for the pairs ``first`` to ``last``.
+
+    Pairs that were not read are absent.
+    """
     span = span_place(slot, width(work))
     for k in range(first, last):
         if not near[span + FIRST_READ] <= k < near[span + LAST_READ]:
@@ -293,10 +301,12 @@ def _nobody(slot, k, work):
 
 @inlined
 def between(a, b, middle, first, last, work):
-    """Fill the slot half-way between two: cubic in gap and compliance, from values and slopes at both ends.
+    """Fill the slot half-way between two: cubic in gap and compliance, from values and slopes at
+    both ends.
 
-    Its slopes are such that Simpson's rule over them gives what the values grow by, kinks between or not. No gap is
-    smaller there than at both ends, so that pairs that come near at neither may be left out.
+    Its slopes are such that Simpson's rule over them gives what the values grow by, kinks between
+    or not. No gap is smaller there than at both ends, so that pairs that come near at neither may
+    be left out.
     """
     begin, end = get_row(work, AHEAD + a), get_row(work, AHEAD + b)
     bend = CUBIC_MIDDLE.value_by_slopes * (end - begin)

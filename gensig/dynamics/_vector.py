@@ -1,9 +1,11 @@
 """Several numbers side by side as one Numba value, one for each record of a group.
 
-Numba cannot be told that arrays do not overlap, so LLVM seldom vectorises its loops. A value of LLVM's own vector type
-needs no luck, and its lanes cannot touch each other: a record's bits do not depend on its neighbours. No fast-math.
+Numba cannot be told that arrays do not overlap, so LLVM seldom vectorises its loops. A value of
+LLVM's own vector type needs no luck, and its lanes cannot touch each other: a record's bits do
+not depend on its neighbours. No fast-math.
 
-A group is 64 bytes wide: two AVX registers, so that each waits less for the other. Rows of tables are vectors of four.
+A group is 64 bytes wide: two AVX registers, so that each waits less for the other. Rows of tables
+are vectors of four.
 """
 
 from __future__ import annotations
@@ -27,12 +29,15 @@ PRECISIONS = ("float64", "float32")
 GROUP_BYTES = 64
 FOUR = 4
 
-# Without Numba's reference counting (arrays are borrowed, none is made here) a step costs a third less.
+# Without Numba's reference counting (arrays are borrowed, none is made here) a step costs a third
+# less.
 _OPTIONS: dict[str, Any] = {"cache": True, "error_model": "numpy", "_nrt": False}
 
 
 def source_stamp(folder: Path) -> str:
-    """Hash of all private modules below a folder, whose compiled functions call each other across files."""
+    """Hash of all private modules below a folder, whose compiled functions call each other across
+    files.
+    """
     digest = hashlib.sha256()
     for path in sorted(folder.rglob("_*.py")):
         name = str(path.relative_to(folder))
@@ -46,7 +51,8 @@ _STAMP = source_stamp(Path(__file__).parents[1])  # of the whole package
 def _stamped(decorator: Callable[[Any], Any]) -> Any:
     """The decorator, with a cache that is stale after a change of any of the files.
 
-    Numba looks at a function's own file alone, and would go on with what was compiled of another one's former content.
+    Numba looks at a function's own file alone, and would go on with what was compiled of another
+    one's former content.
     """
 
     def decorate(function: Any) -> Any:
@@ -153,7 +159,8 @@ _NUMBERS = {types.float64: ir.DoubleType(), types.float32: ir.FloatType()}
 
 def _address(context: Any, builder: Any, kind: Any, array: Any, place: Any, read: Any) -> Any:
     """Where a vector, or a single number, lies."""
-    # the plain field: a proxy of the whole array at every access would cost the compiler most of its time
+    # the plain field: a proxy of the whole array at every access would cost the compiler most of
+    # its time
     data = builder.extract_value(array, context.data_model_manager[kind].get_field_position("data"))
     llvm = read.llvm if isinstance(read, Vector) else _NUMBERS[read]
     return builder.bitcast(builder.gep(data, [place]), llvm.as_pointer())
@@ -225,7 +232,10 @@ def set_row(typing_context: Any, array: Any, row: Any, value: Any) -> Any:
 
 @_intrinsic
 def at(typing_context: Any, row: Any, lane: Any, n_lanes: Any) -> Any:
-    """The place of one record's number in a flat array: row ``row``, record ``lane`` of ``n_lanes``."""
+    """The place of one record's number in a flat array.
+
+    Row ``row``, record ``lane`` of ``n_lanes``.
+    """
 
     def build(context: Any, builder: Any, sig: Any, args: Any) -> Any:
         return builder.add(builder.mul(args[0], args[2]), args[1])
@@ -265,7 +275,10 @@ def where_above(typing_context: Any, a: Any, b: Any, yes: Any, no: Any) -> Any:
 
 @_intrinsic
 def plus_product(typing_context: Any, total: Any, factors: Any, place: Any, value: Any) -> Any:
-    """``total + factors[place] * value``, rounded once; ``factors`` is an array of the vectors' kind."""
+    """``total + factors[place] * value``, rounded once.
+
+    ``factors`` is an array of the vectors' kind.
+    """
 
     def build(context: Any, builder: Any, sig: Any, args: Any) -> Any:
         kind = sig.return_type

@@ -1,4 +1,6 @@
-"""Deep-groove ball bearings under a radial load, and the stiffness of a gear's support made of two and their shaft."""
+"""Deep-groove ball bearings under a radial load, and the stiffness of a gear's support made of
+two and their shaft.
+"""
 
 from __future__ import annotations
 
@@ -25,9 +27,10 @@ SOFTEST = 1e-12  # of a loaded ball's stiffness; keeps a Newton step finite wher
 class BallBearing:
     """A deep-groove ball bearing that carries no thrust, so that its contact angle is 0.
 
-    The conformities are the radii of the grooves' cross sections over the ball's diameter; ``radial_clearance`` is how
-    far one ring can move across the other, from stop to stop, mounted and warm; negative is preload. Balls and rings
-    are of the gears' material, the rings round and rigid but for the contacts.
+    The conformities are the radii of the grooves' cross sections over the ball's diameter;
+    ``radial_clearance`` is how far one ring can move across the other, from stop to stop, mounted
+    and warm; negative is preload. Balls and rings are of the gears' material, the rings round and
+    rigid but for the contacts.
     """
 
     n_balls: int
@@ -58,10 +61,12 @@ class BallBearing:
             raise ConfigError(f"bearing.radial_clearance_um = {clearance:g} must lie in -20..100")
 
     def groove_curvatures(self, race: str) -> tuple[float, float, float, float]:
-        """Principal curvatures 1/m of the ball (twice), then of the "inner" or "outer" groove along and across.
+        """Principal curvatures 1/m of the ball (twice), then of the "inner" or "outer" groove
+        along and across.
 
-        Source: Harris, Rolling Bearing Analysis, 4th ed., section 2.4, with contact angle 0: the groove's curvature
-        along the race is 2 / (d_m - D) inside and -2 / (d_m + D) outside, across it -1 / (f D).
+        Source: Harris, Rolling Bearing Analysis, 4th ed., section 2.4, with contact angle 0: the
+        groove's curvature along the race is 2 / (d_m - D) inside and -2 / (d_m + D) outside,
+        across it -1 / (f D).
         """
         ball, sign = 2.0 / self.ball_diameter, 1.0 if race == "inner" else -1.0
         conformity = (
@@ -73,7 +78,9 @@ class BallBearing:
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Shaft:
-    """A round shaft of the gears' material on a bearing at each end of ``span``, its gear in the middle."""
+    """A round shaft of the gears' material on a bearing at each end of ``span``, its gear in the
+    middle.
+    """
 
     diameter: float = unit("mm")
     span: float = unit("mm")
@@ -85,7 +92,9 @@ class Shaft:
                 raise ConfigError(f"shaft.{key} = {value:g} must be positive")
 
     def bending_stiffness(self, youngs_modulus: float) -> float:
-        """Force over deflection in the middle, 48 E I / L^3 with I = pi d^4 / 64 of a simply supported beam, N/m."""
+        """Force over deflection in the middle, 48 E I / L^3 with I = pi d^4 / 64 of a simply
+        supported beam, N/m.
+        """
         return 0.75 * math.pi * youngs_modulus * self.diameter**4 / self.span**3
 
 
@@ -100,9 +109,9 @@ def point_contact_coefficient(
         within each body in the same order of planes; concave is negative
 
     Source: Harris, Rolling Bearing Analysis, 4th ed., section 6.3: the ellipticity kappa solves
-    F(rho) = ((kappa^2 + 1) E - 2 K) / ((kappa^2 - 1) E) with the complete elliptic integrals of modulus
-    1 - 1 / kappa^2, and delta = delta* (3 Q (1 - nu^2) / (E' sum rho))^(2/3) sum rho / 2 with
-    delta* = (2 K / pi) (pi / (2 kappa^2 E))^(1/3). Solved exactly, no fit.
+    F(rho) = ((kappa^2 + 1) E - 2 K) / ((kappa^2 - 1) E) with the complete elliptic integrals of
+    modulus 1 - 1 / kappa^2, and delta = delta* (3 Q (1 - nu^2) / (E' sum rho))^(2/3) sum rho / 2
+    with delta* = (2 K / pi) (pi / (2 kappa^2 E))^(1/3). Solved exactly, no fit.
     """
     one, two = curvatures[0] + curvatures[2], curvatures[1] + curvatures[3]
     total = one + two
@@ -122,7 +131,9 @@ def _elliptic_integrals(ellipticity: float) -> tuple[float, float]:
 
 
 def _ellipticity(difference: float) -> float:
-    """Ratio of the axes of the contact ellipse, at least 1, for a curvature difference F(rho) in 0..1."""
+    """Ratio of the axes of the contact ellipse, at least 1, for a curvature difference F(rho) in
+    0..1.
+    """
     if difference < 1e-6:  # a circle; the equation below is 0 / 0 there
         return 1.0
     from scipy.optimize import brentq
@@ -137,7 +148,10 @@ def _ellipticity(difference: float) -> float:
 
 @lru_cache(maxsize=64)
 def ball_coefficient(bearing: BallBearing, material: Material) -> float:
-    """K of Q = K delta^1.5 for a ball between both races, N/m^1.5; deflections of inner and outer contact add."""
+    """K of Q = K delta^1.5 for a ball between both races, N/m^1.5.
+
+    Deflections of inner and outer contact add.
+    """
     contacts = [
         point_contact_coefficient(bearing.groove_curvatures(race), material)
         for race in ("inner", "outer")
@@ -149,8 +163,8 @@ def ball_coefficient(bearing: BallBearing, material: Material) -> float:
 class BearingState:
     """Static equilibria under a radial load along y, at some cage positions.
 
-    ``displacement`` (position, 2) m of the inner ring, x and y; ``ball_load`` (position, ball) N; ``stiffness``
-    (position, 2, 2) N/m, the tangent of the forces on x and y.
+    ``displacement`` (position, 2) m of the inner ring, x and y; ``ball_load`` (position, ball) N;
+    ``stiffness`` (position, 2, 2) N/m, the tangent of the forces on x and y.
     """
 
     displacement: Array
@@ -159,20 +173,24 @@ class BearingState:
 
 
 def cage_positions(bearing: BallBearing) -> Array:
-    """Angles of a ball from the load, over half of the angle between two balls without its ends, (position,) rad."""
+    """Angles of a ball from the load, over half of the angle between two balls without its ends,
+    (position,) rad.
+    """
     return (np.arange(CAGE_POSITIONS) + 0.5) / CAGE_POSITIONS * math.pi / bearing.n_balls
 
 
 def bearing_equilibrium(
     bearing: BallBearing, material: Material, load: float, positions: Array
 ) -> BearingState:
-    """Where the inner ring rests under a radial ``load`` in N along y, for cage ``positions`` (position,) rad.
+    """Where the inner ring rests under a radial ``load`` in N along y, for cage ``positions``
+    (position,) rad.
 
-    Ball j at theta_j = position + 2 pi j / Z from y is pressed by delta_j = x sin(theta_j) + y cos(theta_j) - P / 2,
-    P the clearance, and answers with K max(0, delta_j)^1.5. Newton's method over x and y on the potential energy,
-    which is convex, with steps halved until it falls.
+    Ball j at theta_j = position + 2 pi j / Z from y is pressed by delta_j = x sin(theta_j) + y
+    cos(theta_j) - P / 2, P the clearance, and answers with K max(0, delta_j)^1.5. Newton's method
+    over x and y on the potential energy, which is convex, with steps halved until it falls.
 
-    Source: Harris, Rolling Bearing Analysis, 4th ed., section 7.3, without his sums over a ball on the load's line.
+    Source: Harris, Rolling Bearing Analysis, 4th ed., section 7.3, without his sums over a ball
+    on the load's line.
 
     Raises
     ------
@@ -223,7 +241,8 @@ def bearing_equilibrium(
 
 
 def bearing_stiffness(bearing: BallBearing, material: Material, load: float) -> tuple[float, float]:
-    """Tangent stiffness across and along a radial load in N, averaged over the position of the cage, N/m.
+    """Tangent stiffness across and along a radial load in N, averaged over the position of the
+    cage, N/m.
 
     The coupling between the two averages to 0, since a cage position and its mirror image do.
     """
@@ -236,9 +255,11 @@ def bearing_stiffness(bearing: BallBearing, material: Material, load: float) -> 
 def support_stiffness(
     bearing: BallBearing, shaft: Shaft, material: Material, force: float
 ) -> tuple[float, float]:
-    """Stiffness under a gear across and along its static force in N, N/m: two bearings, in series with their shaft.
+    """Stiffness under a gear across and along its static force in N, N/m: two bearings, in series
+    with their shaft.
 
-    Each bearing carries half, since the gear is in the middle of the span. Housing and seats are rigid.
+    Each bearing carries half, since the gear is in the middle of the span. Housing and seats are
+    rigid.
     """
     bending = shaft.bending_stiffness(material.youngs_modulus)
     across, along = (

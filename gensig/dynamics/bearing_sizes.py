@@ -7,8 +7,10 @@ from dataclasses import dataclass
 
 from gensig.errors import ConfigError
 
-# Dimension series 02 of ISO 15 (bearings 62xx): bore, outside diameter and width in mm. To 150 mm as in makers' and
-# dealers' tables, above from memory of the standard, not checked against its text. Bores of 22, 28 and 32 mm are left
+# Dimension series 02 of ISO 15 (bearings 62xx): bore, outside diameter and width in mm. To 150 mm
+# as in makers' and
+# dealers' tables, above from memory of the standard, not checked against its text. Bores of 22,
+# 28 and 32 mm are left
 # out: rare
 SERIES_02 = (
     (3, 10, 4), (4, 13, 5), (5, 16, 5), (6, 19, 6), (7, 22, 7), (8, 24, 8), (9, 26, 8), (10, 30, 9), (12, 32, 10),
@@ -18,7 +20,8 @@ SERIES_02 = (
     (130, 230, 40), (140, 250, 42), (150, 270, 45), (160, 290, 48), (170, 310, 52), (180, 320, 52), (190, 340, 55),
     (200, 360, 58),
 )  # fmt: skip
-# Least radial clearance of ISO 5753-1, group N, deep-groove ball bearings: up to this bore in mm, micrometres. To
+# Least radial clearance of ISO 5753-1, group N, deep-groove ball bearings: up to this bore in mm,
+# micrometres. To
 # 100 mm as in makers' tables, above from memory of the standard, not checked against its text
 GROUP_N = (
     (10, 2), (18, 3), (30, 5), (50, 6), (65, 8), (80, 10), (100, 12), (120, 15), (160, 18), (180, 20), (200, 25),

@@ -26,7 +26,10 @@ STORED = Path(__file__).with_name(
 
 
 def usable_band(sampling_rate: float) -> tuple[float, float]:
-    """Band in Hz in which the recorded signal is flat to 0.01 dB; nothing folds above -100 dB at any frequency."""
+    """Band in Hz in which the recorded signal is flat to 0.01 dB.
+
+    Nothing folds above -100 dB at any frequency.
+    """
     return 0.0, PASS_SHARE * sampling_rate
 
 
@@ -72,7 +75,10 @@ class Decimator:
 
 @lru_cache(maxsize=16)
 def decimator(oversampling: int) -> Decimator:
-    """The low-pass; see ``design``, whose import takes longer than a first record: that of the default is stored."""
+    """The low-pass.
+
+    See ``design``, whose import takes longer than a first record: that of the default is stored.
+    """
     stored = json.loads(STORED.read_text("utf-8")).get(str(oversampling))
     if stored is None:
         return design(oversampling)
@@ -82,12 +88,14 @@ def decimator(oversampling: int) -> Decimator:
 
 
 def design(oversampling: int) -> Decimator:
-    """Kaiser-window design: pass to 0.39 of the output rate, stop from half of it, so that nothing folds anywhere.
+    """Kaiser-window design: pass to 0.39 of the output rate, stop from half of it, so that
+    nothing folds anywhere.
 
-    An even number of taps puts samples at the ends of steps, whose means lie half a step earlier; the pass band makes
-    up for what the mean over a step takes (0.03 dB at 20 kHz for 8 steps a sample). A stop band that began where
-    content folds into the pass band would need half the taps, but would leave mesh harmonics of 20 to 31 kHz in 20 to
-    25.6 kHz, between the mesh lines, where residuals see them.
+    An even number of taps puts samples at the ends of steps, whose means lie half a step earlier;
+    the pass band makes up for what the mean over a step takes (0.03 dB at 20 kHz for 8 steps a
+    sample). A stop band that began where content folds into the pass band would need half the
+    taps, but would leave mesh harmonics of 20 to 31 kHz in 20 to 25.6 kHz, between the mesh
+    lines, where residuals see them.
     """
     from scipy.signal import firwin2, kaiserord
 
@@ -106,7 +114,8 @@ def design(oversampling: int) -> Decimator:
 
 
 def in_band_error(found: Array, exact: Array, sampling_rate: float) -> Array:
-    """Largest relative error of a channel's spectrum from 20 Hz to the end of the usable band, (lane,).
+    """Largest relative error of a channel's spectrum from 20 Hz to the end of the usable band,
+    (lane,).
 
     Parameters
     ----------

@@ -1,4 +1,7 @@
-"""What helical gears add to a pair: motion along the axis and tilts. Derived in ``docs/theory/helical_dynamics.md``."""
+"""What helical gears add to a pair.
+
+Motion along the axis and tilts. Derived in ``docs/theory/helical_dynamics.md``.
+"""
 
 from __future__ import annotations
 
@@ -28,8 +31,9 @@ AXIAL_DOFS = (
 def axial_reach(pair: GearPair) -> Array:
     """Gradient of the approach over ``AXIAL_DOFS``, (dof,); 1, m.
 
-    The axial share of the normal force, tan(beta_b) of the transverse one, acts at the pitch point in the middle of
-    the face. A right-handed pinion comes closer to the wheel's flank as it moves along +z.
+    The axial share of the normal force, tan(beta_b) of the transverse one, acts at the pitch
+    point in the middle of the face. A right-handed pinion comes closer to the wheel's flank as it
+    moves along +z.
     """
     slant = math.copysign(math.tan(pair.base_helix_angle), pair.pinion.helix_angle)
     across = math.tan(pair.working_pressure_angle)
@@ -38,14 +42,17 @@ def axial_reach(pair: GearPair) -> Array:
 
 
 def half_lag(table: PairTable | SlicedTable) -> float:
-    """How much later than the slice that enters first the middle of the face meets a phase, m along the path."""
+    """How much later than the slice that enters first the middle of the face meets a phase, m
+    along the path.
+    """
     if isinstance(table, PairTable):
         return 0.0
     return 0.5 * table.pair.face_width * math.tan(table.pair.base_helix_angle)
 
 
 def pitches(table: PairTable | SlicedTable) -> tuple[int, int]:
-    """Whole base pitches from A at which a table begins and ends; pairs followed at once are the difference.
+    """Whole base pitches from A at which a table begins and ends; pairs followed at once are the
+    difference.
 
     Raises
     ------

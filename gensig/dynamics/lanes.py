@@ -152,7 +152,8 @@ def pack(
 
 
 def _nominal(lanes: Sequence[PairDynamics], span: tuple[float, float]) -> tuple[Array, int, float]:
-    """Nominal motion and torque by cells of time, (cell, 5, lane) flat, the number of the first, and cells a second.
+    """Nominal motion and torque by cells of time, (cell, 5, lane) flat, the number of the first,
+    and cells a second.
 
     Speed and torque run straight through a cell; where neither changes there is one cell.
     """
@@ -160,7 +161,8 @@ def _nominal(lanes: Sequence[PairDynamics], span: tuple[float, float]) -> tuple[
         profile = np.zeros((1, N_PROFILE, len(lanes)))
         profile[0, NOMINAL_SPEED], profile[0, TORQUE] = [one.operating.speed for one in lanes], 1.0
         return profile.ravel(), 0, 1.0
-    # cells begin at multiples of their length, so that the same instants have the same bits whatever the span
+    # cells begin at multiples of their length, so that the same instants have the same bits
+    # whatever the span
     first = math.floor(span[0] * CELLS_PER_SECOND)
     last = max(math.ceil(span[1] * CELLS_PER_SECOND), first + 1)
     edges = np.arange(first, last + 1) / CELLS_PER_SECOND
@@ -192,8 +194,8 @@ def _depths(lanes: Sequence[PairDynamics]) -> Array:
 
 
 def _rows(table: PairTable | SlicedTable) -> tuple[Array, NDArray[np.int64], tuple[int, int]]:
-    """As ``_table_rows``, rows (row, chord, node, column); behind the columns of helical teeth what stands
-    beside them."""
+    """As ``_table_rows``, rows (row, chord, node, column); behind the columns of helical teeth
+    what stands beside them."""
     if isinstance(table, PairTable):
         rows, row, steps = _table_rows(table)
         return rows[:, None], row, steps
@@ -241,10 +243,12 @@ def at_step(group: Group, before: float, after: float) -> Group:
 
 
 def _table_rows(table: PairTable) -> tuple[Array, NDArray[np.int64], tuple[int, int]]:
-    """Rows (row, node, 4) of which the first is that of sound teeth, row (tooth,) of every tooth, and two steps.
+    """Rows (row, node, 4) of which the first is that of sound teeth, row (tooth,) of every tooth,
+    and two steps.
 
-    Rows are pairs of the distinct teeth that the gears have, or, where those would take much more memory, the teeth
-    themselves. The steps lead from one pinion tooth to the next and, where teeth stand by themselves, to the wheel's.
+    Rows are pairs of the distinct teeth that the gears have, or, where those would take much more
+    memory, the teeth themselves. The steps lead from one pinion tooth to the next and, where
+    teeth stand by themselves, to the wheel's.
     """
     (pinion, pinion_row), (wheel, wheel_row) = _used(table.pinion), _used(table.wheel)
     if _are_many(table):
@@ -270,7 +274,9 @@ def _are_many(table: PairTable) -> bool:
 
 
 def _used(side: GearTable) -> tuple[Array, NDArray[np.int64]]:
-    """Columns of the distinct teeth that the gear has, (distinct, node, 4), and which of them every tooth is."""
+    """Columns of the distinct teeth that the gear has, (distinct, node, 4), and which of them
+    every tooth is.
+    """
     used, row = np.unique(side.kind, return_inverse=True)
     return _columns(side)[used], row
 

@@ -1,4 +1,7 @@
-"""Which teeth carry what at every output sample: the ground truth of where a vibration comes from."""
+"""Which teeth carry what at every output sample.
+
+The ground truth of where a vibration comes from.
+"""
 
 from __future__ import annotations
 

@@ -1,4 +1,7 @@
-"""What statics tell the equations of motion of a mesh, spur or helical: stiffness, gaps, arms of friction."""
+"""What statics tell the equations of motion of a mesh, spur or helical.
+
+Stiffness, gaps, arms of friction.
+"""
 
 from __future__ import annotations
 
@@ -17,10 +20,11 @@ Array = NDArray[np.float64]
 
 
 def loss_arm(table: PairTable | SlicedTable, position: Array) -> Array:
-    """Moment of unit friction on pairs at positions s, reduced to the pinion, of the shape of ``position``, m.
+    """Moment of unit friction on pairs at positions s, reduced to the pinion, of the shape of
+    ``position``, m.
 
-    Sliding turns at the pitch point. The contact of helical teeth spans a part of the path, and the mean over the face
-    turns as gently as the compiled core has it.
+    Sliding turns at the pitch point. The contact of helical teeth spans a part of the path, and
+    the mean over the face turns as gently as the compiled core has it.
     """
     pair, lag = table.pair, half_lag(table)
     middle = position - lag
@@ -46,7 +50,8 @@ def least_gaps(table: PairTable | SlicedTable) -> list[Array]:
 def mean_mesh_stiffness(table: PairTable | SlicedTable, force: float) -> float:
     """Mean tangent stiffness over a base pitch under a force in N, N/m.
 
-    Over the teeth that most are, which are the sound ones; where all differ, the median over the teeth.
+    Over the teeth that most are, which are the sound ones; where all differ, the median over the
+    teeth.
     """
     if isinstance(table, SlicedTable):
         kinds = table.pinion_kind, table.wheel_kind
@@ -73,7 +78,10 @@ def mean_mesh_stiffness(table: PairTable | SlicedTable, force: float) -> float:
 
 
 def _commonest(kind: NDArray[np.int64]) -> NDArray[np.int64] | None:
-    """Kinds of a gear whose teeth are all what most of them are, (tooth,); None where there is no such kind."""
+    """Kinds of a gear whose teeth are all what most of them are, (tooth,).
+
+    None where there is no such kind.
+    """
     counts = np.bincount(kind)
     if counts.max() <= len(kind) // 2:
         return None

@@ -1,4 +1,7 @@
-"""A gear pair on its supports as a lumped system: one mesh, a soft speed source, a motor and a load if there are."""
+"""A gear pair on its supports as a lumped system.
+
+One mesh, a soft speed source, a motor and a load if there are.
+"""
 
 from __future__ import annotations
 
@@ -28,7 +31,8 @@ PAIR_DOFS = ("pinion_x", "pinion_y", "pinion_rotation", "wheel_x", "wheel_y", "w
 # all that a machine may have; ``PairDynamics.dofs`` says which
 DOFS = (*PAIR_DOFS, *AXIAL_DOFS, "motor_rotation", "load_rotation")
 APPROACH_SIGN = (0.0, -1.0, 1.0, 0.0, 1.0, -1.0)
-# a prime: no tooth is looked at where the last one was, so that few places a tooth show all of its path
+# a prime: no tooth is looked at where the last one was, so that few places a tooth show all of
+# its path
 FRICTION_PLACES = 509
 PINION_X, PINION_Y, PINION_ROTATION, WHEEL_X, WHEEL_Y, WHEEL_ROTATION = range(
     6
@@ -38,8 +42,8 @@ PINION_Z, WHEEL_Z = 6, 9  # of helical gears, each with its tilts behind it
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Support:
-    """Bearings and shaft under one gear: x across the line of action, y along it, and for helical gears z along the
-    axis and tilts about x and y."""
+    """Bearings and shaft under one gear: x across the line of action, y along it, and for helical
+    gears z along the axis and tilts about x and y."""
 
     stiffness_x: float = unit("n_per_m")
     stiffness_y: float = unit("n_per_m")
@@ -62,8 +66,8 @@ class Support:
                     raise ConfigError(f"support.{key} = {value:g} must not be negative")
 
     def damped(self, body: Body, ratio_x: float, ratio_y: float) -> Support:
-        """The support with c = 2 zeta sqrt(k m) for a gear on it alone; along the axis and against tilting with the
-        mean of the two ratios."""
+        """The support with c = 2 zeta sqrt(k m) for a gear on it alone; along the axis and
+        against tilting with the mean of the two ratios."""
         mean = 0.5 * (ratio_x + ratio_y)
         return replace(
             self,
@@ -76,7 +80,10 @@ class Support:
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Body:
-    """What a gear weighs and how it is held; ``tilt_inertia`` about a diameter in kg m2 is asked of helical gears."""
+    """What a gear weighs and how it is held.
+
+    ``tilt_inertia`` about a diameter in kg m2 is asked of helical gears.
+    """
 
     mass: float
     inertia: float
@@ -86,7 +93,10 @@ class Body:
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Rotor:
-    """A motor or a load: a disc that a coupling, a torsional spring and damper, holds to the shaft of its gear."""
+    """A motor or a load.
+
+    A disc that a coupling, a torsional spring and damper, holds to the shaft of its gear.
+    """
 
     inertia: float = unit("kg_m2")
     coupling_stiffness: float = unit("nm_per_rad")
@@ -107,17 +117,22 @@ class Rotor:
 def solid_disc(
     radius: float, bore_radius: float, width: float, density: float
 ) -> tuple[float, float]:
-    """Mass in kg and moment of inertia in kg m2 of a disc with a bore: for gears whose source prints none."""
+    """Mass in kg and moment of inertia in kg m2 of a disc with a bore.
+
+    For gears whose source prints none.
+    """
     mass = density * math.pi * (radius**2 - bore_radius**2) * width
     return mass, 0.5 * mass * (radius**2 + bore_radius**2)
 
 
 @dataclass(frozen=True, kw_only=True, eq=False)
 class PairDynamics:
-    """Everything that decides the motion of one gear pair. No slots: the equations are kept once they are made.
+    """Everything that decides the motion of one gear pair. No slots: the equations are kept once
+    they are made.
 
-    ``pinion_error``, ``wheel_error`` (tooth,) m open the gaps of their teeth at the pitch point, ``pinion_tilt``,
-    ``wheel_tilt`` (tooth,) m/m by as much more for every metre that the contact is further along the path.
+    ``pinion_error``, ``wheel_error`` (tooth,) m open the gaps of their teeth at the pitch point,
+    ``pinion_tilt``, ``wheel_tilt`` (tooth,) m/m by as much more for every metre that the contact
+    is further along the path.
     """
 
     table: PairTable | SlicedTable
@@ -219,12 +234,14 @@ class PairDynamics:
         return 2.0 * math.pi * self.operating.drive_frequency
 
     def system(self) -> LumpedSystem:
-        """Equations (1) of the spur paper with the signs put right, without the mesh, and those of motor and load.
+        """Equations (1) of the spur paper with the signs put right, without the mesh, and those
+        of motor and load.
 
-        Action and reaction on both gears, mesh force driving the wheel: ``docs/theory/spur_dynamics.md``. The soft
-        speed source acts on the deviation from the set rotation, so it is a spring and a damper there, of the motor if
-        there is one, else of the pinion; its set angle leads by what the mean torque winds up, so that the mean
-        deviation of the pinion is about 0.
+        Action and reaction on both gears, mesh force driving the wheel:
+        ``docs/theory/spur_dynamics.md``. The soft speed source acts on the deviation from the set
+        rotation, so it is a spring and a damper there, of the motor if there is one, else of the
+        pinion; its set angle leads by what the mean torque winds up, so that the mean deviation
+        of the pinion is about 0.
         """
         return self._system
 
@@ -364,7 +381,9 @@ class PairDynamics:
         return float(table.position[first]), float(table.position[last])
 
     def friction_torque(self) -> float:
-        """Mean friction torque reduced to the pinion, from the static loads over one turn of the wheel, N m."""
+        """Mean friction torque reduced to the pinion, from the static loads over one turn of the
+        wheel, N m.
+        """
         pair = self.table.pair
         places = (np.arange(FRICTION_PLACES) + 0.5) / FRICTION_PLACES
         position, static = self._statics(
@@ -375,14 +394,19 @@ class PairDynamics:
         )
 
     def rest(self) -> Array:
-        """Deflections of supports and couplings about which the machine moves; the pinion has not turned, (dof,)."""
+        """Deflections of supports and couplings about which the machine moves.
+
+        The pinion has not turned, (dof,).
+        """
         start = self.static_start(0.0)
         return np.asarray(start - self.system().rotation * start[PINION_ROTATION])
 
     def static_start(self, time: float) -> Array:
-        """Equilibrium at a nominal time: deflected supports and couplings, approach of the pairs in contact, (dof,).
+        """Equilibrium at a nominal time: deflected supports and couplings, approach of the pairs
+        in contact, (dof,).
 
-        Under a nominal acceleration it is that of the accelerated machine; a ripple is too quick to be at rest with.
+        Under a nominal acceleration it is that of the accelerated machine; a ripple is too quick
+        to be at rest with.
         """
         pair, system, (driver, driven) = self.table.pair, self.system(), self._ends
         nominal, smooth = (
@@ -420,7 +444,9 @@ class PairDynamics:
         return start
 
     def _statics(self, roll: Array, force: float) -> tuple[Array, StaticMesh]:
-        """Positions s of the pairs at some rolls, (phase, pair) m, and their equilibrium under a force in N."""
+        """Positions s of the pairs at some rolls, (phase, pair) m, and their equilibrium under a
+        force in N.
+        """
         if isinstance(self.table, SlicedTable):
             chords = chord_states(self.table, roll, **self._teeth)
             return chords.position, chord_equilibrium(self.table, chords, force)

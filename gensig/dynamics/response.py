@@ -1,4 +1,7 @@
-"""What a gear pair answers to small forces beside that of its mesh: its linear frequency response."""
+"""What a gear pair answers to small forces beside that of its mesh.
+
+Its linear frequency response.
+"""
 
 from __future__ import annotations
 
@@ -23,8 +26,9 @@ def accelerations(dynamics: PairDynamics, frequency: Array, force: Complex) -> C
     -------
     (line, dof) m/s2 or rad/s2, complex
 
-    Source: -w^2 (K + i w C - w^2 M)^-1 F of the linear system, K and C with the mesh's k h h^T and c h h^T. Assumes
-    forces so small that teeth stay in contact and stand where they would without them.
+    Source: -w^2 (K + i w C - w^2 M)^-1 F of the linear system, K and C with the mesh's k h h^T
+    and c h h^T. Assumes forces so small that teeth stay in contact and stand where they would
+    without them.
     """
     system, direction = dynamics.system(), dynamics.approach_direction()
     mesh = np.outer(direction, direction)

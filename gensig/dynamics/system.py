@@ -16,10 +16,11 @@ Array = NDArray[np.float64]
 class LumpedSystem:
     """Masses, springs, dampers and forces; rotations are deviations from the nominal rotation.
 
-    ``mass`` (dof,) kg or kg m2, ``stiffness`` and ``damping`` (dof, dof); ``force`` (dof,) at the set torque, all of it
-    follows a torque profile. ``rotation`` (dof,) says how far each turns with the nominal rotation of the pinion, 0 for
-    a translation: under its acceleration the equations get the inertia force -mass * rotation * acceleration. ``names``
-    name the degrees of freedom, as channels call them.
+    ``mass`` (dof,) kg or kg m2, ``stiffness`` and ``damping`` (dof, dof); ``force`` (dof,) at the
+    set torque, all of it follows a torque profile. ``rotation`` (dof,) says how far each turns
+    with the nominal rotation of the pinion, 0 for a translation: under its acceleration the
+    equations get the inertia force -mass * rotation * acceleration. ``names`` name the degrees of
+    freedom, as channels call them.
     """
 
     names: tuple[str, ...]
@@ -60,7 +61,8 @@ def eigenvalues(
 def slowest_decay(system: LumpedSystem, direction: Array, mesh_stiffness: float) -> float:
     """Slowest decay rate in 1/s of the system with its mesh held at a mean stiffness.
 
-    ``direction`` (dof,) is the gradient of the approach. Rigid-body motion without restoring force is left out.
+    ``direction`` (dof,) is the gradient of the approach. Rigid-body motion without restoring
+    force is left out.
     """
     rates = -np.real(eigenvalues(system, direction, mesh_stiffness))
     moving = rates[rates > 1e-3]

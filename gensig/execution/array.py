@@ -1,4 +1,7 @@
-"""The share of one task of an array job, such as SLURM's: every shard whose number is its own modulo the tasks."""
+"""The share of one task of an array job, such as SLURM's.
+
+Every shard whose number is its own modulo the tasks.
+"""
 
 from __future__ import annotations
 
@@ -12,7 +15,10 @@ from gensig.execution.local import LocalExecutor
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class ArrayExecutor(Executor):
-    """Task ``shard_index`` of ``shard_count``; tasks know nothing of each other, and ``gensig finalize`` closes."""
+    """Task ``shard_index`` of ``shard_count``.
+
+    Tasks know nothing of each other, and ``gensig finalize`` closes.
+    """
 
     closes = False
 

@@ -1,4 +1,7 @@
-"""What every executor promises: a job is run for each shard, and what came of it is told as it comes."""
+"""What every executor promises.
+
+A job is run for each shard, and what came of it is told as it comes.
+"""
 
 from __future__ import annotations
 
@@ -44,9 +47,9 @@ class Executor(ABC):
     ) -> Iterator[tuple[int, T | ShardFailure]]:
         """Run ``job`` for the shards and yield each shard's number and result as they come.
 
-        ``job`` must be picklable and safe to run twice. An exception that it raises is yielded as a failure and not
-        tried again, because it would come again; a worker that dies is replaced, and the shard that it had in hand is
-        begun again, up to ``TRIES`` times in all.
+        ``job`` must be picklable and safe to run twice. An exception that it raises is yielded as
+        a failure and not tried again, because it would come again; a worker that dies is
+        replaced, and the shard that it had in hand is begun again, up to ``TRIES`` times in all.
         """
 
     def share(self, shard_indices: Sequence[int]) -> list[int]:

@@ -1,4 +1,7 @@
-"""Shards on the workers of a Dask cluster: one on this machine, or any whose scheduler's address is given."""
+"""Shards on the workers of a Dask cluster.
+
+One on this machine, or any whose scheduler's address is given.
+"""
 
 from __future__ import annotations
 
@@ -19,7 +22,9 @@ CONNECT_SECONDS = 20
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class DaskExecutor(Executor):
-    """Workers of one thread each, which see the data set's folder under the same path as this process."""
+    """Workers of one thread each, which see the data set's folder under the same path as this
+    process.
+    """
 
     n_workers: int
     address: str | None
@@ -35,7 +40,10 @@ class DaskExecutor(Executor):
     def run(
         self, job: Callable[[int], T], shard_indices: Sequence[int]
     ) -> Iterator[tuple[int, T | ShardFailure]]:
-        """See ``Executor.run``; the scheduler counts the tries, and one of your own counts as it is configured."""
+        """See ``Executor.run``.
+
+        The scheduler counts the tries, and one of your own counts as it is configured.
+        """
         distributed = load_distributed()
         with self._client(distributed) as client:
             futures = client.map(

@@ -1,4 +1,7 @@
-"""Shards on processes of this machine; a process that dies is replaced and only its shard runs again."""
+"""Shards on processes of this machine.
+
+A process that dies is replaced and only its shard runs again.
+"""
 
 from __future__ import annotations
 
@@ -65,7 +68,8 @@ class LocalExecutor(Executor):
                     idle.append(worker)
                     yield index, result
         except BaseException:
-            # Interrupted: what is half done is a temporary file that nobody will mistake for a shard.
+            # Interrupted: what is half done is a temporary file that nobody will mistake for a
+            # shard.
             for process in set(multiprocessing.active_children()) - strangers:
                 process.terminate()
             raise
@@ -97,7 +101,10 @@ def _submit(
 
 @contextmanager
 def _interrupts_held() -> Iterator[None]:
-    """Processes that start in this block never see Ctrl-C, not even while they import: it is the parent's to answer."""
+    """Processes that start in this block never see Ctrl-C, not even while they import.
+
+    It is the parent's to answer.
+    """
     if not hasattr(signal, "pthread_sigmask"):
         yield
         return
@@ -113,7 +120,8 @@ def _interrupts_held() -> Iterator[None]:
 def _main_unknown() -> Iterator[None]:
     """Processes that start in this block do not run the user's script again to import it.
 
-    A script that calls ``gensig.generate`` needs no ``if __name__ == "__main__"`` then: jobs are importable without it.
+    A script that calls ``gensig.generate`` needs no ``if __name__ == "__main__"`` then: jobs are
+    importable without it.
     """
     main = sys.modules["__main__"]
     looked_at = ("__spec__", "__file__")  # by multiprocessing.spawn.get_preparation_data
@@ -127,7 +135,10 @@ def _main_unknown() -> Iterator[None]:
 
 
 def _begin_worker() -> None:
-    """Leave Ctrl-C to the parent, and end when the parent ends: a killed one would leave workers waiting for ever."""
+    """Leave Ctrl-C to the parent, and end when the parent ends.
+
+    A killed one would leave workers waiting for ever.
+    """
     signal.signal(signal.SIGINT, signal.SIG_IGN)
     parent = multiprocessing.parent_process()
     if parent is not None:

@@ -115,10 +115,11 @@ def _shown(fault: Fault, key: str) -> str:
 def faulty_teeth(
     pair: GearPair, faults: Iterable[Fault], sound_teeth: Mapping[str, Tooth] | None = None
 ) -> dict[tuple[str, int], Tooth]:
-    """The teeth that differ from the sound one, by (gear, tooth); several faults of a tooth compose in order.
+    """The teeth that differ from the sound one, by (gear, tooth); several faults of a tooth
+    compose in order.
 
-    Teeth to which the same has happened are one object: the mesh computes them once. ``sound_teeth`` are those that
-    faults happen to, by gear; None: as cut.
+    Teeth to which the same has happened are one object: the mesh computes them once.
+    ``sound_teeth`` are those that faults happen to, by gear; None: as cut.
 
     Raises
     ------

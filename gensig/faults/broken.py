@@ -43,7 +43,10 @@ class MissingTooth(Fault):
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class BrokenTooth(Fault):
-    """The tooth is broken off ``broken_height`` below its tip, over the whole face; at full height it is missing."""
+    """The tooth is broken off ``broken_height`` below its tip, over the whole face.
+
+    At full height it is missing.
+    """
 
     kind: ClassVar[str] = "broken"
     growth: ClassVar[Growth] = Growth.NONE
@@ -71,7 +74,8 @@ class BrokenTooth(Fault):
 class ChippedTooth(Fault):
     """A chip off the tip: ``chip_height`` below it, over ``chip_width`` from one end of the face.
 
-    ``chip_shape`` is ``"triangular"`` (the whole height at the end, none at ``chip_width``) or ``"rectangular"``.
+    ``chip_shape`` is ``"triangular"`` (the whole height at the end, none at ``chip_width``) or
+    ``"rectangular"``.
     """
 
     kind: ClassVar[str] = "chipped"

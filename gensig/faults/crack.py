@@ -30,9 +30,10 @@ N_STRIPS = 64  # across the face; a front ends within one of them
 class Crack(Fault):
     """Crack at ``crack_angle`` to the tooth centreline, inward and towards the root.
 
-    It is ``crack_depth`` deep at one end of the face and reaches over ``crack_width`` of it (None: all), with a front
-    that is ``straight``, or falls off to 0 at ``crack_width`` in a ``parabolic`` or ``linear`` way; ``crack_side`` and
-    ``crack_faces`` as in ``RootCrack``. How much softer it makes the tooth is the mesh's choice (``mesh.crack``).
+    It is ``crack_depth`` deep at one end of the face and reaches over ``crack_width`` of it
+    (None: all), with a front that is ``straight``, or falls off to 0 at ``crack_width`` in a
+    ``parabolic`` or ``linear`` way; ``crack_side`` and ``crack_faces`` as in ``RootCrack``. How
+    much softer it makes the tooth is the mesh's choice (``mesh.crack``).
     """
 
     kind: ClassVar[str] = "crack"
@@ -111,7 +112,10 @@ class Crack(Fault):
         return replace(tooth, cracks=(*tooth.cracks, crack))
 
     def _depth(self, gear: Gear) -> Array:
-        """Mean depth in every strip across the face, (strip,) m; one strip where the front is the same all along."""
+        """Mean depth in every strip across the face, (strip,) m.
+
+        One strip where the front is the same all along.
+        """
         width = gear.face_width if self.crack_width is None else self.crack_width
         if not 0.0 <= width <= gear.face_width:
             raise FaultError(

@@ -1,4 +1,5 @@
-"""Flanks that stand where they should not: manufacturing and mounting errors, wear, and relief that is meant.
+"""Flanks that stand where they should not: manufacturing and mounting errors, wear, and relief
+that is meant.
 
 Each has a declared limit; its severity is the share of it that is used.
 """
@@ -67,8 +68,9 @@ class PitchError(FlankForm):
 class ProfileError(FlankForm):
     """Slope and form of the profile.
 
-    ``profile_slope`` is how much more the flank stands back at its tip than at its lower end (the middle stays),
-    ``profile_form`` the height of ``profile_waves`` waves from end to end, all of them back from the nominal flank.
+    ``profile_slope`` is how much more the flank stands back at its tip than at its lower end (the
+    middle stays), ``profile_form`` the height of ``profile_waves`` waves from end to end, all of
+    them back from the nominal flank.
     """
 
     kind: ClassVar[str] = "profile_error"
@@ -95,7 +97,8 @@ class ProfileError(FlankForm):
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Runout(FlankForm):
-    """The teeth sit on a circle ``eccentricity`` off the axis; ``tooth`` stands back most, at the pitch point.
+    """The teeth sit on a circle ``eccentricity`` off the axis; ``tooth`` stands back most, at the
+    pitch point.
 
     Half the radial runout F_r. The change of working pressure angle is left out (second order).
     """
@@ -125,9 +128,11 @@ class Runout(FlankForm):
         return self.eccentricity
 
     def apply(self, tooth: Tooth, number: int) -> Tooth:
-        """Move the flank by the eccentricity's part along the line of action, which turns with the gear.
+        """Move the flank by the eccentricity's part along the line of action, which turns with
+        the gear.
 
-        One pitch further round, a tooth touches one base pitch lower on the pinion and higher on the wheel.
+        One pitch further round, a tooth touches one base pitch lower on the pinion and higher on
+        the wheel.
         """
         if self.eccentricity == 0.0:
             return tooth
@@ -143,7 +148,9 @@ class Runout(FlankForm):
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Misalignment(FlankForm):
-    """The flanks stand back by ``misalignment`` more at one end of the face than at the other (its sign says which)."""
+    """The flanks stand back by ``misalignment`` more at one end of the face than at the other
+    (its sign says which).
+    """
 
     kind: ClassVar[str] = "misalignment"
     growth: ClassVar[Growth] = Growth.NONE
@@ -169,8 +176,8 @@ class Misalignment(FlankForm):
 class Wear(FlankForm):
     """Material worn off: ``wear_depth`` everywhere, or times ``wear_profile``.
 
-    ``wear_profile`` gives the depth along the flank as multiples of ``wear_depth``, at curvature radii evenly spaced
-    from the lower end of the involute to the tip; None is uniform wear.
+    ``wear_profile`` gives the depth along the flank as multiples of ``wear_depth``, at curvature
+    radii evenly spaced from the lower end of the involute to the tip; None is uniform wear.
     """
 
     kind: ClassVar[str] = "wear"
@@ -202,7 +209,9 @@ class Wear(FlankForm):
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class TipRelief(FlankForm):
-    """The tip stands back by ``relief``, falling off to nothing ``relief_length`` below it on the line of action."""
+    """The tip stands back by ``relief``, falling off to nothing ``relief_length`` below it on the
+    line of action.
+    """
 
     kind: ClassVar[str] = "tip_relief"
     growth: ClassVar[Growth] = Growth.NONE
@@ -239,6 +248,9 @@ class TipRelief(FlankForm):
 
 
 def _share(tooth: Tooth) -> Array:
-    """Place along the flank: 0 at the lower end of the involute, 1 at the tip, linear in roll, (profile,)."""
+    """Place along the flank.
+
+    0 at the lower end of the involute, 1 at the tip, linear in roll, (profile,).
+    """
     curvature = tooth.profile.curvature_radius
     return (curvature - curvature[0]) / (curvature[-1] - curvature[0])

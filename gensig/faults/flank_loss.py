@@ -21,8 +21,9 @@ N_STRIPS = 24  # across an ellipse
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Patch:
-    """A hole in a flank, ``length`` along the tooth height, ``width`` along the face, ``depth`` inward with a flat
-    floor; its middle at ``abscissa`` on the tooth centreline and ``face_position`` from one end of the face. In m."""
+    """A hole in a flank, ``length`` along the tooth height, ``width`` along the face, ``depth``
+    inward with a flat floor; its middle at ``abscissa`` on the tooth centreline and
+    ``face_position`` from one end of the face. In m."""
 
     shape: str
     length: float

@@ -1,4 +1,7 @@
-"""Pits and spalls on the flank: one of the paper's, one of any size and shape, or many small ones."""
+"""Pits and spalls on the flank.
+
+One of the paper's, one of any size and shape, or many small ones.
+"""
 
 from __future__ import annotations
 
@@ -30,10 +33,12 @@ Array = NDArray[np.float64]
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Pitting(Fault):
-    """Rectangular pit: ``pit_length`` along the tooth height, ``pit_width`` along the face, ``pit_depth`` inward.
+    """Rectangular pit: ``pit_length`` along the tooth height, ``pit_width`` along the face,
+    ``pit_depth`` inward.
 
-    ``pit_position`` is the distance from the root chord to the middle of the pit on the tooth centreline; None puts
-    it on the pitch circle, as in the paper. ``pit_face_position`` from one end of the face; None puts it in the middle.
+    ``pit_position`` is the distance from the root chord to the middle of the pit on the tooth
+    centreline; None puts it on the pitch circle, as in the paper. ``pit_face_position`` from one
+    end of the face; None puts it in the middle.
 
     Source: spur paper section 3.2, eqs. (13) to (18); h in (14) and (15) is the pit depth.
     """
@@ -139,10 +144,11 @@ MOST_PITS = 20000
 class DistributedPitting(Fault):
     """Many round pits, drawn until ``pitted_share`` of the flank is gone.
 
-    Their diameters are log-normal about ``pit_diameter`` with the standard deviation ``diameter_scatter`` of the
-    logarithm, their depths ``depth_ratio`` diameters, their places uniform over the face and over the flank's height
-    from ``region_low`` to ``region_high`` (0 at the lower end of the involute, 1 at the tip). ``pit_seed`` and the
-    tooth's number decide the pits: a larger share has all pits of a smaller one.
+    Their diameters are log-normal about ``pit_diameter`` with the standard deviation
+    ``diameter_scatter`` of the logarithm, their depths ``depth_ratio`` diameters, their places
+    uniform over the face and over the flank's height from ``region_low`` to ``region_high`` (0 at
+    the lower end of the involute, 1 at the tip). ``pit_seed`` and the tooth's number decide the
+    pits: a larger share has all pits of a smaller one.
     """
 
     kind: ClassVar[str] = "distributed_pitting"

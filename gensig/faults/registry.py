@@ -24,7 +24,10 @@ COMPOUND = "compound"
 
 
 def fault_parts(values: Mapping[str, Any], where: str = "fault") -> list[Mapping[str, Any]]:
-    """The single faults that a configuration's fault is made of: none for healthy, the parts of a compound one."""
+    """The single faults that a configuration's fault is made of.
+
+    None for healthy, the parts of a compound one.
+    """
     kind = values.get("kind")
     if kind == "healthy":
         return []
@@ -46,7 +49,10 @@ def fault_parts(values: Mapping[str, Any], where: str = "fault") -> list[Mapping
 
 
 def read_faults(values: Mapping[str, Any], where: str = "fault") -> tuple[Fault, ...]:
-    """Faults from boundary keys with their ``kind``; ``vary``, which only plans use, is passed over."""
+    """Faults from boundary keys with their ``kind``.
+
+    ``vary``, which only plans use, is passed over.
+    """
     parts = fault_parts(values, where)
     if values.get("kind") != COMPOUND:
         return tuple(_read_fault(part, where) for part in parts)

@@ -1,7 +1,7 @@
 """Where two gears touch: line of action, contact ratio, corner contact beyond the path of contact.
 
-Positions s are measured in m along the line of action from A, the start of contact of the driving pinion; the
-pinion's curvature radius there is ``start_curvature_radius + s``.
+Positions s are measured in m along the line of action from A, the start of contact of the driving
+pinion; the pinion's curvature radius there is ``start_curvature_radius + s``.
 """
 
 from __future__ import annotations
@@ -23,10 +23,12 @@ SIDES = ("pinion", "wheel")  # the two gears of a pair, the driving one first
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class GearPair:
-    """A pinion that drives a wheel at the centre distance at which they mesh without play, in the transverse section.
+    """A pinion that drives a wheel at the centre distance at which they mesh without play, in the
+    transverse section.
 
-    ``backlash`` is the play along the line of action that is left to the coast flank, m. ``center_distance_change`` is
-    how much farther apart the shafts are than that distance, m; negative where they are closer, which costs backlash.
+    ``backlash`` is the play along the line of action that is left to the coast flank, m.
+    ``center_distance_change`` is how much farther apart the shafts are than that distance, m;
+    negative where they are closer, which costs backlash.
     """
 
     pinion: Gear
@@ -209,8 +211,8 @@ def corner_gap(pair: GearPair, position: Array) -> Array:
     -------
     (phase,) m    pinion advance along the line of action at which a tip corner meets the mating flank; 0 on the path
 
-    Exact for rigid involutes: beyond E the pinion's tip corner against the wheel's flank, before A the wheel's tip
-    corner against the pinion's flank.
+    Exact for rigid involutes: beyond E the pinion's tip corner against the wheel's flank, before
+    A the wheel's tip corner against the pinion's flank.
     """
     gap = np.zeros_like(position)
     after = position > pair.path_of_contact
@@ -223,7 +225,8 @@ def corner_gap(pair: GearPair, position: Array) -> Array:
 def corner_gap_by_pinion(pair: GearPair, position: Array) -> Array:
     """The same gap with both sides referred to the pinion's rotation, (phase,) m.
 
-    Before A the touching wheel lags the pinion by the gap itself: the fixed point of ``gap(position - gap)``.
+    Before A the touching wheel lags the pinion by the gap itself: the fixed point of
+    ``gap(position - gap)``.
     """
     gap = corner_gap(pair, position)
     before = position < 0.0
@@ -262,7 +265,8 @@ def _wheel_tip_gap(pair: GearPair, position: Array) -> Array:
 def _flank_lead(
     radius: Array, polar: Array, base_radius: float, alpha: float, curvature: Array
 ) -> Array:
-    """Angle by which a flank with the given nominal curvature radius leads a corner at (radius, polar).
+    """Angle by which a flank with the given nominal curvature radius leads a corner at (radius,
+    polar).
 
     Both angles are measured from the line of centres towards the flank's tangent point.
     """

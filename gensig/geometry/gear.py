@@ -16,13 +16,15 @@ LARGEST_HELIX = 45.0  # degrees; beyond, the slices of a tooth are no spur teeth
 class Gear:
     """Geometry of one external gear, lengths in m, angles in rad.
 
-    ``pressure_angle`` and ``normal_module`` are those of the basic rack, so of the normal section; coefficients count
-    normal modules. All radii and half angles are of the transverse section, which for ``helix_angle`` 0 is the same.
-    ``helix_angle`` is that on the reference cylinder, positive for a right-handed gear.
+    ``pressure_angle`` and ``normal_module`` are those of the basic rack, so of the normal
+    section; coefficients count normal modules. All radii and half angles are of the transverse
+    section, which for ``helix_angle`` 0 is the same. ``helix_angle`` is that on the reference
+    cylinder, positive for a right-handed gear.
 
-    ``cutter_tip_radius_coefficient`` is the rounding of the rack's tip over the module: it makes the root curve. In the
-    transverse section of a helical gear the rounding is an ellipse; a circle of the same radius is taken for it.
-    ``name`` ("pinion" or "wheel") only serves messages.
+    ``cutter_tip_radius_coefficient`` is the rounding of the rack's tip over the module: it makes
+    the root curve. In the transverse section of a helical gear the rounding is an ellipse; a
+    circle of the same radius is taken for it. ``name`` ("pinion" or "wheel") only serves
+    messages.
 
     Source: ISO 21771-1:2024, with x tan(alpha_n) = x cos(beta) tan(alpha_t).
     """
@@ -168,7 +170,9 @@ class Gear:
 
     @property
     def rounding_center_offset(self) -> float:
-        """Distance b_1 along the pitch line from the tooth centreline to the centre of the rounding."""
+        """Distance b_1 along the pitch line from the tooth centreline to the centre of the
+        rounding.
+        """
         alpha, rounding = self.transverse_pressure_angle, self.cutter_tip_radius
         depth = (self.addendum_coefficient + self.clearance_coefficient) * self.normal_module
         return (
@@ -192,6 +196,9 @@ class Gear:
 
     @property
     def junction_curvature_radius(self) -> float:
-        """Curvature radius of the involute where the root curve joins it; not positive when undercut."""
+        """Curvature radius of the involute where the root curve joins it.
+
+        Not positive when undercut.
+        """
         alpha = self.transverse_pressure_angle
         return self.base_radius * math.tan(alpha) - self.straight_flank_depth / math.sin(alpha)

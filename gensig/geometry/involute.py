@@ -15,7 +15,8 @@ def involute(angle: float) -> float:
 def inverse_involute(value: float) -> float:
     """Angle whose involute is ``value``; between 0 and 80 degrees.
 
-    Newton's method from above, where it cannot overshoot: inv is convex, inv' = tan^2, and inv(a) > a^3 / 3.
+    Newton's method from above, where it cannot overshoot: inv is convex, inv' = tan^2, and inv(a)
+    > a^3 / 3.
     """
     upper = math.radians(80.0)
     if not 0.0 <= value <= involute(upper):

@@ -1,4 +1,7 @@
-"""One tooth as the mesh sees it: what of it is left, where its flank stands. Faults change these and nothing else."""
+"""One tooth as the mesh sees it.
+
+What of it is left, where its flank stands. Faults change these and nothing else.
+"""
 
 from __future__ import annotations
 
@@ -18,11 +21,12 @@ Array = NDArray[np.float64]
 class RootCrack:
     """A crack into the root, straight in every strip across the face.
 
-    ``depth`` (strip,) m in strips of equal width, 0 where there is none; the mouth lies at ``mouth_abscissa`` and
-    ``mouth_half_thickness`` of the outline, which makes ``mouth_slope`` with the tooth centreline there; the crack goes
-    at ``angle`` to the centreline, inward and towards the root. ``side`` is
-    ``"tension"`` (under the loaded flank) or ``"compression"``; the faces of a ``breathing`` crack bear on each other
-    when pressed together, those of an open one never touch.
+    ``depth`` (strip,) m in strips of equal width, 0 where there is none; the mouth lies at
+    ``mouth_abscissa`` and ``mouth_half_thickness`` of the outline, which makes ``mouth_slope``
+    with the tooth centreline there; the crack goes at ``angle`` to the centreline, inward and
+    towards the root. ``side`` is ``"tension"`` (under the loaded flank) or ``"compression"``; the
+    faces of a ``breathing`` crack bear on each other when pressed together, those of an open one
+    never touch.
     """
 
     depth: Array
@@ -38,10 +42,10 @@ class RootCrack:
 class Tooth:
     """A tooth on its outline, in slices across the face.
 
-    ``slice_edges`` (slice + 1,) m from 0 to the face width. On the nodes of the involute, (slice, profile) m:
-    ``material_loss`` has been removed (inf where the tooth is broken off: nothing is left up to its centreline and
-    beyond), ``flank_deviation`` is how far the flank stands back from its nominal place (negative: proud of it).
-    ``present`` is False for a missing tooth.
+    ``slice_edges`` (slice + 1,) m from 0 to the face width. On the nodes of the involute, (slice,
+    profile) m: ``material_loss`` has been removed (inf where the tooth is broken off: nothing is
+    left up to its centreline and beyond), ``flank_deviation`` is how far the flank stands back
+    from its nominal place (negative: proud of it). ``present`` is False for a missing tooth.
     """
 
     profile: ToothProfile
@@ -96,14 +100,17 @@ class Tooth:
         return replace(self, material_loss=np.maximum(self.material_loss, loss))
 
     def with_deviation(self, deviation: Array) -> Tooth:
-        """The tooth with ``deviation`` added to that of its flank, (slice, profile) or what broadcasts to it, m."""
+        """The tooth with ``deviation`` added to that of its flank, (slice, profile) or what
+        broadcasts to it, m.
+        """
         return replace(self, flank_deviation=self.flank_deviation + deviation)
 
 
 def healthy_tooth(gear: Gear, profile: ToothProfile | None = None) -> Tooth:
     """The tooth that the cutter makes: one slice over the full width, nothing lost, no deviation.
 
-    Without an outline of its own, the one sound tooth of the gear, shared by all who ask: its arrays are read-only.
+    Without an outline of its own, the one sound tooth of the gear, shared by all who ask: its
+    arrays are read-only.
     """
     return _sound_tooth(gear) if profile is None else _tooth_on(profile)
 

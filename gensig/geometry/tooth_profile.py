@@ -1,7 +1,8 @@
 """Tooth outline on the tooth axis: root transition curve and involute.
 
-Axes: X along the tooth centreline from the gear centre, Y half thickness. The root curve is eq. (6) of the spur
-paper, read as in ``docs/theory/spur_mesh.md`` (gamma from pi/2 at the root circle to alpha at the involute).
+Axes: X along the tooth centreline from the gear centre, Y half thickness. The root curve is eq.
+(6) of the spur paper, read as in ``docs/theory/spur_mesh.md`` (gamma from pi/2 at the root circle
+to alpha at the involute).
 """
 
 from __future__ import annotations
@@ -28,7 +29,8 @@ def root_curve(gear: Gear, gamma: Array) -> tuple[Array, Array]:
     -------
     X, Y : (point,) m
 
-    Source: spur paper eq. (6), with r_p read as the cutter tip radius and phi = (a1/tan(gamma) + b1)/r.
+    Source: spur paper eq. (6), with r_p read as the cutter tip radius and phi = (a1/tan(gamma) +
+    b1)/r.
     """
     a1, b1 = gear.rounding_center_depth, gear.rounding_center_offset
     r = gear.pitch_radius
@@ -56,8 +58,9 @@ def load_angle(gear: Gear, curvature_radius: Array) -> Array:
 class ToothProfile:
     """Outline from the root circle to the tip, sampled for quadrature.
 
-    ``abscissa`` and ``half_thickness`` are (profile,) m at cell edges; ``n_root_cells`` cells lie on the root
-    curve, the rest on the involute, where ``curvature_radius`` (profile - n_root_cells,) gives the contact.
+    ``abscissa`` and ``half_thickness`` are (profile,) m at cell edges; ``n_root_cells`` cells lie
+    on the root curve, the rest on the involute, where ``curvature_radius`` (profile -
+    n_root_cells,) gives the contact.
     """
 
     gear: Gear
@@ -74,7 +77,10 @@ N_FLANK_CELLS = 384
 def tooth_profile(
     gear: Gear, *, n_root_cells: int = N_ROOT_CELLS, n_flank_cells: int = N_FLANK_CELLS
 ) -> ToothProfile:
-    """Sample the outline: cells uniform in gamma on the root curve, in curvature radius on the involute."""
+    """Sample the outline.
+
+    Cells uniform in gamma on the root curve, in curvature radius on the involute.
+    """
     gamma = np.linspace(0.5 * np.pi, gear.transverse_pressure_angle, n_root_cells + 1)
     tip = np.sqrt(gear.tip_radius**2 - gear.base_radius**2)
     curvature = np.linspace(gear.junction_curvature_radius, tip, n_flank_cells + 1)
@@ -115,8 +121,8 @@ def root_curve_point(gear: Gear, where: str) -> tuple[float, float]:
 def root_curve_slope(gear: Gear, where: str) -> float:
     """Angle of the root curve to the tooth centreline at its middle, rad.
 
-    The rack's rounding rolls on the pitch circle: the normal of what it cuts passes through the pitch point, at
-    gamma - phi to the tooth's thickness direction.
+    The rack's rounding rolls on the pitch circle: the normal of what it cuts passes through the
+    pitch point, at gamma - phi to the tooth's thickness direction.
     """
     gamma = root_curve_middle(gear, where)
     phi = (

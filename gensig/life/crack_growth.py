@@ -1,4 +1,6 @@
-"""Root cracks that grow by the Paris law, driven by the energy release rate of our own crack compliance."""
+"""Root cracks that grow by the Paris law, driven by the energy release rate of our own crack
+compliance.
+"""
 
 from __future__ import annotations
 
@@ -29,10 +31,11 @@ LEAST_DEPTH = 0.005  # of the root chord: below it a crack is a notch of the sur
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class CrackGrowthOptions(GrowthOptions):
-    """Paris law da/dN = C dK^m with a threshold, first and last depth of a crack, and how units differ.
+    """Paris law da/dN = C dK^m with a threshold, first and last depth of a crack, and how units
+    differ.
 
-    ``coefficient`` C is in m a cycle at 1 MPa sqrt(m), ``threshold`` in Pa sqrt(m); the shares are of the root chord,
-    ``width_share`` of the face (1: through it).
+    ``coefficient`` C is in m a cycle at 1 MPa sqrt(m), ``threshold`` in Pa sqrt(m); the shares
+    are of the root chord, ``width_share`` of the face (1: through it).
     """
 
     coefficient: float
@@ -104,7 +107,8 @@ class CrackGrowth(GrowthLaw):
     def rate(self, size: Array, torque: float) -> Array:
         """Depth a turn of the pinion, (size,) m: nothing below the threshold.
 
-        Source: Paris & Erdogan (1963). A tooth is unloaded between two meshes, so that the range is the greatest value.
+        Source: Paris & Erdogan (1963). A tooth is unloaded between two meshes, so that the range
+        is the greatest value.
         """
         found = np.interp(size, self.sizes, self._intensity(torque)) * torque
         grown = self.options.coefficient * (found / 1e6) ** self.options.exponent
@@ -124,7 +128,10 @@ class CrackGrowth(GrowthLaw):
         return {"stress_intensity_range_mpa_sqrt_m": value / 1e6}
 
     def _intensity(self, torque: float) -> Array:
-        """(node,) Pa sqrt(m) at 1 N m: between two torques it goes with the logarithm, beyond them it stays."""
+        """(node,) Pa sqrt(m) at 1 N m.
+
+        Between two torques it goes with the logarithm, beyond them it stays.
+        """
         if len(self.torques) == 1:
             return self.intensity[0]
         place = float(np.interp(np.log(torque), np.log(self.torques), np.arange(len(self.torques))))
@@ -137,11 +144,12 @@ def crack_growth(
 ) -> CrackGrowth:
     """The law of a crack like ``crack``, of which depth, width and front are left aside.
 
-    The stress intensity follows Irwin's K^2 = E' G, plane strain, with the energy release rate of the loaded tooth,
-    G = F^2 / 2 dC/dA: over the depth dA = w da, over the width dA = a dw, of a crack a deep and w wide; F is the
-    greatest that one tooth carries, the whole load where one pair is in contact, and G the greatest there. Dynamic
-    loads are left out. A crack over part of the face grows in both ways by the same law; the width that goes with a
-    depth is that which growth without a threshold leads to from ``width_share`` at the least depth.
+    The stress intensity follows Irwin's K^2 = E' G, plane strain, with the energy release rate of
+    the loaded tooth, G = F^2 / 2 dC/dA: over the depth dA = w da, over the width dA = a dw, of a
+    crack a deep and w wide; F is the greatest that one tooth carries, the whole load where one
+    pair is in contact, and G the greatest there. Dynamic loads are left out. A crack over part of
+    the face grows in both ways by the same law; the width that goes with a depth is that which
+    growth without a threshold leads to from ``width_share`` at the least depth.
 
     Raises
     ------
@@ -212,7 +220,9 @@ def _slope(depth: Array, values: Array) -> Array:
 def _part_of_face(
     sizes: Array, face: float, options: CrackGrowthOptions, compliance: Any
 ) -> tuple[Array, Array]:
-    """Width that goes with each depth, (node,) m, and the greatest energy release rate at 1 N, (node,) N/m."""
+    """Width that goes with each depth, (node,) m, and the greatest energy release rate at 1 N,
+    (node,) N/m.
+    """
     from scipy.interpolate import RectBivariateSpline
 
     depths, widths = sizes[::WIDTH_STEP], crack_widths(face, options)

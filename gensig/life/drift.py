@@ -11,10 +11,11 @@ from gensig.units import unit
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Drift:
-    """One number of the configuration that moves with the running time t as 1 + change (1 - exp(-t / time)).
+    """One number of the configuration that moves with the running time t as 1 + change (1 -
+    exp(-t / time)).
 
-    ``change`` is its last relative change, log-normal among units with ``scatter``. Assumed: the form, one time
-    constant, and that the drift does not feed back on how damage grows.
+    ``change`` is its last relative change, log-normal among units with ``scatter``. Assumed: the
+    form, one time constant, and that the drift does not feed back on how damage grows.
     """
 
     change: float
@@ -32,5 +33,8 @@ class Drift:
             raise ConfigError(f"life.drift: scatter = {self.scatter:g} must lie in 0..2")
 
     def factor(self, running: float, unit_factor: float) -> float:
-        """On the number, after so many s of running; ``unit_factor`` is the unit's own on the change."""
+        """On the number, after so many s of running.
+
+        ``unit_factor`` is the unit's own on the change.
+        """
         return max(1.0 + self.change * unit_factor * (1.0 - math.exp(-running / self.time)), 0.01)

@@ -42,15 +42,16 @@ class GrowthLaw(ABC):
 
     @abstractmethod
     def fault(self, size: float) -> dict[str, Any]:
-        """Boundary keys of the class's fault at a size, over those of its option; with ``kind`` it is a fault of its
-        own."""
+        """Boundary keys of the class's fault at a size, over those of its option; with ``kind``
+        it is a fault of its own."""
 
     @abstractmethod
     def measures(self, size: float, torque: float) -> dict[str, float]:
         """Measures of the damage besides the fault itself, by name with unit."""
 
     def turns(self, torque: Array | Sequence[Array]) -> Array:
-        """Turns of the pinion that each cell between two sizes takes, (setpoint, cell); inf where nothing grows.
+        """Turns of the pinion that each cell between two sizes takes, (setpoint, cell); inf where
+        nothing grows.
 
         Parameters
         ----------
@@ -89,7 +90,10 @@ class Course:
     has_failed: bool
 
     def at(self, running: float) -> tuple[int, float]:
-        """Piece, and place in it from 0 to 1, at which the machine had run so many s; never within a standstill."""
+        """Piece, and place in it from 0 to 1, at which the machine had run so many s.
+
+        Never within a standstill.
+        """
         last = len(self.running) - 2
         piece = min(max(int(np.searchsorted(self.running, running, side="right")) - 1, 0), last)
         while piece > 0 and self.running[piece + 1] == self.running[piece]:
@@ -112,8 +116,8 @@ def grow(sizes: Array, turns: Array, history: History, start: float) -> Course:
     sizes : (node,)             ascending; the last is the end of life
     turns : (setpoint, cell)    turns of the pinion that each cell takes; inf where nothing grows
 
-    The rates do not depend on the size's past, so that loads of any order may follow each other (no overload
-    retardation).
+    The rates do not depend on the size's past, so that loads of any order may follow each other
+    (no overload retardation).
     """
     nodes, per_cell = sizes.tolist(), turns.tolist()
     cell = min(int(np.searchsorted(sizes, start, side="right")) - 1, len(nodes) - 2)

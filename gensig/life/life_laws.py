@@ -23,7 +23,8 @@ EXPONENT_STEP = 0.05  # of the torque, on either side
 class LifeMap:
     """Lives over torques (torque,) N m and speeds (speed,) rad/s of the pinion.
 
-    ``turns`` (torque,) of the pinion do not hang on the speed: flanks slide as far in a turn, however fast.
+    ``turns`` (torque,) of the pinion do not hang on the speed: flanks slide as far in a turn,
+    however fast.
     """
 
     torque: Array
@@ -73,10 +74,11 @@ def torque_exponent(case: WearCase) -> float:
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class FittedLaw:
-    """Hours of life as a formula, and where it was fitted; torque T in N m, speed w in rad/s, both of the pinion.
+    """Hours of life as a formula, and where it was fitted; torque T in N m, speed w in rad/s,
+    both of the pinion.
 
-    ``power``: a T^-b w^-c. ``logarithm``: a - b ln(T), at one speed. ``exponential``: a exp(-b w), at one torque. The
-    last two are the forms of the wear-life paper, eqs. (25) and (26).
+    ``power``: a T^-b w^-c. ``logarithm``: a - b ln(T), at one speed. ``exponential``: a exp(-b
+    w), at one torque. The last two are the forms of the wear-life paper, eqs. (25) and (26).
     ``largest_error`` is the greatest relative deviation from the lives that it was fitted to.
     """
 
@@ -123,7 +125,10 @@ class FittedLaw:
 
     @property
     def no_life_from(self) -> float | None:
-        """Torque in N m from which the formula gives no life but a negative one; None where it always gives one."""
+        """Torque in N m from which the formula gives no life but a negative one.
+
+        None where it always gives one.
+        """
         return math.exp(self.a / self.b) if self.form == "logarithm" else None
 
     @property
@@ -137,7 +142,10 @@ class FittedLaw:
 
 
 def fitted_laws(lives: LifeMap, torque: float, speed: float) -> tuple[FittedLaw, ...]:
-    """All three forms fitted to a map; those of one variable at the nearest torque and speed of the map."""
+    """All three forms fitted to a map.
+
+    Those of one variable at the nearest torque and speed of the map.
+    """
     at_speed = int(np.argmin(np.abs(lives.speed - speed)))
     at_torque = int(np.argmin(np.abs(lives.torque - torque)))
     values = lives.hours

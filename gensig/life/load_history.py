@@ -1,4 +1,7 @@
-"""When a machine runs, and at which speed and load: blocks of time, each at one set-point, with standstills between."""
+"""When a machine runs, and at which speed and load.
+
+Blocks of time, each at one set-point, with standstills between.
+"""
 
 from __future__ import annotations
 
@@ -62,7 +65,8 @@ class History:
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class DrawnBlocks:
-    """How blocks are drawn: lengths uniform between two limits, and how often and how long the machine stands still.
+    """How blocks are drawn: lengths uniform between two limits, and how often and how long the
+    machine stands still.
 
     ``gap_chance`` is that of a standstill after a block; all lengths in s.
     """
@@ -90,7 +94,8 @@ class DrawnBlocks:
 def draw_history(
     blocks: DrawnBlocks, speed: Array, torque: Array, horizon: float, rng: np.random.Generator
 ) -> History:
-    """Blocks at set-points drawn with equal chance, up to the horizon in s of clock time, where the last is cut.
+    """Blocks at set-points drawn with equal chance, up to the horizon in s of clock time, where
+    the last is cut.
 
     Raises
     ------

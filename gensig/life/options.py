@@ -21,7 +21,10 @@ CHOICES = {
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class FlankMaterial:
-    """What Archard's law asks of one flank; ``hardness`` in Pa, None stands for the value of both gears."""
+    """What Archard's law asks of one flank.
+
+    ``hardness`` in Pa, None stands for the value of both gears.
+    """
 
     coefficient: float | None
     hardness: float | None = unit("hbs")

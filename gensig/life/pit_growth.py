@@ -1,4 +1,7 @@
-"""Pits that come and grow with the load cycles of a flank: Miner's sum on a pitting S-N line, then number and size."""
+"""Pits that come and grow with the load cycles of a flank.
+
+Miner's sum on a pitting S-N line, then number and size.
+"""
 
 from __future__ import annotations
 
@@ -27,10 +30,10 @@ N_SIZES = 121
 class PitGrowthOptions(GrowthOptions):
     """Pitting S-N line, what comes after its end, and how units differ.
 
-    ``cycles`` at the contact stress ``strength`` end a flank's life without pits; at another stress s they are
-    cycles (strength / s)^exponent. From there on ``pits_per_life`` pits a tooth come in as many cycles again, and their
-    median diameter grows as the damage to the power ``size_exponent``. ``end_share`` is the pitted share of the flank
-    at which the life ends.
+    ``cycles`` at the contact stress ``strength`` end a flank's life without pits; at another
+    stress s they are cycles (strength / s)^exponent. From there on ``pits_per_life`` pits a tooth
+    come in as many cycles again, and their median diameter grows as the damage to the power
+    ``size_exponent``. ``end_share`` is the pitted share of the flank at which the life ends.
     """
 
     cycles: float
@@ -63,7 +66,8 @@ class PitGrowthOptions(GrowthOptions):
 
 @dataclass(frozen=True, slots=True, kw_only=True, eq=False)
 class PitGrowth(GrowthLaw):
-    """The law of one gear's pits; its size is the damage, 1 where the first pits come. Made by ``pit_growth``.
+    """The law of one gear's pits; its size is the damage, 1 where the first pits come. Made by
+    ``pit_growth``.
 
     Parameters
     ----------
@@ -124,7 +128,8 @@ class PitGrowth(GrowthLaw):
 def contact_stress(pair: GearPair, material: Material, torque: float) -> float:
     """Nominal contact stress of a spur pair under a torque of the pinion in N m, Pa.
 
-    Hertz's largest pressure of the two flanks at the pitch point, the whole load on one pair (ISO 6336-2, sigma_H0).
+    Hertz's largest pressure of the two flanks at the pitch point, the whole load on one pair (ISO
+    6336-2, sigma_H0).
     """
     radii = (pair.pinion_curvature(pair.pitch_point), pair.wheel_curvature(pair.pitch_point))
     curvature = sum(1.0 / float(radius) for radius in radii)
@@ -143,8 +148,8 @@ def pit_growth(
 ) -> PitGrowth:
     """The law of pits like ``pits``, whose diameter is that of the first ones, times ``first``.
 
-    ``stresses`` are torques of the pinion in N m, ascending, and contact stresses there in Pa, (torque,) both; None
-    takes the nominal ones of a spur pair.
+    ``stresses`` are torques of the pinion in N m, ascending, and contact stresses there in Pa,
+    (torque,) both; None takes the nominal ones of a spur pair.
 
     Raises
     ------

@@ -1,4 +1,7 @@
-"""Root cracks that grow in teeth cut into slices: the Paris law under the load that the mesh gives every slice."""
+"""Root cracks that grow in teeth cut into slices.
+
+The Paris law under the load that the mesh gives every slice.
+"""
 
 from __future__ import annotations
 
@@ -42,18 +45,20 @@ def sliced_crack_growth(
     options: CrackGrowthOptions,
     torques: Array,
 ) -> CrackGrowth:
-    """The law of a crack like ``crack``, of which depth, width and front are left aside, in a pair cut into slices.
+    """The law of a crack like ``crack``, of which depth, width and front are left aside, in a
+    pair cut into slices.
 
     Parameters
     ----------
     mesh_of : the pair with faults; its cracks are the calibrated ones, beyond the checked range too
     torques : (torque,) N m    of the pinion, ascending, where the mesh is solved: how the load is shared hangs on it
 
-    Energy release rate at constant load G = dU / dA as in ``crack_growth``, with the loads of all slices from the
-    equilibrium of the mesh with the crack in it. Every equilibrium is the least complementary energy, so that a change
-    of the crack changes that energy at first order only by what the same loads on the changed structure hold
-    (envelope theorem): the derivative of the structure's own energy at those loads. It is the mean over the crack's
-    front. The greatest over the engagement of the tooth counts.
+    Energy release rate at constant load G = dU / dA as in ``crack_growth``, with the loads of all
+    slices from the equilibrium of the mesh with the crack in it. Every equilibrium is the least
+    complementary energy, so that a change of the crack changes that energy at first order only by
+    what the same loads on the changed structure hold (envelope theorem): the derivative of the
+    structure's own energy at those loads. It is the mean over the crack's front. The greatest
+    over the engagement of the tooth counts.
 
     Raises
     ------
@@ -104,9 +109,11 @@ def sliced_crack_growth(
 def _greatest(
     mesh: SlicedMesh, gear: str, spans: Sequence[tuple[Sequence[SlicedMesh], float]], force: float
 ) -> list[float]:
-    """Greatest release rates over the engagement of the cracked pair under a force in N, (span,) N/m.
+    """Greatest release rates over the engagement of the cracked pair under a force in N, (span,)
+    N/m.
 
-    ``spans`` are meshes with a little less and a little more crack, and the area between them in m2.
+    ``spans`` are meshes with a little less and a little more crack, and the area between them in
+    m2.
     """
     pitch = mesh.pair.base_pitch
 
@@ -161,7 +168,8 @@ def _smooth(looked: Array, values: Array, sizes: Array) -> Array:
 def _followed(
     depths: Array, face: float, options: CrackGrowthOptions, rates: Callable[[float, float], Array]
 ) -> tuple[Array, Array]:
-    """Width that goes with each depth at the middle torque, (depth,) m, and release rates, (depth, torque) N/m.
+    """Width that goes with each depth at the middle torque, (depth,) m, and release rates,
+    (depth, torque) N/m.
 
     From depth to depth by the two-step method of Adams and Bashforth over the depth's logarithm.
     """

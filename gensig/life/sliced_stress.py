@@ -1,4 +1,7 @@
-"""Contact stress of a pair in slices, as the pitting line asks it: one number for the whole flank."""
+"""Contact stress of a pair in slices, as the pitting line asks it.
+
+One number for the whole flank.
+"""
 
 from __future__ import annotations
 
@@ -22,9 +25,9 @@ def sliced_contact_stress(
     torques : (torque,) N m    of the pinion
     exponent : of the stress in the pitting line
 
-    Hertz's pressure of every slice as it passes the pitch point, where ISO 6336-2 takes it, with its load from the
-    equilibrium of the mesh; s = (mean of p_j^q over the face)^(1 / q), which is Miner's damage averaged over the face:
-    pits come anywhere on it.
+    Hertz's pressure of every slice as it passes the pitch point, where ISO 6336-2 takes it, with
+    its load from the equilibrium of the mesh; s = (mean of p_j^q over the face)^(1 / q), which is
+    Miner's damage averaged over the face: pits come anywhere on it.
     """
     pair = mesh.pair
     roll = pair.pitch_point + mesh.lag

@@ -14,7 +14,9 @@ WIDEST = 3.0  # standard deviations: nothing is drawn beyond
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Spread:
-    """Standard deviations of the logarithm of a unit's rate of growth and of its first size, about their medians."""
+    """Standard deviations of the logarithm of a unit's rate of growth and of its first size,
+    about their medians.
+    """
 
     rate_scatter: float
     start_scatter: float
@@ -30,6 +32,9 @@ class Spread:
         return math.exp(WIDEST * self.start_scatter)
 
     def draw(self, rng: np.random.Generator) -> tuple[float, float]:
-        """Factors on the rate and the first size of one unit; two draws, whatever the scatters are."""
+        """Factors on the rate and the first size of one unit.
+
+        Two draws, whatever the scatters are.
+        """
         rate, start = np.clip(rng.standard_normal(2), -WIDEST, WIDEST).tolist()
         return math.exp(rate * self.rate_scatter), math.exp(start * self.start_scatter)

@@ -21,7 +21,8 @@ LEAST_INTENSITY = (
 
 @_compiled
 def lower_envelope(standing_back, arc, center, relative_radius, gap):
-    """Gap that the mating flank finds, the least of standing_back + x^2 / (2 rho) along the common tangent.
+    """Gap that the mating flank finds, the least of standing_back + x^2 / (2 rho) along the
+    common tangent.
 
     Parameters
     ----------
@@ -71,8 +72,9 @@ def share_over_slices(
 ):
     """Gap of the slice that touches first, and the secant compliance from there under the load.
 
-    Every slice carries width x (approach - its gap) / (unit compliance), the unit compliance being that of the contact,
-    factor x (constant - log_weight x ln(its load per width)), and of what bends with the slice alone.
+    Every slice carries width x (approach - its gap) / (unit compliance), the unit compliance
+    being that of the contact, factor x (constant - log_weight x ln(its load per width)), and of
+    what bends with the slice alone.
 
     Parameters
     ----------

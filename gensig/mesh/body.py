@@ -16,7 +16,8 @@ from gensig.mesh.options import MeshOptions
 
 Array = NDArray[np.float64]
 
-# rim thickness over module: the ring was checked against finite elements down to 2, one case at 1.75
+# rim thickness over module: the ring was checked against finite elements down to 2, one case at
+# 1.75
 CHECKED_RIM, THINNEST_RIM = 2.0, 1.5
 
 

@@ -1,4 +1,5 @@
-"""How the load on one tooth deflects the gear body under its neighbours: the clamped elastic ring by Fourier series.
+"""How the load on one tooth deflects the gear body under its neighbours: the clamped elastic ring
+by Fourier series.
 
 Derivation, checks against finite elements and limits: ``docs/theory/spur_mesh.md``.
 """
@@ -28,8 +29,9 @@ SERIES_LENGTH = 12.0  # harmonics up to n theta_f = 12: cross terms to 1e-4
 def shared_body_compliance(pair: GearPair, material: Material) -> float:
     """Cross compliance of two pairs in contact at once, through both gear bodies, m/N.
 
-    The mean over the double zone of (deflection of one pair) / (load on the other); it varies by 1 to 5 % there.
-    Plane stress. Source: elastic ring clamped at the bore, loaded over the root arc of a tooth.
+    The mean over the double zone of (deflection of one pair) / (load on the other); it varies by
+    1 to 5 % there. Plane stress. Source: elastic ring clamped at the bore, loaded over the root
+    arc of a tooth.
     """
     overlap = (pair.transverse_contact_ratio - 1.0) * pair.base_pitch
     position = np.linspace(0.0, max(overlap, 0.0), 9)
@@ -53,7 +55,8 @@ def shared_body_compliance(pair: GearPair, material: Material) -> float:
 def cross_compliance(
     gear: Gear, material: Material, loaded: Array, probed: Array, *, pitches: int
 ) -> Array:
-    """Deflection along its own line of action of the tooth ``pitches`` ahead, per load on tooth 0, (phase,) m/N.
+    """Deflection along its own line of action of the tooth ``pitches`` ahead, per load on tooth
+    0, (phase,) m/N.
 
     Parameters
     ----------
@@ -66,7 +69,8 @@ def cross_compliance(
 
 @lru_cache(maxsize=64)
 def arc_flexibility(gear: Gear, material: Material, angle: float) -> Array:
-    """Displacements (u_x, u_y, rotation about the centre) of a root arc per (F_x, F_y, moment) on the arc at angle 0.
+    """Displacements (u_x, u_y, rotation about the centre) of a root arc per (F_x, F_y, moment) on
+    the arc at angle 0.
 
     Returns
     -------
@@ -98,7 +102,8 @@ def arc_flexibility(gear: Gear, material: Material, angle: float) -> Array:
 
 
 def ring_harmonic(gear: Gear, material: Material, n: int) -> Array:
-    """Compliance (U, V) per (S, T) of the n-th harmonic of radial and shear stress on the root circle, (2, 2) m/Pa.
+    """Compliance (U, V) per (S, T) of the n-th harmonic of radial and shear stress on the root
+    circle, (2, 2) m/Pa.
 
     Source: Michell's solutions for the annulus, U = V = 0 at the bore. Plane stress.
     """
@@ -153,7 +158,10 @@ def ring_harmonic(gear: Gear, material: Material, n: int) -> Array:
 def _resultants(
     theta_f: float, r_f: float, nodes: Array, weights: Array, normal: Array, shear: Array
 ) -> Array:
-    """(F_x, F_y, moment about the centre) of each stress shape per unit width; columns are shapes."""
+    """(F_x, F_y, moment about the centre) of each stress shape per unit width.
+
+    Columns are shapes.
+    """
     theta, measure = theta_f * nodes, r_f * theta_f * weights
     return np.stack(
         [

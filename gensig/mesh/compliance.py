@@ -1,4 +1,7 @@
-"""Tooth compliance by the potential-energy method: bending, shear and axial compression of a tapered cantilever."""
+"""Tooth compliance by the potential-energy method.
+
+Bending, shear and axial compression of a tapered cantilever.
+"""
 
 from __future__ import annotations
 
@@ -14,7 +17,8 @@ from gensig.mesh.tooth_sections import sections
 
 Array = NDArray[np.float64]
 
-# parabolic shear of a long prismatic beam, spur paper eq. (4), against even shear: see tooth_compliance
+# parabolic shear of a long prismatic beam, spur paper eq. (4), against even shear: see
+# tooth_compliance
 SHEAR_FACTORS = {"to_contact": 1.2, "to_centreline": 1.0}
 
 
@@ -55,8 +59,9 @@ def tooth_compliance(
     -------
     ToothCompliance, (phase,) m/N, along the line of action
 
-    Source: spur paper eqs. (3) to (5), integrated from the root chord to the contact abscissa. The squared moment arm
-    of (3) is expanded, so one running sum of section moments serves every contact point. Plane stress.
+    Source: spur paper eqs. (3) to (5), integrated from the root chord to the contact abscissa.
+    The squared moment arm of (3) is expanded, so one running sum of section moments serves every
+    contact point. Plane stress.
     """
     profile, gear = tooth.profile, tooth.gear
     root = profile.abscissa[0]

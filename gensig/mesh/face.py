@@ -1,4 +1,7 @@
-"""Contact over the face: which slices of a faulty flank bear, how far they stand back, how much softer they make it."""
+"""Contact over the face.
+
+Which slices of a faulty flank bear, how far they stand back, how much softer they make it.
+"""
 
 from __future__ import annotations
 
@@ -13,7 +16,8 @@ from gensig.mesh.local_contact import ContactLaw
 Array = NDArray[np.float64]
 
 SHAPE_DECIMALS = 15  # of a metre: rounding noise does not make two slices different
-# law=paper knows no gap: flank deeper than this share of the module below the rest of its tooth does not bear
+# law=paper knows no gap: flank deeper than this share of the module below the rest of its tooth
+# does not bear
 LOST_DEPTH = 0.04
 
 
@@ -25,8 +29,9 @@ def is_nominal(tooth: Tooth) -> bool:
 def slice_gaps(tooth: Tooth, curvature_radius: Array, relative_radius: Array) -> Array:
     """How much later than a sound flank each slice touches its mate, (slice, phase) m.
 
-    The mate rides on the edges of what is short: the gap is the lower envelope of both flanks along the common
-    tangent, not the material removed. Where the flank has lost its tip its new corner touches.
+    The mate rides on the edges of what is short: the gap is the lower envelope of both flanks
+    along the common tangent, not the material removed. Where the flank has lost its tip its new
+    corner touches.
 
     Parameters
     ----------
@@ -57,7 +62,8 @@ def slice_gaps(tooth: Tooth, curvature_radius: Array, relative_radius: Array) ->
 
 
 def _shapes(standing_back: Array) -> tuple[Array, NDArray[np.int64], Array]:
-    """Rows that differ by more than how far back they stand as a whole, which of them each row is, and how far back.
+    """Rows that differ by more than how far back they stand as a whole, which of them each row
+    is, and how far back.
 
     Slices of one flank that is only moved or tilted across the face share their envelope.
     """
@@ -80,7 +86,8 @@ def face_contact(
     load: Array,
     bending: Array,
 ) -> tuple[Array, Array]:
-    """Gap of the slice that touches first; from there, contact compliance and what partial width adds to bending.
+    """Gap of the slice that touches first; from there, contact compliance and what partial width
+    adds to bending.
 
     Parameters
     ----------
@@ -108,7 +115,8 @@ def face_contact(
 
 
 def bearing_width(tooth: Tooth, curvature_radius: Array) -> Array:
-    """Width in contact by the paper's law, which knows no gaps: the face less what is lost, (phase,) m.
+    """Width in contact by the paper's law, which knows no gaps: the face less what is lost,
+    (phase,) m.
 
     Raises
     ------

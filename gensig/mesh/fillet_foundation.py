@@ -48,8 +48,9 @@ def fillet_foundation_compliance(
     ------
     ExtrapolationError    outside the range on which the coefficients were checked, unless allowed
 
-    Source: Sainsot, Velex & Duverger (2004), spur paper eq. (7), with theta_f = b1/r, s_f = 2 r_f theta_f and
-    u_f = r_b/cos(angle) - r_f. Assumes an isolated tooth and a bore clamped all around; plane stress.
+    Source: Sainsot, Velex & Duverger (2004), spur paper eq. (7), with theta_f = b1/r, s_f = 2 r_f
+    theta_f and u_f = r_b/cos(angle) - r_f. Assumes an isolated tooth and a bore clamped all
+    around; plane stress.
     """
     values = body_coefficients(gear, allow_extrapolation=allow_extrapolation)
     height = gear.base_radius / np.cos(load_angle) - gear.root_radius

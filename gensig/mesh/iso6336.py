@@ -1,4 +1,7 @@
-"""Tooth stiffness by ISO 6336-1, Method B: the standard's yardstick for the computed mesh stiffness."""
+"""Tooth stiffness by ISO 6336-1, Method B.
+
+The standard's yardstick for the computed mesh stiffness.
+"""
 
 from __future__ import annotations
 
@@ -41,9 +44,10 @@ def single_stiffness(
     ConfigError           for a load, factor or modulus that is not positive
     ExtrapolationError    for profile shifts outside x1 >= x2, -0.5 <= x1 + x2 <= 2, unless allowed
 
-    Source: ISO 6336-1, Method B, c' = c'_th C_M C_R C_B cos(beta), virtual teeth z / (cos^2(beta_b) cos(beta)), solid
-    discs (C_R = 1) and (F_t K_A / b / 100 N/mm)^0.25 below 100 N/mm. One N/(mm um) of the standard is 1e9 N/m/m. The
-    body down to the bore, which makes thin-rimmed gears softer, is not in it.
+    Source: ISO 6336-1, Method B, c' = c'_th C_M C_R C_B cos(beta), virtual teeth z /
+    (cos^2(beta_b) cos(beta)), solid discs (C_R = 1) and (F_t K_A / b / 100 N/mm)^0.25 below 100
+    N/mm. One N/(mm um) of the standard is 1e9 N/m/m. The body down to the bore, which makes
+    thin-rimmed gears softer, is not in it.
     """
     for name, value in (
         ("line_load", line_load),
@@ -81,7 +85,8 @@ def mesh_stiffness(
     youngs_modulus: float = STEEL_YOUNGS_MODULUS,
     allow_extrapolation: bool = False,
 ) -> float:
-    """Mean mesh stiffness c_gamma = c' (0.75 eps_alpha + 0.25) per face width, N/m/m; parameters as for c'.
+    """Mean mesh stiffness c_gamma = c' (0.75 eps_alpha + 0.25) per face width, N/m/m; parameters
+    as for c'.
 
     Raises
     ------
@@ -115,7 +120,10 @@ def flexibility(pair: GearPair) -> float:
 
 
 def basic_rack_factor(gear: Gear) -> float:
-    """C_B = [1 + 0.5 (1.2 - h_fP / m)] [1 - 0.02 (20 deg - alpha_P)] of one gear; 1 for h_fP = 1.2 m, 20 deg."""
+    """C_B = [1 + 0.5 (1.2 - h_fP / m)] [1 - 0.02 (20 deg - alpha_P)] of one gear.
+
+    1 for h_fP = 1.2 m, 20 deg.
+    """
     dedendum = gear.addendum_coefficient + gear.clearance_coefficient
     return (1.0 + 0.5 * (1.2 - dedendum)) * (
         1.0 - 0.02 * (20.0 - math.degrees(gear.pressure_angle))

@@ -26,8 +26,9 @@ LEAST_LOAD_SHARE = (
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class PairStates:
-    """Compliance (less the shared part) and gap of the pairs followed at each phase, (phase, pair); pairs in order
-    of entry, the one approaching A first. An absent pair has an infinite gap."""
+    """Compliance (less the shared part) and gap of the pairs followed at each phase, (phase,
+    pair); pairs in order of entry, the one approaching A first. An absent pair has an infinite
+    gap."""
 
     compliance: Array
     gap: Array
@@ -36,7 +37,10 @@ class PairStates:
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class StaticMesh:
-    """Equilibrium under one force: ``approach`` (phase,) m, ``load`` (phase, pair) N, ``stiffness`` (phase,) N/m."""
+    """Equilibrium under one force.
+
+    ``approach`` (phase,) m, ``load`` (phase, pair) N, ``stiffness`` (phase,) N/m.
+    """
 
     approach: Array
     load: Array
@@ -54,10 +58,12 @@ def pair_states(
     pinion_tilt: Array | None = None,
     wheel_tilt: Array | None = None,
 ) -> PairStates:
-    """Pairs at the pinion's roll, (phase,) m along the line of action; at 0 the start teeth enter at A.
+    """Pairs at the pinion's roll, (phase,) m along the line of action; at 0 the start teeth enter
+    at A.
 
-    ``pinion_error`` and ``wheel_error`` (tooth,) m open the gaps of their teeth at the pitch point, ``pinion_tilt`` and
-    ``wheel_tilt`` (tooth,) m/m by as much more for every metre that the contact is further along the path.
+    ``pinion_error`` and ``wheel_error`` (tooth,) m open the gaps of their teeth at the pitch
+    point, ``pinion_tilt`` and ``wheel_tilt`` (tooth,) m/m by as much more for every metre that
+    the contact is further along the path.
     """
     pitch = table.pair.base_pitch
     newest = np.floor(roll / pitch).astype(np.int64)
@@ -91,8 +97,8 @@ def pair_states(
 def static_mesh(table: PairTable, states: PairStates, force: float) -> StaticMesh:
     """Load sharing, approach and tangent stiffness dF/d(approach) under a total mesh force in N.
 
-    ``mesh.law=paper`` has no gaps: pairs on the path share by stiffness, and where none is on it the stiffness is 0
-    and the approach infinite.
+    ``mesh.law=paper`` has no gaps: pairs on the path share by stiffness, and where none is on it
+    the stiffness is 0 and the approach infinite.
     """
     if table.options.law == "paper":
         on_path = (
@@ -136,7 +142,9 @@ def loaded_pair_table(
     force: float,
     modification: PairModification = PLAIN,
 ) -> PairTable:
-    """Table whose contact term is the secant at the quasi-static load of sound pairs under a total force in N."""
+    """Table whose contact term is the secant at the quasi-static load of sound pairs under a
+    total force in N.
+    """
     load = (
         force
         if options.contact == "linear"
@@ -153,9 +161,11 @@ def sound_load(
     force: float,
     modification: PairModification = PLAIN,
 ) -> Array:
-    """Quasi-static load of a sound pair at every node under a total force in N, (node,) N; not to be written to.
+    """Quasi-static load of a sound pair at every node under a total force in N, (node,) N; not to
+    be written to.
 
-    Load sharing and local compliance depend on each other; the sharing moves by less than 1e-3 after three rounds.
+    Load sharing and local compliance depend on each other; the sharing moves by less than 1e-3
+    after three rounds.
     """
     load: Array | float = force
     for _ in range(LOAD_ROUNDS):
@@ -168,7 +178,10 @@ def sound_load(
 
 
 def _sound_states(table: PairTable) -> PairStates:
-    """Sound pairs at every node of one pitch; in order of entry, each one pitch after the one before it."""
+    """Sound pairs at every node of one pitch.
+
+    In order of entry, each one pitch after the one before it.
+    """
 
     def of_pairs(nodes: Array) -> Array:
         return nodes[:-1].reshape(N_PAIRS, table.options.points_per_pitch).T

@@ -1,4 +1,7 @@
-"""Local compliance of the contact: the paper's constant term, or the load-dependent one of Weber and Banaschek."""
+"""Local compliance of the contact.
+
+The paper's constant term, or the load-dependent one of Weber and Banaschek.
+"""
 
 from __future__ import annotations
 
@@ -28,7 +31,9 @@ class ContactLaw:
     log_weight: float
 
     def compliance(self, width: Array | float, load: Array | float) -> Array:
-        """Secant compliance along the line of action for a width in contact in m under a load in N, (phase,) m/N."""
+        """Secant compliance along the line of action for a width in contact in m under a load in
+        N, (phase,) m/N.
+        """
         return (
             self.factor
             * (self.constant - self.log_weight * np.log(np.asarray(load) / width))
@@ -46,16 +51,17 @@ def linear_contact(position: Array, material: Material) -> ContactLaw:
 
 
 def weber_contact(pair: GearPair, position: Array, material: Material) -> ContactLaw:
-    """Load-dependent local compliance of both teeth, from the flank to the tooth centreline, as a secant.
+    """Load-dependent local compliance of both teeth, from the flank to the tooth centreline, as a
+    secant.
 
     Parameters
     ----------
     position : (phase,) m    on the path of contact, from A
 
-    Source: Weber & Banaschek (1955), per tooth 2 (1 - nu^2) / (pi E W) [ln(2 h / b) - nu / (2 (1 - nu))] with the
-    Hertzian half width b and the depth h along the load from the flank to the centreline. Plane strain, whatever
-    ``mesh.elasticity`` says of the other terms: the contact is far narrower than the face. 91 to 94 % of what finite
-    elements give.
+    Source: Weber & Banaschek (1955), per tooth 2 (1 - nu^2) / (pi E W) [ln(2 h / b) - nu / (2 (1
+    - nu))] with the Hertzian half width b and the depth h along the load from the flank to the
+    centreline. Plane strain, whatever ``mesh.elasticity`` says of the other terms: the contact is
+    far narrower than the face. 91 to 94 % of what finite elements give.
     """
     nu = material.poisson_ratio
     reduced = (1.0 - nu**2) / (math.pi * material.youngs_modulus)

@@ -1,7 +1,9 @@
-"""Flanks that are ground back on purpose, or stand askew: relief, crowning, helix slope, misalignment.
+"""Flanks that are ground back on purpose, or stand askew: relief, crowning, helix slope,
+misalignment.
 
-Depths are along the transverse line of action and count into the flank. Heights are radial, from the tip or from the
-lowest working point. Source of the shapes and names: ISO 21771-1:2024, section on flank modifications.
+Depths are along the transverse line of action and count into the flank. Heights are radial, from
+the tip or from the lowest working point. Source of the shapes and names: ISO 21771-1:2024,
+section on flank modifications.
 """
 
 from __future__ import annotations
@@ -28,7 +30,8 @@ N_SLICES = 40  # across the face of a spur tooth with a modified lead
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class FlankModification:
-    """What is ground off one gear's flanks, the same on every tooth; all 0 is the involute helicoid.
+    """What is ground off one gear's flanks, the same on every tooth; all 0 is the involute
+    helicoid.
 
     Parameters
     ----------
@@ -127,7 +130,9 @@ class FlankModification:
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class PairModification:
-    """Both gears' modifications and how much the shafts are out of line, m over the face, along the line of action."""
+    """Both gears' modifications and how much the shafts are out of line, m over the face, along
+    the line of action.
+    """
 
     pinion: FlankModification
     wheel: FlankModification
@@ -161,7 +166,10 @@ class PairModification:
         return profile + self.lead(pair, place)[:, None]
 
     def profile(self, pair: GearPair, name: str, curvature_radius: Array) -> Array:
-        """Depth over the profile of the gear of that name, (point,) m; see ``FlankModification.profile``."""
+        """Depth over the profile of the gear of that name, (point,) m.
+
+        See ``FlankModification.profile``.
+        """
         lowest = dict(zip(SIDES, (0.0, pair.path_of_contact), strict=True))
         start = float(pair.curvature(name, lowest[name]))
         return self.sides[name].profile(pair.gears[name], curvature_radius, start)
@@ -181,7 +189,10 @@ PLAIN = PairModification(pinion=FlankModification(), wheel=FlankModification())
 
 
 def sound_teeth(pair: GearPair, modification: PairModification = PLAIN) -> Mapping[str, Tooth]:
-    """The tooth that all of a spur gear have before faults and errors, by gear: as cut, or modified."""
+    """The tooth that all of a spur gear have before faults and errors, by gear.
+
+    As cut, or modified.
+    """
     if modification.is_any:
         return _modified_teeth(pair, modification)
     return {side: healthy_tooth(gear) for side, gear in pair.gears.items()}
@@ -189,7 +200,10 @@ def sound_teeth(pair: GearPair, modification: PairModification = PLAIN) -> Mappi
 
 @lru_cache(maxsize=16)
 def _modified_teeth(pair: GearPair, modification: PairModification) -> Mapping[str, Tooth]:
-    """A mate feels the sum of both leads only: all of it stands on the gear with the narrower face."""
+    """A mate feels the sum of both leads only.
+
+    All of it stands on the gear with the narrower face.
+    """
     gears = pair.gears
     teeth = {name: healthy_tooth(gear) for name, gear in gears.items()}
     narrow = min(gears, key=lambda name: gears[name].face_width)

@@ -1,4 +1,7 @@
-"""Compliance and gap of every distinct tooth along the line of action: all that statics and dynamics ask."""
+"""Compliance and gap of every distinct tooth along the line of action.
+
+All that statics and dynamics ask.
+"""
 
 from __future__ import annotations
 
@@ -31,7 +34,8 @@ Array = NDArray[np.float64]
 # pairs followed at once: positions u - 1, u, u + 1, u + 2 base pitches, u in 0..1
 N_PAIRS = 4
 FIRST_PITCH, LAST_PITCH = -1, 3
-# larger second differences of compliances, as a share, and of gaps in m are steps and kinks of the flank
+# larger second differences of compliances, as a share, and of gaps in m are steps and kinks of
+# the flank
 SMOOTHED_SHARE, SMOOTHED_GAP = 0.01, 1e-7
 
 
@@ -39,8 +43,8 @@ SMOOTHED_SHARE, SMOOTHED_GAP = 0.01, 1e-7
 class GearTable:
     """One gear's side of the mesh: one row per distinct tooth, ``kind`` says which row a tooth has.
 
-    ``compliance`` and ``gap`` are (distinct, node), m/N and m, each with its slope over position; between nodes slopes
-    go straight and values follow their integral.
+    ``compliance`` and ``gap`` are (distinct, node), m/N and m, each with its slope over position;
+    between nodes slopes go straight and values follow their integral.
     """
 
     compliance: Array
@@ -55,8 +59,9 @@ class GearTable:
 class PairTable:
     """Both gears' tables on the node positions s of -1 to 3 base pitches, and what the pairs share.
 
-    The contact term stands on the pinion's side for sound flanks; each side adds what its own faults cost against a
-    sound mate. ``shared_compliance`` is the body compliance that all pairs in contact share.
+    The contact term stands on the pinion's side for sound flanks; each side adds what its own
+    faults cost against a sound mate. ``shared_compliance`` is the body compliance that all pairs
+    in contact share.
     """
 
     pair: GearPair
@@ -130,8 +135,8 @@ def _node_sides(pair: GearPair, material: Material, options: MeshOptions) -> dic
 
 @lru_cache(maxsize=16)
 def _sound_structure(pair: GearPair, material: Material, options: MeshOptions) -> dict[str, Any]:
-    """What neither load nor faults change: (corner gap, structural compliance) of either gear at the nodes, (node,)
-    each, what bends slice by slice (node,), and the shared body compliance."""
+    """What neither load nor faults change: (corner gap, structural compliance) of either gear at
+    the nodes, (node,) each, what bends slice by slice (node,), and the shared body compliance."""
     position = node_positions(pair, options)
     structure = material.in_plane(options.elasticity)
     on_path = np.clip(position, 0.0, pair.path_of_contact)
@@ -151,7 +156,9 @@ def _sound_structure(pair: GearPair, material: Material, options: MeshOptions) -
 def _structure_at_nodes(
     tooth: Tooth, curvature: Array, material: Material, options: MeshOptions
 ) -> Array:
-    """Structural compliance at each different curvature radius once, most nodes being held at A or E, (node,)."""
+    """Structural compliance at each different curvature radius once, most nodes being held at A
+    or E, (node,).
+    """
     different, place = np.unique(curvature, return_inverse=True)
     return structural_compliance(tooth, different, material, options)[place]
 
@@ -159,14 +166,18 @@ def _structure_at_nodes(
 def structural_compliance(
     tooth: Tooth, curvature: Array, material: Material, options: MeshOptions
 ) -> Array:
-    """Tooth and body compliance of one loaded tooth, (phase,) m/N; the material as ``Material.in_plane`` gives it."""
+    """Tooth and body compliance of one loaded tooth, (phase,) m/N.
+
+    The material as ``Material.in_plane`` gives it.
+    """
     return np.sum(list(structural_terms(tooth, curvature, material, options).values()), axis=0)
 
 
 def check_teeth(
     pair: GearPair, material: Material, options: MeshOptions, teeth: Mapping[tuple[str, int], Tooth]
 ) -> None:
-    """Raise what ``pair_table`` would raise about faulty teeth, at the cost of one contact point a tooth.
+    """Raise what ``pair_table`` would raise about faulty teeth, at the cost of one contact point
+    a tooth.
 
     Raises
     ------
@@ -189,7 +200,10 @@ def check_teeth(
 def structural_terms(
     tooth: Tooth, curvature: Array, material: Material, options: MeshOptions
 ) -> dict[str, Array]:
-    """The same by its parts: bending, shear, axial, foundation, and what cracks add where they do not cut sections."""
+    """The same by its parts.
+
+    Bending, shear, axial, foundation, and what cracks add where they do not cut sections.
+    """
     gear, papers_crack = tooth.gear, options.crack == "paper"
     parts = tooth_compliance(
         tooth, curvature, material, reach=options.tooth, papers_crack=papers_crack
@@ -211,11 +225,12 @@ def structural_terms(
 def slice_bending(
     pair: GearPair, position: Array, material: Material, options: MeshOptions
 ) -> Array:
-    """Compliance of both sound teeth that belongs to the slices of the face, (phase,) m/N; 0 with ``bending=whole``.
+    """Compliance of both sound teeth that belongs to the slices of the face, (phase,) m/N; 0 with
+    ``bending=whole``.
 
-    Three-dimensional finite elements of a pinion loaded over part of its face give it 0.8 (middle, or both ends) to
-    1.4 times (one end) the teeth's own bending, shear and axial compliance; the body behind them is shared
-    (``tests/reference``).
+    Three-dimensional finite elements of a pinion loaded over part of its face give it 0.8
+    (middle, or both ends) to 1.4 times (one end) the teeth's own bending, shear and axial
+    compliance; the body behind them is shared (``tests/reference``).
     """
     if options.bending == "whole":
         return np.zeros_like(position)
@@ -233,8 +248,9 @@ def slice_bending(
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class FlankSide:
-    """One gear's flank at contact positions: ``flank_curvature`` goes on beyond its tip, ``curvature`` is held at A
-    and E. ``base`` is the ``share`` of a sound pair's contact compliance that the mate's side carries already."""
+    """One gear's flank at contact positions: ``flank_curvature`` goes on beyond its tip,
+    ``curvature`` is held at A and E. ``base`` is the ``share`` of a sound pair's contact
+    compliance that the mate's side carries already."""
 
     gear: Gear
     curvature: Array
@@ -253,7 +269,8 @@ class FlankSide:
         )
 
     def contact(self, tooth: Tooth, bending: Array, options: MeshOptions) -> tuple[Array, Array]:
-        """Gap and contact compliance of one tooth against a sound mate, (phase,) m and m/N, less ``base``.
+        """Gap and contact compliance of one tooth against a sound mate, (phase,) m and m/N, less
+        ``base``.
 
         ``bending`` (phase,) m/N is what bends slice by slice, see ``slice_bending``.
         """
@@ -319,7 +336,10 @@ def _gear_table(
     material: Material,
     options: MeshOptions,
 ) -> GearTable:
-    """Rows of the distinct teeth: teeth that are one object share a row, equal structures are computed once."""
+    """Rows of the distinct teeth.
+
+    Teeth that are one object share a row, equal structures are computed once.
+    """
     distinct, kind = distinct_teeth(whole, odd)
     corner, sound_row = sound
     structures = {_structure_key(distinct[0]): sound_row}
@@ -349,7 +369,9 @@ def _gear_table(
 
 
 def distinct_teeth(sound: Tooth, odd: Mapping[int, Tooth]) -> tuple[list[Tooth], NDArray[np.int64]]:
-    """The sound tooth and those that differ, by object, and which of them each tooth of the gear is, (tooth,)."""
+    """The sound tooth and those that differ, by object, and which of them each tooth of the gear
+    is, (tooth,).
+    """
     distinct = [sound]
     kind = np.zeros(sound.gear.n_teeth, dtype=np.int64)
     for number, tooth in odd.items():

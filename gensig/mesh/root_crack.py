@@ -35,11 +35,12 @@ def crack_compliance(
     curvature_radius : (phase,) m    of the tooth's own flank at the contact
     material : as ``Material.in_plane`` gives it
 
-    Source: Irwin's relation between energy release and compliance. The stress intensity at the tip is linear in moment,
-    shear and normal force at the root, so a unit load adds [k_m M / h + k_v cos(alpha) - k_n sin(alpha)]^2 / (E' W):
-    M about the middle of the root chord h through the mouth, each k a function of depth over h, crack angle and the
-    slope of the root curve at the mouth. The coefficients of that function are fitted to two-dimensional finite
-    elements of whole gears (``tests/reference``), so the body behind the crack gives way too.
+    Source: Irwin's relation between energy release and compliance. The stress intensity at the
+    tip is linear in moment, shear and normal force at the root, so a unit load adds [k_m M / h +
+    k_v cos(alpha) - k_n sin(alpha)]^2 / (E' W): M about the middle of the root chord h through
+    the mouth, each k a function of depth over h, crack angle and the slope of the root curve at
+    the mouth. The coefficients of that function are fitted to two-dimensional finite elements of
+    whole gears (``tests/reference``), so the body behind the crack gives way too.
     """
     return sum(
         (
@@ -75,10 +76,11 @@ def _one(
 
 
 def basis(depth: Array, angle: float, slope: float) -> Array:
-    """Functions of depth over root chord, crack angle and slope at the mouth that the factors are made of.
+    """Functions of depth over root chord, crack angle and slope at the mouth that the factors are
+    made of.
 
-    Powers of the depth times low-order terms of the two angles about the middle of what was calibrated,
-    (depth, function); 0 at no depth.
+    Powers of the depth times low-order terms of the two angles about the middle of what was
+    calibrated, (depth, function); 0 at no depth.
     """
     tilt, fillet = angle - MIDDLE_ANGLE, slope - MIDDLE_SLOPE
     angles = np.array([1.0, tilt, tilt**2, fillet, tilt * fillet])
@@ -86,7 +88,8 @@ def basis(depth: Array, angle: float, slope: float) -> Array:
 
 
 def root_loads(gear: Gear, crack: RootCrack, load_angle: Array) -> Array:
-    """Moment over chord, shear and normal force at the crack's root chord under a unit load, (3, phase).
+    """Moment over chord, shear and normal force at the crack's root chord under a unit load, (3,
+    phase).
 
     Their sense is that in which they open the crack.
     """
@@ -117,11 +120,13 @@ def _require_checked(
 
 
 def _side_by_side(own: Array, through: Array) -> Array:
-    """Strips side by side, each a tooth's own compliance in series with its crack, less the sound tooth, (phase,).
+    """Strips side by side, each a tooth's own compliance in series with its crack, less the sound
+    tooth, (phase,).
 
-    The strips share their deflection at the load, as far as the tooth between them can hold them together:
-    ``TOGETHER`` times its own compliance, calibrated to three-dimensional finite elements of cracks over a quarter and
-    half of the face (``tests/reference``), within 9 % of them.
+    The strips share their deflection at the load, as far as the tooth between them can hold them
+    together: ``TOGETHER`` times its own compliance, calibrated to three-dimensional finite
+    elements of cracks over a quarter and half of the face (``tests/reference``), within 9 % of
+    them.
     """
     together = TOGETHER * own
     return 1.0 / np.mean(1.0 / (together + through), axis=0) - together

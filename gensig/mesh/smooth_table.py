@@ -1,4 +1,7 @@
-"""Tables that parabolas between the nodes make smooth: the slope is exactly the derivative of the value."""
+"""Tables that parabolas between the nodes make smooth.
+
+The slope is exactly the derivative of the value.
+"""
 
 from __future__ import annotations
 
@@ -11,11 +14,12 @@ Array = NDArray[np.float64]
 def smooth(values: Array, distance: float, limit: float) -> tuple[Array, Array]:
     """Values and slopes at the nodes of quadratic splines that run through nearly the given values.
 
-    Between nodes the slope goes straight, and the value follows its integral; point values and slopes of a law that
-    an integrator asks for are then consistent, and its energy balance holds between nodes too. The control points are
-    the values less a quarter of the second difference of the first row, the sound tooth, which makes up for what a
-    spline cuts off a curve; of more than ``limit`` it makes up no more, so that no step rings. Where one row lies above
-    another it stays there. A step becomes as wide as three nodes.
+    Between nodes the slope goes straight, and the value follows its integral; point values and
+    slopes of a law that an integrator asks for are then consistent, and its energy balance holds
+    between nodes too. The control points are the values less a quarter of the second difference
+    of the first row, the sound tooth, which makes up for what a spline cuts off a curve; of more
+    than ``limit`` it makes up no more, so that no step rings. Where one row lies above another it
+    stays there. A step becomes as wide as three nodes.
 
     Parameters
     ----------

@@ -16,9 +16,10 @@ Array = NDArray[np.float64]
 def sections(tooth: Tooth, *, papers_crack: bool) -> tuple[Array, Array]:
     """Area in m2 and second moment in m4 of every cell of the outline, (cell,) each.
 
-    Material lost from the flank leaves a section whose centroid moves away from it: the parallel-axis result, of
-    which the spur paper's eqs. (14) and (15) are the case of one rectangular pit. ``papers_crack`` also reduces
-    what a crack cuts by eqs. (11) and (12), strip by strip with the tooth kept whole.
+    Material lost from the flank leaves a section whose centroid moves away from it: the
+    parallel-axis result, of which the spur paper's eqs. (14) and (15) are the case of one
+    rectangular pit. ``papers_crack`` also reduces what a crack cuts by eqs. (11) and (12), strip
+    by strip with the tooth kept whole.
     """
     gear, half = tooth.gear, tooth.cell_half_thickness
     area, second_moment = 2.0 * half * gear.face_width, (2.0 * half) ** 3 * gear.face_width / 12.0
@@ -49,9 +50,10 @@ def _kept_height(tooth: Tooth, half: Array) -> Array:
 def kept_shares(tooth: Tooth, crack: RootCrack) -> Array:
     """Share of its height that each section keeps in each strip of a crack, (strip, cell).
 
-    Source: spur paper eqs. (11) and (12): h_q = h_c - q sin(angle), and every section thicker than h_q keeps
-    h_x + h_q of its height. Below its mouth every section is thicker than h_c, so that they cut the tooth even at
-    depth 0: strips without depth are left whole, and the first micrometre costs up to 34e-12 m/N.
+    Source: spur paper eqs. (11) and (12): h_q = h_c - q sin(angle), and every section thicker
+    than h_q keeps h_x + h_q of its height. Below its mouth every section is thicker than h_c, so
+    that they cut the tooth even at depth 0: strips without depth are left whole, and the first
+    micrometre costs up to 34e-12 m/N.
 
     Raises
     ------

@@ -32,7 +32,8 @@ MOST_SCATTER = 0.2
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Profile:
-    """A factor over time, piecewise linear; it holds its first value before its first time and its last value after.
+    """A factor over time, piecewise linear; it holds its first value before its first time and
+    its last value after.
 
     ``times`` in s from the first recorded sample, ``factors`` as many shares of the set-point.
     """
@@ -63,7 +64,10 @@ class Profile:
         return min(self.factors)
 
     def curve(self) -> PPoly:
-        """The factor as a function of time in s; its derivative at a point is that of the piece that begins there."""
+        """The factor as a function of time in s.
+
+        Its derivative at a point is that of the piece that begins there.
+        """
         from scipy.interpolate import PPoly
 
         times = np.array([self.times[0] - 1.0, *self.times, self.times[-1] + 1.0])
@@ -77,7 +81,10 @@ class Profile:
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Ramp:
-    """From one factor to another, in s from the first recorded sample; an ``end`` of None is that of the record."""
+    """From one factor to another, in s from the first recorded sample.
+
+    An ``end`` of None is that of the record.
+    """
 
     first_factor: float
     last_factor: float
@@ -99,12 +106,12 @@ class Ramp:
 class RandomWalk:
     """A factor that wanders about 1 and comes back: an Ornstein-Uhlenbeck process.
 
-    ``scatter`` is its standard deviation, ``correlation_time`` in s the time after which its autocorrelation
-    exp(-|t| / correlation_time) has fallen to 1/e.
+    ``scatter`` is its standard deviation, ``correlation_time`` in s the time after which its
+    autocorrelation exp(-|t| / correlation_time) has fallen to 1/e.
 
     Source: Uhlenbeck & Ornstein (1930). Sampled exactly at even points (Gillespie 1996, eq. 1.9),
-    x_k+1 = rho x_k + sqrt(1 - rho^2) n_k with rho = exp(-step / correlation_time) and n_k standard normal; linear
-    between them.
+    x_k+1 = rho x_k + sqrt(1 - rho^2) n_k with rho = exp(-step / correlation_time) and n_k
+    standard normal; linear between them.
     """
 
     scatter: float
@@ -127,7 +134,8 @@ class RandomWalk:
     def profile(self, duration: float, rng: np.random.Generator) -> Profile:
         """A course for a record of ``duration`` s; that of a longer record goes on from it.
 
-        It is a function of the absolute time: where the simulation of a record begins does not change it.
+        It is a function of the absolute time: where the simulation of a record begins does not
+        change it.
         """
         step = self.correlation_time / POINTS_PER_CORRELATION_TIME
         n_points = math.ceil((duration - EARLIEST) / step) + 2
@@ -151,10 +159,11 @@ class RandomWalk:
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Ripple:
-    """A course times 1 + ``share`` sin(psi): psi is ``order`` times the pinion's set angle, or of a fixed frequency.
+    """A course times 1 + ``share`` sin(psi): psi is ``order`` times the pinion's set angle, or of
+    a fixed frequency.
 
-    The set angle is that of the speed without its ripple, 0 at the first recorded sample; ``frequency`` in Hz,
-    ``phase`` in rad is psi at the first recorded sample.
+    The set angle is that of the speed without its ripple, 0 at the first recorded sample;
+    ``frequency`` in Hz, ``phase`` in rad is psi at the first recorded sample.
     """
 
     share: float
@@ -189,8 +198,9 @@ class Ripple:
     ) -> Array:
         """Integral of profile x share x sin(psi) from time 0, (time,) s.
 
-        With an order it is share / (order set_speed) [-cos psi], since the set angle grows by profile x set_speed.
-        With a frequency, [-profile cos psi] / w and the integral by parts: on each piece the slope is constant.
+        With an order it is share / (order set_speed) [-cos psi], since the set angle grows by
+        profile x set_speed. With a frequency, [-profile cos psi] / w and the integral by parts:
+        on each piece the slope is constant.
         """
         if self.order is not None:
             psi = self.psi(times, set_angle)

@@ -1,4 +1,7 @@
-"""The group ``operating`` of a configuration: set-points and their courses, and what a record tells of them."""
+"""The group ``operating`` of a configuration.
+
+Set-points and their courses, and what a record tells of them.
+"""
 
 from __future__ import annotations
 
@@ -110,7 +113,8 @@ def read_operating(values: Section) -> Operating:
 
 
 def read_course(values: Section, key: str) -> Course | None:
-    """The course that ``key``, speed_profile or torque_profile, of a group ``operating`` describes; None for null.
+    """The course that ``key``, speed_profile or torque_profile, of a group ``operating``
+    describes; None for null.
 
     Raises
     ------
@@ -174,7 +178,9 @@ def _profile(course: Course | None, duration: float, rng: np.random.Generator) -
 
 
 def _read_file(where: str, own: Mapping[str, Any], quantity: str, set_point: Any) -> FileCourse:
-    """``time_s`` and ``factor``, or ``time_s`` and the quantity itself, which is divided by the set-point."""
+    """``time_s`` and ``factor``, or ``time_s`` and the quantity itself, which is divided by the
+    set-point.
+    """
     if not (set(own) == {"file"} and isinstance(own["file"], str)):
         raise ConfigError(
             f"{where}: kind = file needs exactly file, the name of a CSV file with a header"
@@ -203,7 +209,8 @@ def _read_file(where: str, own: Mapping[str, Any], quantity: str, set_point: Any
 
 
 def read_ripple(values: Section, key: str) -> Ripple | None:
-    """The ripple that ``key``, speed_ripple or torque_ripple, of a group ``operating`` describes; None for null.
+    """The ripple that ``key``, speed_ripple or torque_ripple, of a group ``operating`` describes;
+    None for null.
 
     Raises
     ------
@@ -234,11 +241,13 @@ def _is_number(value: Any) -> bool:
 def operating_signals(
     operating: Operating, sampling_rate: float, shaft_angle: Array, load_exponent: int = 0
 ) -> dict[str, NDArray[np.float32]]:
-    """Traces of a record, (sample,) each: ``shaft_speed`` in rad/s, as the shaft turned, and ``torque_set`` in N m.
+    """Traces of a record, (sample,) each: ``shaft_speed`` in rad/s, as the shaft turned, and
+    ``torque_set`` in N m.
 
-    The speed is the central difference of the shaft angle: it takes sin(x) / x with x = 2 pi f / sampling_rate of a
-    change at f, 1 % less at 0.039 of the rate (2 kHz of 51.2 kHz), -3 dB at 0.22 of it. An angle of one NaN a sample
-    is a failed record's. ``load_exponent`` is the power of the nominal speed that the torque of the load follows.
+    The speed is the central difference of the shaft angle: it takes sin(x) / x with x = 2 pi f /
+    sampling_rate of a change at f, 1 % less at 0.039 of the rate (2 kHz of 51.2 kHz), -3 dB at
+    0.22 of it. An angle of one NaN a sample is a failed record's. ``load_exponent`` is the power
+    of the nominal speed that the torque of the load follows.
     """
     times = np.arange(len(shaft_angle)) / sampling_rate
     speed = np.full_like(shaft_angle, operating.speed)

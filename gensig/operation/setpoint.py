@@ -19,8 +19,9 @@ Array = NDArray[np.float64]
 class Nominal:
     """Nominal motion of the pinion and share of the set torque at some times, (time,) each.
 
-    ``angle`` rad since time 0, ``speed`` rad/s, ``acceleration`` rad/s2, ``torque_factor``, ``torque_slope`` 1/s; what
-    jumps at a point of a profile has the value of the piece that begins there.
+    ``angle`` rad since time 0, ``speed`` rad/s, ``acceleration`` rad/s2, ``torque_factor``,
+    ``torque_slope`` 1/s; what jumps at a point of a profile has the value of the piece that
+    begins there.
     """
 
     angle: Array
@@ -34,9 +35,10 @@ class Nominal:
 class Operating:
     """Set-point of the pinion, its course over time, and the soft speed source that holds it.
 
-    The driver is T = T_set + k (integral of the set speed - angle) + c (set speed - speed), with k and c giving
-    ``drive_frequency`` and ``drive_damping_ratio`` on the inertia reduced to the pinion. The profiles are shares of
-    ``speed`` and ``torque``, None is constant; the ripples are on top of them.
+    The driver is T = T_set + k (integral of the set speed - angle) + c (set speed - speed), with
+    k and c giving ``drive_frequency`` and ``drive_damping_ratio`` on the inertia reduced to the
+    pinion. The profiles are shares of ``speed`` and ``torque``, None is constant; the ripples are
+    on top of them.
     """
 
     speed: float = unit("rpm")
@@ -105,7 +107,9 @@ class Operating:
         return replace(self, speed_ripple=None, torque_ripple=None)
 
     def earlier(self, lead: float, duration: float) -> Operating:
-        """The same courses as told by a record of ``duration`` s that begins ``lead`` s before this one."""
+        """The same courses as told by a record of ``duration`` s that begins ``lead`` s before
+        this one.
+        """
         turned = -float(self._set_angle(np.array([-lead]))[0])
         return replace(
             self,
@@ -132,7 +136,9 @@ class Operating:
         return self.speed * self._profile_time(times)
 
     def time_at_set_speed(self, times: Array) -> Array:
-        """Time in which the set speed would turn as far as the nominal motion turns from time 0, (time,) s."""
+        """Time in which the set speed would turn as far as the nominal motion turns from time 0,
+        (time,) s.
+        """
         smooth = self._profile_time(times)
         if self.speed_ripple is None:
             return smooth

@@ -1,6 +1,7 @@
 """The only door to Hydra: overrides in, a `Configuration` out, mistakes as one line.
 
-Nothing of Hydra's own (working directories, logs, ``outputs/``) is created, and nothing is instantiated.
+Nothing of Hydra's own (working directories, logs, ``outputs/``) is created, and nothing is
+instantiated.
 """
 
 from __future__ import annotations
@@ -64,7 +65,9 @@ def compose(
 
 
 def sweep(overrides: Sequence[str]) -> list[list[str]]:
-    """Expand comma and range sweeps into one list of overrides a job (the Cartesian product, first key slowest)."""
+    """Expand comma and range sweeps into one list of overrides a job (the Cartesian product,
+    first key slowest).
+    """
     jobs: list[list[str]] = [[]]
     for override in _parse(overrides):
         key = override.get_key_element()
@@ -120,7 +123,10 @@ def _one_value(override: Any) -> str:
 
 
 def typed_mapping(overrides: Sequence[str], key: str) -> dict[str, Any]:
-    """What was typed as ``key={name: value, ...}``; such a mapping may have names that no option has yet."""
+    """What was typed as ``key={name: value, ...}``.
+
+    Such a mapping may have names that no option has yet.
+    """
     result: dict[str, Any] = {}
     for override in _parse([word for word in overrides if word.startswith(f"{key}=")]):
         value = override.value()

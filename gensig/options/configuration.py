@@ -1,7 +1,7 @@
 """A composed configuration as one read-only value, and its groups of keys.
 
-Everything past Hydra's door takes a `Configuration` or a `Section`. The readers beside the physics turn
-sections into typed values with ``section.read(cls)``.
+Everything past Hydra's door takes a `Configuration` or a `Section`. The readers beside the
+physics turn sections into typed values with ``section.read(cls)``.
 """
 
 from __future__ import annotations

@@ -1,7 +1,9 @@
-"""What can be chosen and set: groups, their options, and the keys of an option with value, unit and comment.
+"""What can be chosen and set: groups, their options, and the keys of an option with value, unit
+and comment.
 
-Read from the text of the configuration files, comments included, without Hydra, so that it is quick enough for a key
-press. A group's own line stands behind it in the defaults list of the primary file.
+Read from the text of the configuration files, comments included, without Hydra, so that it is
+quick enough for a key press. A group's own line stands behind it in the defaults list of the
+primary file.
 """
 
 from __future__ import annotations
@@ -34,7 +36,10 @@ LOADER = getattr(yaml, "CSafeLoader", yaml.SafeLoader)
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Key:
-    """One key: dotted name, value as the file writes it and as it is read, unit or empty, comment or empty."""
+    """One key.
+
+    Dotted name, value as the file writes it and as it is read, unit or empty, comment or empty.
+    """
 
     name: str
     text: str
@@ -45,7 +50,10 @@ class Key:
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Group:
-    """One group: what it is about, the option taken where none is typed, and the primary files that have it."""
+    """One group.
+
+    What it is about, the option taken where none is typed, and the primary files that have it.
+    """
 
     name: str
     about: str
@@ -63,7 +71,10 @@ class Option:
 
 
 class _File:
-    """One configuration file: its tree with the places of everything, and its lines for the comments."""
+    """One configuration file.
+
+    Its tree with the places of everything, and its lines for the comments.
+    """
 
     def __init__(self, path: Path) -> None:
         self.path = path
@@ -92,7 +103,10 @@ class _File:
         return SENTENCE_END.split(" ".join(words))[0].rstrip(".")
 
     def defaults(self) -> list[tuple[str | None, Any, str]]:
-        """The entries of its defaults list: group (None for an option of its own group), option, comment."""
+        """The entries of its defaults list.
+
+        Group (None for an option of its own group), option, comment.
+        """
         for key, value in self.tree.value if isinstance(self.tree, yaml.MappingNode) else ():
             if key.value == "defaults" and isinstance(value, yaml.SequenceNode):
                 return [self._entry(node) for node in value.value]
@@ -181,7 +195,10 @@ def options(group: str, config_dir: str | Path | None = None) -> list[Option]:
 
 
 def sections() -> dict[str, str]:
-    """Parts of the primary files that offer no choice, each with its primary file: mesh, solver, quality, ..."""
+    """Parts of the primary files that offer no choice, each with its primary file.
+
+    Mesh, solver, quality, ...
+    """
     found: dict[str, str] = {}
     for primary in PRIMARY:
         for key in _primary(primary).entries():
@@ -241,7 +258,9 @@ def _option_keys(
 
 
 def elsewhere(group: str, option: str) -> str | None:
-    """How to take an option that lies in the folder where gensig new writes, for who forgot to name it."""
+    """How to take an option that lies in the folder where gensig new writes, for who forgot to
+    name it.
+    """
     if not (Path(OWN) / group / f"{option}.yaml").is_file():
         return None
     return f"it is in ./{OWN}: add --config-dir {OWN}, in Python config_dir='{OWN}'"
@@ -302,7 +321,9 @@ def _indent(line: str) -> int:
 
 
 def _is_on_its_own(lines: Sequence[str]) -> bool:
-    """Whether the comment that ends ``lines`` goes on from none behind a value, and is not the head of the file."""
+    """Whether the comment that ends ``lines`` goes on from none behind a value, and is not the
+    head of the file.
+    """
     place = len(lines)
     while place and lines[place - 1].lstrip().startswith("#"):
         place -= 1

@@ -32,8 +32,9 @@ EVERY_SEED = {"distribution": "integers", "low": 0, "high": 999_999, "levels": N
 def settle_courses(config: Configuration, typed: Collection[str]) -> Configuration:
     """The configuration with what follows from its plan for its courses.
 
-    Random walks get a seed for each condition in ``plan.vary``, unless ``operating.course_seed`` is
-    among the keys that were ``typed``. ``operating.duration_s`` becomes that of ``operating.turns``.
+    Random walks get a seed for each condition in ``plan.vary``, unless ``operating.course_seed``
+    is among the keys that were ``typed``. ``operating.duration_s`` becomes that of
+    ``operating.turns``.
 
     Raises
     ------
@@ -76,7 +77,8 @@ def settle_courses(config: Configuration, typed: Collection[str]) -> Configurati
 def least_speed(config: Configuration, set_speed: float) -> float:
     """The slowest set speed of the pinion that records of a plan can have, rad/s.
 
-    The lower end of what the plan draws (else ``set_speed`` in rad/s), times the smallest factor of the course.
+    The lower end of what the plan draws (else ``set_speed`` in rad/s), times the smallest factor
+    of the course.
 
     Raises
     ------

@@ -88,7 +88,10 @@ def draw_faults(
     points: NDArray[np.int64],
     rng: np.random.Generator,
 ) -> list[dict[str, Any]]:
-    """One complete fault a condition, its severity distribution drawn; one design for all parts of a compound fault."""
+    """One complete fault a condition, its severity distribution drawn.
+
+    One design for all parts of a compound fault.
+    """
     specs, places = fault_specs(config, fault)
     parts = [
         {key: value for key, value in part.items() if key != "vary"} for part in fault_parts(fault)

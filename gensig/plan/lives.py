@@ -57,8 +57,8 @@ class Snapshot:
 def snapshots(config: Configuration) -> Iterator[Snapshot]:
     """All looks at all lives, life by life in order of time.
 
-    Classes are dealt to units in turn, in an order drawn anew for each round, so that no number of a unit or gearbox
-    tells the class.
+    Classes are dealt to units in turn, in an order drawn anew for each round, so that no number
+    of a unit or gearbox tells the class.
 
     Raises
     ------

@@ -63,10 +63,10 @@ class Counts:
 def make_plan(config: Configuration) -> Plan:
     """Draw every input of every record.
 
-    Nested by unit, condition, fault and repeat. Records that share a ``condition_id`` are of one unit
-    at one set-point: one record a class and repeat, in random order within each repeat, so that
-    neither position nor any drawn value tells the class. Repeats share the fault too; each has a start
-    and noise of its own.
+    Nested by unit, condition, fault and repeat. Records that share a ``condition_id`` are of one
+    unit at one set-point: one record a class and repeat, in random order within each repeat, so
+    that neither position nor any drawn value tells the class. Repeats share the fault too; each
+    has a start and noise of its own.
 
     Raises
     ------
@@ -104,7 +104,8 @@ def make_plan(config: Configuration) -> Plan:
             if len(rows) == counts.n_records:
                 break
             name = names[label]
-            # The first sound record of a condition starts as the twin that sets the noise does: it is that twin.
+            # The first sound record of a condition starts as the twin that sets the noise does:
+            # it is that twin.
             is_twin = name == sound and repeat == 0
             start = (
                 stream(seed, Stream.TWIN, condition)
@@ -160,7 +161,10 @@ def _unit_ids(unit: int, gearbox: int, specimen: int) -> dict[str, str]:
 
 
 def count_gearboxes(options: PlanOptions) -> int:
-    """Number of gearboxes, at most one a unit; about the square root of the units where it is not given."""
+    """Number of gearboxes, at most one a unit.
+
+    About the square root of the units where it is not given.
+    """
     if options.n_gearboxes is None:
         return min(options.n_units, round(math.sqrt(options.n_units)))
     return min(options.n_units, options.n_gearboxes)
@@ -206,7 +210,9 @@ def read_counts(config: Configuration) -> Counts:
 
 
 def _grid_size(config: Configuration, plan: PlanOptions) -> tuple[int, int]:
-    """Points of the grid over the conditions, and the least number that the grids of all faults divide."""
+    """Points of the grid over the conditions, and the least number that the grids of all faults
+    divide.
+    """
     for key, distribution in plan.vary.items():
         if distribution.n_levels is None and not distribution.names_levels:
             raise ConfigError(
@@ -227,7 +233,10 @@ def _fault_varies(config: Configuration) -> dict[str, dict[str, Distribution]]:
 
 
 def describe_design(config: Configuration) -> str:
-    """The design in words: of a grid the number of levels of each key, and the keys that are drawn all the same."""
+    """The design in words.
+
+    Of a grid the number of levels of each key, and the keys that are drawn all the same.
+    """
     plan = read_plan_options(config)
     if not plan.is_grid:
         return plan.design
@@ -243,7 +252,9 @@ def describe_design(config: Configuration) -> str:
 
 
 def _fitting(plan: PlanOptions, n_records: int, counts: tuple[int, ...]) -> int:
-    """The number of records that follows from the others, if ``plan.n_records`` has nothing against it."""
+    """The number of records that follows from the others, if ``plan.n_records`` has nothing
+    against it.
+    """
     names = ("units", "conditions", "faults", "classes", "repeats")
     product = " x ".join(
         f"{n:,} {name}" for n, name in zip((*counts, plan.n_repeats), names, strict=True) if n > 1
@@ -264,8 +275,8 @@ def _fitting(plan: PlanOptions, n_records: int, counts: tuple[int, ...]) -> int:
 class _Fault:
     """The fault of one row, with its sizes drawn.
 
-    ``is_sham`` keeps its label and gives it severity 0. The teeth of a row with a larger fault of the
-    same life need no check: ``is_checked`` is false.
+    ``is_sham`` keeps its label and gives it severity 0. The teeth of a row with a larger fault of
+    the same life need no check: ``is_checked`` is false.
     """
 
     plain: Mapping[str, Any]
@@ -302,7 +313,10 @@ def _row(
 
 
 def _as_plan(config: Configuration, rows: list[dict[str, Any]]) -> Plan:
-    """Rows to columns; a parameter that a record has not is NaN. The rows are emptied: nothing is held twice."""
+    """Rows to columns.
+
+    A parameter that a record has not is NaN. The rows are emptied: nothing is held twice.
+    """
     names: dict[str, None] = {}
     for row in rows:
         names.update(dict.fromkeys(row))
@@ -320,7 +334,8 @@ def records_per_shard(config: Configuration) -> int:
 
 
 def record_bytes(config: Configuration, *, as_stored: bool = False) -> int:
-    """Bytes of one record's samples, ``as_stored`` in the chosen type before compression, else in single precision.
+    """Bytes of one record's samples, ``as_stored`` in the chosen type before compression, else in
+    single precision.
 
     Shards are cut by the latter, so that how samples are stored does not change a plan.
     """

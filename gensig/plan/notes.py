@@ -11,7 +11,10 @@ BY_MACHINE = {"by_unit": "unit", "cross_specimen": "set of gears", "cross_gearbo
 
 
 def plan_notes(config: Configuration, plan: Plan) -> list[str]:
-    """At most one line: fewer units than asked for, and which splits by machine are not possible."""
+    """At most one line.
+
+    Fewer units than asked for, and which splits by machine are not possible.
+    """
     parts = [_units_left_out(config, plan), _splits_left_out(plan, config.seed)]
     return ["; ".join(part for part in parts if part)] if any(parts) else []
 
@@ -30,7 +33,9 @@ def _units_left_out(config: Configuration, plan: Plan) -> str:
 
 
 def _splits_left_out(plan: Plan, seed: int) -> str:
-    """The reason of the first protocol of the list, or, where whole units can be kept apart, of those that cannot."""
+    """The reason of the first protocol of the list, or, where whole units can be kept apart, of
+    those that cannot.
+    """
     reasons = why_left_out(plan, seed, tuple(BY_MACHINE))
     if "by_unit" in reasons:
         reasons = {"by_unit": reasons["by_unit"]}

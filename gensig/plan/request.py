@@ -31,9 +31,9 @@ class DerivedValueWarning(UserWarning):
 class Request:
     """A composed configuration and the overrides as typed.
 
-    ``classes`` of ``config`` maps every class of the plan to its fault option, so that the folder of
-    a data set needs no package to be understood. ``notes`` lists settings of the selected option that
-    an override replaced.
+    ``classes`` of ``config`` maps every class of the plan to its fault option, so that the folder
+    of a data set needs no package to be understood. ``notes`` lists settings of the selected
+    option that an override replaced.
     """
 
     config: Configuration
@@ -44,8 +44,9 @@ class Request:
 def read_request(overrides: Sequence[str], *, config_dir: str | Path | None = None) -> Request:
     """Compose the configuration for one job.
 
-    A ``fault.key=value`` is applied to every class of the plan whose option has that key, and pinned
-    there. The whole configuration is composed once; fault options of classes are composed alone.
+    A ``fault.key=value`` is applied to every class of the plan whose option has that key, and
+    pinned there. The whole configuration is composed once; fault options of classes are composed
+    alone.
 
     Raises
     ------
@@ -136,7 +137,8 @@ def _class_names(words: _Words, base: Mapping[str, Any]) -> list[str]:
 class _ClassFault:
     """Fault option of one class with the typed keys put in.
 
-    ``used`` are the typed keys that the option has, ``pinned`` those that its ``vary`` no longer draws.
+    ``used`` are the typed keys that the option has, ``pinned`` those that its ``vary`` no longer
+    draws.
     """
 
     option: dict[str, Any]
@@ -147,7 +149,10 @@ class _ClassFault:
 def _class_fault(
     words: _Words, name: str | None, option: dict[str, Any], config_dir: str | Path | None
 ) -> _ClassFault:
-    """A fault option with the typed keys that it has; ``name`` None for that of the whole configuration."""
+    """A fault option with the typed keys that it has.
+
+    ``name`` None for that of the whole configuration.
+    """
     typed = {key: word for key, word in words.fault_words.items() if key.split(".")[1] in option}
     typed.pop("fault.vary", None)
     if typed:
@@ -168,10 +173,10 @@ def _fault_option(
 ) -> dict[str, Any]:
     """A fault option by its name, with words that its keys are given by.
 
-    Its file is composed alone, which takes a third of the time. The whole configuration is composed
-    where the name is not known, where an experiment sets keys of the fault, and where composing alone
-    fails: for an option of one's own that refers to another group, and for its message where no such
-    option exists.
+    Its file is composed alone, which takes a third of the time. The whole configuration is
+    composed where the name is not known, where an experiment sets keys of the fault, and where
+    composing alone fails: for an option of one's own that refers to another group, and for its
+    message where no such option exists.
     """
     removed = tuple(word for word in words.others if word.startswith("~fault."))
     if name is not None and not _experiment_sets_fault(words.keys.get("experiment"), config_dir):
@@ -209,7 +214,10 @@ def _packaged_option(name: str, words: tuple[str, ...]) -> dict[str, Any]:
 def _with_whole_parts(
     fault: dict[str, Any], words: _Words, config_dir: str | Path | None
 ) -> dict[str, Any]:
-    """A compound fault whose parts have every key: what a part leaves out is its kind's option, ``vary`` included."""
+    """A compound fault whose parts have every key.
+
+    What a part leaves out is its kind's option, ``vary`` included.
+    """
     if fault["kind"] != COMPOUND:
         return fault
     parts = []
@@ -275,7 +283,9 @@ def _no_such_fault_key(key: str, selected: Mapping[str, Any]) -> str:
 
 
 def _reset_derived(gear: dict[str, Any], touched: set[str]) -> None:
-    """Derive mass and inertia anew where teeth, module or width are no longer those the source weighed."""
+    """Derive mass and inertia anew where teeth, module or width are no longer those the source
+    weighed.
+    """
     for side in SIDES:
         changed = sorted(
             touched

@@ -1,4 +1,6 @@
-"""The same machine with and without a fault, side by side, over a map of speeds and torques and several units."""
+"""The same machine with and without a fault, side by side, over a map of speeds and torques and
+several units.
+"""
 
 from __future__ import annotations
 
@@ -92,7 +94,9 @@ class FaultPairs:
         return len(self.speeds_rpm) * len(self.torques_nm)
 
     def cell(self, place: int) -> PairCell:
-        """Simulate the cell of speed ``place // len(torques_nm)`` and torque ``place % len(torques_nm)``."""
+        """Simulate the cell of speed ``place // len(torques_nm)`` and torque ``place %
+        len(torques_nm)``.
+        """
         rows = self.rows[place * self.n_units : (place + 1) * self.n_units]
         sound, faulty = _contrasts(self.config, rows)
         motions = simulate_motions([*sound, *faulty])
@@ -220,7 +224,9 @@ def _levels(
 def _planned(
     config: Configuration, speeds: Sequence[float], torques: Sequence[float], n_units: int
 ) -> tuple[Configuration, list[dict[str, Any]]]:
-    """The configuration with a plan of one row a cell and unit, and those rows, each unit in a gearbox of its own."""
+    """The configuration with a plan of one row a cell and unit, and those rows, each unit in a
+    gearbox of its own.
+    """
     plan = read_plan_options(config)
     n_gearboxes = n_units if plan.n_gearboxes is None else plan.n_gearboxes
     config = config.with_keys(
@@ -249,7 +255,8 @@ def _planned(
 def _contrasts(
     config: Configuration, rows: Sequence[Row]
 ) -> tuple[list[RecordInputs], list[RecordInputs]]:
-    """Each row without and with its fault, from the start of the healthy twin that sets the noise of a data set.
+    """Each row without and with its fault, from the start of the healthy twin that sets the noise
+    of a data set.
 
     Both are records: their nuisances and noise are those of the row.
     """
@@ -280,7 +287,9 @@ def _power_at_set_point(config: Configuration, n_units: int) -> Array:
 
 
 def _noise_shape(config: Configuration, rows: Sequence[Row]) -> Array:
-    """Density of each unit's noise at power 1, averaged over draws and neighbouring bins, (unit, channel, bin)."""
+    """Density of each unit's noise at power 1, averaged over draws and neighbouring bins, (unit,
+    channel, bin).
+    """
     reader = InputReader(config)
     densities = []
     for unit, row in enumerate(rows):

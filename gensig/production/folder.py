@@ -67,7 +67,10 @@ class Progress:
 
 
 def begin_folder(config: Configuration, overrides: Sequence[str], out: Path) -> Plan:
-    """Plan a data set and make its folder, ready for ``run_folder``; nothing is touched if anything is wrong."""
+    """Plan a data set and make its folder, ready for ``run_folder``.
+
+    Nothing is touched if anything is wrong.
+    """
     for key, allowed in (("compression", COMPRESSIONS), ("sample_type", SAMPLE_TYPES)):
         if config["dataset"][key] not in allowed:
             raise ConfigError(
@@ -99,7 +102,8 @@ def run_folder(
     on_shard: Callable[[Progress], None],
     asked: Configuration | None = None,
 ) -> tuple[int, list[str]]:
-    """Make the shards that a folder still lacks, then close it; a task of an array job makes its share only.
+    """Make the shards that a folder still lacks, then close it; a task of an array job makes its
+    share only.
 
     Parameters
     ----------
@@ -191,7 +195,8 @@ def _is_there(out: Path, index: int, entry: ShardEntry) -> bool:
 
 
 def close_folder(out: Path) -> int:
-    """Close a folder whose shards were made by tasks of an array job; returns the number of failed records.
+    """Close a folder whose shards were made by tasks of an array job; returns the number of
+    failed records.
 
     Raises
     ------
@@ -220,7 +225,8 @@ class WrittenShard:
 
 
 def write_shard(out: Path, shard_index: int) -> WrittenShard:
-    """Simulate and write one shard of a folder; its bits depend on nothing but the folder's plan and configuration.
+    """Simulate and write one shard of a folder; its bits depend on nothing but the folder's plan
+    and configuration.
 
     Raises
     ------
@@ -244,7 +250,9 @@ def write_shard(out: Path, shard_index: int) -> WrittenShard:
 
 @functools.lru_cache(maxsize=1)
 def _folder_inputs(out: Path, _changed: int) -> tuple[Configuration, PlanRows, list[int]]:
-    """Configuration, plan and records of each shard, read once by a process that makes many shards of one folder."""
+    """Configuration, plan and records of each shard, read once by a process that makes many
+    shards of one folder.
+    """
     manifest, config = joined_folder(out)
     return Configuration(config), PlanRows(out / PLAN), [entry.rows for entry in manifest.shards]
 

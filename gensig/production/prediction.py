@@ -19,7 +19,8 @@ from gensig.plan.notes import n_different
 from gensig.production.folder import block_length, open_shard
 from gensig.record.simulate import Record, forget_twins, simulate_records
 
-# Bytes beside shards and plan: index, cards and configuration; more for each shard, record (splits) and class (figure).
+# Bytes beside shards and plan: index, cards and configuration; more for each shard, record
+# (splits) and class (figure).
 BESIDE, BESIDE_A_SHARD, BESIDE_A_RECORD, BESIDE_A_CLASS = 42_000, 3_000, 380, 40_000
 
 CLOSING = 2.0  # s for index, cards and figures, most of it the import of matplotlib
@@ -34,8 +35,9 @@ def predict(
 ) -> dict[str, str]:
     """Facts of a data set that is not made yet, by name, as text.
 
-    A block of its first records is simulated and stored in a temporary folder. Time is that of a machine like this one
-    with as many workers; start-up is counted for the workers of this machine.
+    A block of its first records is simulated and stored in a temporary folder. Time is that of a
+    machine like this one with as many workers; start-up is counted for the workers of this
+    machine.
 
     Parameters
     ----------

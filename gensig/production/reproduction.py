@@ -62,8 +62,9 @@ class Reproduction:
 def reproduce(folder: Path, n_records: int) -> Reproduction:
     """Simulate records spread over a data set again and compare their samples with those on disk.
 
-    In the environment that made the data set every bit must agree. On another processor, or with other versions of the
-    libraries, ``ACCEPTED`` of the record's RMS is, and one count more where samples are stored as counts.
+    In the environment that made the data set every bit must agree. On another processor, or with
+    other versions of the libraries, ``ACCEPTED`` of the record's RMS is, and one count more where
+    samples are stored as counts.
 
     Raises
     ------
@@ -118,7 +119,8 @@ def recorded_row(folder: Path, record: str) -> tuple[Configuration, dict[str, An
 def simulate_twin(config: Configuration, row: Mapping[str, Any]) -> Record:
     """The record without its faults: same unit, condition, start and noise, severity zero.
 
-    The original less its twin is the residual of the fault, exact but for the rounding of stored samples.
+    The original less its twin is the residual of the fault, exact but for the rounding of stored
+    samples.
 
     Raises
     ------
@@ -160,7 +162,9 @@ def _finished(folder: Path) -> tuple[Manifest, Configuration, Plan]:
 
 
 def _difference(folder: Path, row: Mapping[str, Any], record: Record) -> tuple[float, float]:
-    """Largest difference of a sample over the RMS of its channel, and what one count is on that scale."""
+    """Largest difference of a sample over the RMS of its channel, and what one count is on that
+    scale.
+    """
     path, place = shard_path(folder, int(row["shard"])), int(row["row"])
     largest, count = 0.0, 0.0
     with open_shard(path, folder=folder) as file:
@@ -190,7 +194,10 @@ def _difference(folder: Path, row: Mapping[str, Any], record: Record) -> tuple[f
 
 
 def _other_difference(stored: NDArray[Any], made: NDArray[Any]) -> float:
-    """Largest difference of anything else over the RMS of its values; infinite where whole numbers differ."""
+    """Largest difference of anything else over the RMS of its values.
+
+    Infinite where whole numbers differ.
+    """
     made = made.astype(stored.dtype)
     if stored.dtype.kind in "iu":
         return 0.0 if np.array_equal(stored, made) else np.inf

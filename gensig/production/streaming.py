@@ -1,4 +1,7 @@
-"""A data set that is never stored: its records, made when they are asked for, bit for bit those of ``generate``."""
+"""A data set that is never stored.
+
+Its records, made when they are asked for, bit for bit those of ``generate``.
+"""
 
 from __future__ import annotations
 
@@ -26,10 +29,12 @@ EPOCH_STREAM = 9100  # spawn key of the seeds of later epochs; the causes of a r
 
 @dataclass(frozen=True, slots=True, kw_only=True, eq=False, repr=False)
 class RecordStream:
-    """The records of one plan, or a part of them, simulated while one iterates; made by ``gensig.stream``.
+    """The records of one plan, or a part of them, simulated while one iterates; made by
+    ``gensig.stream``.
 
-    Holds plain data only, so that it can be pickled, forked and spawned. A record has ``signals`` and ``values`` by
-    the names that a shard has, every column and array with the bits that ``gensig generate`` would store.
+    Holds plain data only, so that it can be pickled, forked and spawned. A record has ``signals``
+    and ``values`` by the names that a shard has, every column and array with the bits that
+    ``gensig generate`` would store.
 
     Attributes
     ----------
@@ -38,9 +43,9 @@ class RecordStream:
     plan : Plan                 all records of the epoch
     numbers : (record,) int     records of this part, by their number in the plan
 
-    Epoch ``k`` of root seed ``s`` is the data set of ``seed``: ``s`` itself for epoch 0, else the 53 high bits of
-    ``SeedSequence(s, spawn_key=(9100, k))``. Everything is drawn anew, units included: ``unit-0000`` of two epochs
-    are different gears.
+    Epoch ``k`` of root seed ``s`` is the data set of ``seed``: ``s`` itself for epoch 0, else the
+    53 high bits of ``SeedSequence(s, spawn_key=(9100, k))``. Everything is drawn anew, units
+    included: ``unit-0000`` of two epochs are different gears.
     """
 
     config: Configuration
@@ -80,7 +85,10 @@ class RecordStream:
 
     @property
     def usable(self) -> NDArray[np.bool_]:
-        """(record,) True: which records fail is known only when they are made; see their ``status``."""
+        """(record,) True: which records fail is known only when they are made.
+
+        See their ``status``.
+        """
         return np.ones(len(self), dtype=bool)
 
     @property
@@ -102,7 +110,9 @@ class RecordStream:
         return sorted(make_splits(self.plan, self.seed))
 
     def split(self, protocol: str) -> dict[str, list[tuple[int, float, float]]]:
-        """Subset -> list of (place in this part, start_fraction, stop_fraction), as the stored data set has it."""
+        """Subset -> list of (place in this part, start_fraction, stop_fraction), as the stored
+        data set has it.
+        """
         tables = make_splits(self.plan, self.seed)
         if protocol not in tables:
             reason = why_left_out(self.plan, self.seed).get(
@@ -126,9 +136,11 @@ class RecordStream:
         )
 
     def shard(self, index: int, count: int) -> RecordStream:
-        """The part of worker ``index`` of ``count``; together they are the whole, and no record is in two of them.
+        """The part of worker ``index`` of ``count``; together they are the whole, and no record
+        is in two of them.
 
-        Conditions are dealt in turn, each whole: its records share the simulation of their healthy twin.
+        Conditions are dealt in turn, each whole: its records share the simulation of their
+        healthy twin.
         """
         whole_number("count", count, at_least=1)
         if whole_number("index", index, at_least=0) >= count:
@@ -170,7 +182,8 @@ class RecordStream:
 
 
 def open_stream(config: Configuration, *, epoch: int = 0) -> RecordStream:
-    """All records of a composed configuration; ``out``, ``executor`` and how samples are stored change nothing.
+    """All records of a composed configuration; ``out``, ``executor`` and how samples are stored
+    change nothing.
 
     Raises
     ------
@@ -183,7 +196,10 @@ def open_stream(config: Configuration, *, epoch: int = 0) -> RecordStream:
 
 
 def epoch_seed(seed: int, epoch: int) -> int:
-    """Seed of one epoch, a whole number that every JSON reader takes exactly; see ``RecordStream``."""
+    """Seed of one epoch, a whole number that every JSON reader takes exactly.
+
+    See ``RecordStream``.
+    """
     if whole_number("epoch", epoch, at_least=0) == 0:
         return seed
     sequence = np.random.SeedSequence(seed, spawn_key=(EPOCH_STREAM, epoch))
@@ -200,7 +216,9 @@ def _simulate(config: Configuration, rows: Sequence[Mapping[str, Any]]) -> list[
 
 
 def _as_stored(record: Record) -> Record:
-    """The record with the values that a shard fills in, and its reason as long as a shard holds it."""
+    """The record with the values that a shard fills in, and its reason as long as a shard holds
+    it.
+    """
     values = {**DEFAULTS, **record.values}
     values["status_reason"] = stored_reason(values["status_reason"])
     return replace(record, values=values)

@@ -77,7 +77,9 @@ class RecordNumbers:
 
     @classmethod
     def of(cls, row: Row) -> RecordNumbers:
-        """The numbers that the ids of a row end in, such as 3 of ``gearbox-0003`` and 7 of ``r000007``."""
+        """The numbers that the ids of a row end in, such as 3 of ``gearbox-0003`` and 7 of
+        ``r000007``.
+        """
         return cls(
             **{name: _number(row[f"{name}_id"]) for name in (RECORD, CONDITION, GEARBOX, SPECIMEN)}
         )
@@ -124,7 +126,10 @@ class RecordInputs:
         return replace(self, run=replace(self.run, start=start))
 
     def healthy_twin(self) -> RecordInputs:
-        """The sound record that sets the noise of the condition; it starts as no row of the plan decides."""
+        """The sound record that sets the noise of the condition.
+
+        It starts as no row of the plan decides.
+        """
         run = replace(
             self.run,
             faults=(),
@@ -134,10 +139,11 @@ class RecordInputs:
         return replace(self, run=run, is_reference=True)
 
     def nuisance_streams(self) -> tuple[dict[str, np.random.Generator], np.random.Generator]:
-        """Generators of the nuisances of gearbox and specimen, and of the angles that no tooth fixes.
+        """Generators of the nuisances of gearbox and specimen, and of the angles that no tooth
+        fixes.
 
-        Those angles are drawn for the record. Those of the twin are drawn for its condition, so that
-        they do not depend on which record asks for it first.
+        Those angles are drawn for the record. Those of the twin are drawn for its condition, so
+        that they do not depend on which record asks for it first.
         """
         units = {
             level: stream(self.seed, Stream.NUISANCE, getattr(self.numbers, level))
@@ -164,10 +170,11 @@ class RecordInputs:
         }
 
     def noisy_twin(self, clean: Array, noise_power: Array) -> Array:
-        """Output of the sensors on the machine without faults, with drift, noise and losses of its own.
+        """Output of the sensors on the machine without faults, with drift, noise and losses of
+        its own.
 
-        ``clean`` (sensor, sample) m/s2 is before drift. No draw is shared with the record: else their
-        difference would be free of noise.
+        ``clean`` (sensor, sample) m/s2 is before drift. No draw is shared with the record: else
+        their difference would be free of noise.
         """
         drift, noise, dropped = self.stream(Stream.HEALTHY_TWIN).spawn(3)
         drifted = clean * self.instrument.drift(clean.shape[1], drift)
@@ -175,14 +182,18 @@ class RecordInputs:
         return self.instrument.sent(noisy, dropped)[0]
 
     def shaft_signals(self, record: CleanRecord | None) -> dict[str, NDArray[Any]]:
-        """Signals of the sensors on the shafts, as far as they are stored; NaN for a failed record."""
+        """Signals of the sensors on the shafts, as far as they are stored.
+
+        NaN for a failed record.
+        """
         start = self.run.start or Start(tooth_pinion=0, tooth_wheel=0, phase=0.0)
         generators = (self.stream(Stream.ENCODER), self.stream(Stream.TACHO))
         return shaft_signals(self.dataset.shaft_signals, self.machine, start, record, *generators)
 
 
 def simulate_motions(inputs: Sequence[RecordInputs]) -> list[CleanRecord | SimulationError]:
-    """Accelerations at the bearings, nuisances included, side by side; an error in place of a failed one.
+    """Accelerations at the bearings, nuisances included, side by side; an error in place of a
+    failed one.
 
     A record's bits do not depend on what it is simulated beside.
     """
@@ -200,7 +211,10 @@ def _with_nuisances(
 
 
 class InputReader:
-    """Makes the inputs of the records of one configuration; records of a condition share their machine."""
+    """Makes the inputs of the records of one configuration.
+
+    Records of a condition share their machine.
+    """
 
     def __init__(self, config: Configuration) -> None:
         self.config = config
@@ -268,7 +282,10 @@ def row_faults(row: Row) -> list[Fault]:
 
 
 def twin_start(machine: Machine, rng: np.random.Generator) -> Start:
-    """Start of the healthy twin of a unit at a condition; ``rng`` is the condition's stream TWIN."""
+    """Start of the healthy twin of a unit at a condition.
+
+    ``rng`` is the condition's stream TWIN.
+    """
     tooth = int(rng.integers(machine.pair.pinion.n_teeth))
     return Start(
         tooth_pinion=tooth,

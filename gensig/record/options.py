@@ -17,8 +17,8 @@ PREFIX = "store_"
 class DatasetOptions:
     """Signals that a data set stores, and how its shards hold them.
 
-    ``records_per_shard`` None means about 64 MB of samples. Each ``store_`` switch adds signals; see
-    ``configs/generate.yaml``.
+    ``records_per_shard`` None means about 64 MB of samples. Each ``store_`` switch adds signals;
+    see ``configs/generate.yaml``.
     """
 
     records_per_shard: int | None

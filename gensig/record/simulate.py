@@ -1,4 +1,7 @@
-"""One record: from a row of the plan to arrays and values, by the configuration and the row alone."""
+"""One record.
+
+From a row of the plan to arrays and values, by the configuration and the row alone.
+"""
 
 from __future__ import annotations
 
@@ -29,7 +32,10 @@ Signals = dict[str, NDArray[Any]]
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Record:
-    """One finished record: arrays by signal name and values by column name, as a shard takes them."""
+    """One finished record.
+
+    Arrays by signal name and values by column name, as a shard takes them.
+    """
 
     signals: Signals
     values: dict[str, Any]
@@ -75,7 +81,8 @@ class _Measured:
     """A simulated motion with what its record is made of.
 
     ``sound`` is the motion of the same record without its faults, None where it is not needed;
-    ``twin_power`` the power of the healthy twin at the sensors, None where noise does not follow it.
+    ``twin_power`` the power of the healthy twin at the sensors, None where noise does not follow
+    it.
     """
 
     inputs: RecordInputs
@@ -84,7 +91,10 @@ class _Measured:
     twin_power: Array | SimulationError | None
 
     def noise_power(self, signal: Array) -> Array:
-        """Mean square of the noise that a signal gets, (sensor,); raises the error of a failed twin."""
+        """Mean square of the noise that a signal gets, (sensor,).
+
+        Raises the error of a failed twin.
+        """
         instrument = self.inputs.instrument
         sensing = instrument.sensing
         if sensing.snr is None:
@@ -98,7 +108,10 @@ class _Measured:
         return reference * sensing.noise_factor(sensing.snr)
 
     def healthy_twin(self) -> Array:
-        """Output of the sensors on the same record without its faults; nothing in it depends on the fault."""
+        """Output of the sensors on the same record without its faults.
+
+        Nothing in it depends on the fault.
+        """
         if isinstance(self.sound, SimulationError):
             raise self.sound
         assert self.sound is not None

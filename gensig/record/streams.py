@@ -1,4 +1,7 @@
-"""Random streams of a data set: one for each cause, so that changing one cause leaves the others alone."""
+"""Random streams of a data set.
+
+One for each cause, so that changing one cause leaves the others alone.
+"""
 
 from __future__ import annotations
 

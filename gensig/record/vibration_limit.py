@@ -1,4 +1,6 @@
-"""Depth of wear at which the vibration of a machine reaches a limit, from clean records of worn flanks."""
+"""Depth of wear at which the vibration of a machine reaches a limit, from clean records of worn
+flanks.
+"""
 
 from __future__ import annotations
 
@@ -83,7 +85,10 @@ class _Bench:
         return [sensor for sensor, name in enumerate(names) if channel_unit(name) == "m/s^2"]
 
     def rms(self, depths: Sequence[Array]) -> Array:
-        """RMS of clean records with (2, slice, node) m off the flanks, (depth, sensor) m/s2; NaN for failed ones."""
+        """RMS of clean records with (2, slice, node) m off the flanks, (depth, sensor) m/s2.
+
+        NaN for failed ones.
+        """
         levels = np.full((len(depths), len(self.heard)), np.nan)
         motions = simulate_motions([self._worn_by(depth) for depth in depths])
         for k, motion in enumerate(motions):
@@ -93,7 +98,10 @@ class _Bench:
         return levels
 
     def _worn_by(self, depth: Array) -> RecordInputs:
-        """The same record with flanks worn to a depth; its fault passes through text as those of a plan do."""
+        """The same record with flanks worn to a depth.
+
+        Its fault passes through text as those of a plan do.
+        """
         if not depth.any():
             return self.sound
         parts = json.loads(json.dumps(fault_parts(wear_fault(self.case, depth))))
@@ -104,14 +112,16 @@ class _Bench:
 def limited_by_vibration(
     case: WearCase, config: Configuration
 ) -> tuple[WearCase, WornVibration | None]:
-    """A case whose threshold is the depth at which the machine of its configuration reaches a limit of vibration.
+    """A case whose threshold is the depth at which the machine of its configuration reaches a
+    limit of vibration.
 
-    The case as it was, and None, where ``wear`` sets no such limit; the case as it was where the life to its threshold
-    ends below the limit.
+    The case as it was, and None, where ``wear`` sets no such limit; the case as it was where the
+    life to its threshold ends below the limit.
 
-    The flanks wear under the case's torque. At ``N_LOOKS`` times the machine is simulated with the flanks as they are
-    then; between the first look at the limit or above and the one before, the root is found by Brent's method, of at
-    most ``MOST_STEPS`` records. A limit that is passed and left again between two looks goes unseen.
+    The flanks wear under the case's torque. At ``N_LOOKS`` times the machine is simulated with
+    the flanks as they are then; between the first look at the limit or above and the one before,
+    the root is found by Brent's method, of at most ``MOST_STEPS`` records. A limit that is passed
+    and left again between two looks goes unseen.
 
     Raises
     ------
@@ -183,7 +193,10 @@ def _worn(life: WearLife, turn: float) -> Array:
 
 
 def _share_of_limit(options: WearOptions, rms: Array, new: Array) -> float:
-    """The loudest sensor over the limit, or the one that rose most over the rise; the larger where both are set."""
+    """The loudest sensor over the limit, or the one that rose most over the rise.
+
+    The larger where both are set.
+    """
     shares = []
     if options.vibration_limit_m_per_s2 is not None:
         shares.append(float(rms.max()) / options.vibration_limit_m_per_s2)

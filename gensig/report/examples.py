@@ -1,4 +1,7 @@
-"""The records that the page shows: which, and their waveform, spectrum, envelope spectrum and spectrogram."""
+"""The records that the page shows.
+
+Which, and their waveform, spectrum, envelope spectrum and spectrogram.
+"""
 
 from __future__ import annotations
 
@@ -29,7 +32,8 @@ SPECTRUM_SAMPLES = (
 SPECTRUM_BINS = 20_000
 ENVELOPE_BINS = 4000
 ENVELOPE_MESHES = 3.2  # the envelope spectrum ends above the third harmonic of the mesh
-# above the lower mesh harmonics, below the highest usable frequency, as `gensig simulate --plot` takes it
+# above the lower mesh harmonics, below the highest usable frequency, as `gensig simulate --plot`
+# takes it
 ENVELOPE_BAND = (5000.0 / 51200.0, 19000.0 / 51200.0)  # of the sampling rate
 WINDOW_SAMPLES = 256  # of the spectrogram
 SPECTROGRAM_COLUMNS = 96
@@ -37,7 +41,9 @@ SPECTROGRAM_COLUMNS = 96
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Choice:
-    """Records (by number) and channels (by name) that are shown, and one line on what was left out, or ""."""
+    """Records (by number) and channels (by name) that are shown, and one line on what was left
+    out, or "".
+    """
 
     records: dict[str, list[int]]
     channels: list[str]
@@ -50,7 +56,8 @@ class Choice:
 
 
 def choose(data: Dataset, per_class: int | None) -> Choice:
-    """Usable records of each class, from the least to the greatest severity; sound ones of the same machines.
+    """Usable records of each class, from the least to the greatest severity; sound ones of the
+    same machines.
 
     Parameters
     ----------
@@ -86,7 +93,10 @@ def choose(data: Dataset, per_class: int | None) -> Choice:
 
 
 def _spread(data: Dataset, name: str, n_shown: int) -> list[int]:
-    """Records of a class at even steps of the rank of their severity; those of one life where there are lives."""
+    """Records of a class at even steps of the rank of their severity.
+
+    Those of one life where there are lives.
+    """
     mine = np.flatnonzero((data.column("label_name") == name) & data.usable)
     mine = mine[np.argsort(data.column("severity")[mine], kind="stable")]
     if has_lives(data):  # the machine that gets worst, from its beginning
@@ -96,7 +106,9 @@ def _spread(data: Dataset, name: str, n_shown: int) -> list[int]:
 
 
 def _sound(data: Dataset, faulty: Sequence[Sequence[int]], n_shown: int) -> list[int]:
-    """Healthy records at the conditions of the middle records of other classes, the first named first; then any."""
+    """Healthy records at the conditions of the middle records of other classes, the first named
+    first; then any.
+    """
     condition, unit = data.column("condition_id"), data.column("unit_id")
     sound = np.flatnonzero((data.column("label_name") == "healthy") & data.usable)
     found: list[int] = []
@@ -186,7 +198,10 @@ def _views(signal: FloatArray, rate: float, top: float, mesh: float | None) -> d
 def _lines(
     frequency: FloatArray, amplitude: FloatArray, top: float, most: int, first: int = 0
 ) -> dict[str, Any]:
-    """A spectrum from the bin `first` up to `top` Hz; of more bins than `most`, the largest of each few."""
+    """A spectrum from the bin `first` up to `top` Hz.
+
+    Of more bins than `most`, the largest of each few.
+    """
     amplitude = amplitude[
         first : max(int(np.searchsorted(frequency, top, side="right")), first + 2)
     ]

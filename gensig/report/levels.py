@@ -1,4 +1,7 @@
-"""How loud the records are, in the units of machine monitoring: what to hold beside a machine of one's own."""
+"""How loud the records are, in the units of machine monitoring.
+
+What to hold beside a machine of one's own.
+"""
 
 from __future__ import annotations
 
@@ -26,7 +29,8 @@ LOUD_ACCELERATION = 10.0 * STANDARD_GRAVITY  # assumed: published housings of so
 def velocity_rms(signal: FloatArray, sampling_rate: float) -> FloatArray:
     """RMS velocity in `BAND`, m/s, (channel,), of accelerations in m/s^2, (channel, sample).
 
-    Integrated in the spectrum, under a Hann window so that the steps at the ends do not leak into low frequencies.
+    Integrated in the spectrum, under a Hann window so that the steps at the ends do not leak into
+    low frequencies.
     """
     from scipy.signal import periodogram
 
@@ -57,7 +61,10 @@ def level_table(
 def loudness(
     data: Dataset, measured: Measured, channels: Sequence[str], units: Sequence[str]
 ) -> list[str]:
-    """One sentence where a level is beyond what housings of machines in service show; empty elsewhere."""
+    """One sentence where a level is beyond what housings of machines in service show.
+
+    Empty elsewhere.
+    """
     medians = _medians(data, measured, channels, units)
     loud = [row for row in medians if row[2] > LOUD_ACCELERATION or row[3] > HARMFUL_VELOCITY]
     if not loud:

@@ -1,7 +1,7 @@
 """How the records lie beside published measurements, as far as any data set allows it.
 
-``python -m benchmarks.realism`` is the whole comparison, with records made for it; here are those of its quantities
-that need no pair of records at the same set-points, or find one.
+``python -m benchmarks.realism`` is the whole comparison, with records made for it; here are those
+of its quantities that need no pair of records at the same set-points, or find one.
 """
 
 from __future__ import annotations
@@ -22,7 +22,10 @@ ALL, ELSEWHERE = "all conditions", "elsewhere"
 
 
 def at_measured_rate(signal: FloatArray, sampling_rate: float) -> dict[str, FloatArray]:
-    """RMS and kurtosis of the band that the measured records have; signal (channel, sample), results (channel,)."""
+    """RMS and kurtosis of the band that the measured records have.
+
+    Signal (channel, sample), results (channel,).
+    """
     if sampling_rate < RATE:
         unknown = np.full(signal.shape[0], np.nan)
         return {"rms_5_khz": unknown, "kurtosis_5_khz": unknown}

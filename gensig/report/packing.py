@@ -1,4 +1,7 @@
-"""Long rows of numbers as short text: base64 of little-endian bytes, which the page's script unpacks."""
+"""Long rows of numbers as short text.
+
+Base64 of little-endian bytes, which the page's script unpacks.
+"""
 
 from __future__ import annotations
 
@@ -32,7 +35,8 @@ def pack_signal(signal: NDArray[np.floating]) -> dict[str, Any]:
 
 
 def pack_amplitude(amplitude: NDArray[np.floating]) -> dict[str, Any]:
-    """Amplitudes as bytes: 255 is the largest, `top`, and each count less `STEP_DB` lower; 0 is all below.
+    """Amplitudes as bytes: 255 is the largest, `top`, and each count less `STEP_DB` lower; 0 is
+    all below.
 
     Parameters
     ----------

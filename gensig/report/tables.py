@@ -1,4 +1,7 @@
-"""Sections of the page that are text and tables: what there is, splits, where it is from, how it is loaded."""
+"""Sections of the page that are text and tables.
+
+What there is, splits, where it is from, how it is loaded.
+"""
 
 from __future__ import annotations
 

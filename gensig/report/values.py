@@ -99,7 +99,9 @@ def drawn_columns(data: Dataset, records: NDArray[np.intp]) -> list[str]:
 
 
 def column_label(name: str) -> str:
-    """A column in words with its unit, such as 'fault.crack_depth_mm' of a parameter, 'torque, N m'."""
+    """A column in words with its unit, such as 'fault.crack_depth_mm' of a parameter, 'torque, N
+    m'.
+    """
     if name.startswith(f"{PARAMS}/"):
         return name.removeprefix(f"{PARAMS}/")
     unit = COLUMNS[name].unit if name in COLUMNS else ""
@@ -161,7 +163,10 @@ def _of_turns(
     n_teeth: dict[str, int],
     index: int,
 ) -> dict[str, FloatArray]:
-    """Indicators of the average turn; NaN where the record holds no whole turn, or no speed is known."""
+    """Indicators of the average turn.
+
+    NaN where the record holds no whole turn, or no speed is known.
+    """
     names = (f"fm4_{gear}", f"sideband_ratio_{gear}")
     unknown = np.full(x.shape[0], np.nan)
     if gear not in turns or not turns[gear][index] > 0.0:
@@ -180,7 +185,10 @@ def has_lives(data: Dataset) -> bool:
 
 
 def life_table(data: Dataset) -> dict[str, Any]:
-    """Whole lives, as many as `MOST_ROWS` records are: snapshots in the order of time, beside their life's number."""
+    """Whole lives, as many as `MOST_ROWS` records are.
+
+    Snapshots in the order of time, beside their life's number.
+    """
     names = data.column("life_id")
     _, first = np.unique(names, return_index=True)
     lives = names[np.sort(first)].tolist()

@@ -22,10 +22,11 @@ LONGEST_LOW = 0.1  # s
 class Accelerometer:
     """Properties of all sensors of a data set; null or 0 leaves one out.
 
-    ``sensitivity_tolerance`` and ``transverse_sensitivity`` are the largest shares, ``dc_offset_m_per_s2`` the largest
-    offset; each sensor of a gearbox has its own. A record whose share of samples at the ends of the converter's range
-    is above ``max_clipped_fraction`` is marked. Gains drift over a record by ``drift_scatter``, see ``drift``; samples
-    get lost in runs of ``dropped_run_samples``, see ``dropped``.
+    ``sensitivity_tolerance`` and ``transverse_sensitivity`` are the largest shares,
+    ``dc_offset_m_per_s2`` the largest offset; each sensor of a gearbox has its own. A record
+    whose share of samples at the ends of the converter's range is above ``max_clipped_fraction``
+    is marked. Gains drift over a record by ``drift_scatter``, see ``drift``; samples get lost in
+    runs of ``dropped_run_samples``, see ``dropped``.
     """
 
     sensitivity_tolerance: float
@@ -105,7 +106,8 @@ class Accelerometer:
     def memory(self) -> float:
         """Time in which filters settle, s; 0 where nothing is filtered.
 
-        The low cut-off would take long, but has little to settle from: accelerations hold next to nothing so low.
+        The low cut-off would take long, but has little to settle from: accelerations hold next to
+        nothing so low.
         """
         slowest = 0.0 if self.low_cutoff is None else SETTLED / (2.0 * math.pi * self.low_cutoff)
         return max(min(slowest, LONGEST_LOW), self.memory_of_resonance)
@@ -120,8 +122,9 @@ class Accelerometer:
     def filtered(self, signal: Array, sampling_rate: float) -> Array:
         """Mounted resonance and low cut-off, (sensor, sample).
 
-        The resonance may lie above half the sampling rate, where no recursive filter has it: the spectrum is multiplied
-        by w^2 / (w^2 - W^2 + 2 i zeta w W), exact at every frequency that the signal has.
+        The resonance may lie above half the sampling rate, where no recursive filter has it: the
+        spectrum is multiplied by w^2 / (w^2 - W^2 + 2 i zeta w W), exact at every frequency that
+        the signal has.
         """
         from scipy.signal import butter, sosfilt
 
@@ -146,7 +149,10 @@ class Accelerometer:
         return signal
 
     def digitised(self, signal: Array) -> tuple[Array, float]:
-        """What the converter gives, and the share of samples that lie outside its range; (sensor, sample)."""
+        """What the converter gives, and the share of samples that lie outside its range.
+
+        (sensor, sample).
+        """
         if self.adc_range_m_per_s2 is None or self.adc_bits is None:
             return signal, 0.0
         half = 2 ** (self.adc_bits - 1)
@@ -158,7 +164,10 @@ class Accelerometer:
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class SensorSet:
-    """The sensors of one gearbox, (sensor,) each: gain, share of the transverse motion, offset in m/s2."""
+    """The sensors of one gearbox, (sensor,) each.
+
+    Gain, share of the transverse motion, offset in m/s2.
+    """
 
     gain: Array
     transverse: Array

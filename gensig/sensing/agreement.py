@@ -1,8 +1,9 @@
 """How far two solutions of one motion agree in what people use of them.
 
-Point values of teeth that bounce mean little: a landing that comes later by a microsecond changes every sample after
-it, and nothing that anybody measures. Where bouncing is chaotic, no two solutions follow each other at any step; they
-are samples of one random process, and narrow bands differ: those of noise by 8.6 dB over the root of width x duration.
+Point values of teeth that bounce mean little: a landing that comes later by a microsecond changes
+every sample after it, and nothing that anybody measures. Where bouncing is chaotic, no two
+solutions follow each other at any step; they are samples of one random process, and narrow bands
+differ: those of noise by 8.6 dB over the root of width x duration.
 """
 
 from __future__ import annotations
@@ -29,8 +30,9 @@ LOWEST_BAND = -17  # x of the band at 20 Hz
 class Agreement:
     """Largest differences between two solutions, (lane,) each.
 
-    ``third_octave_db`` in the level of a band, over bands and channels, dB; ``indicators`` in RMS, kurtosis or crest
-    factor, over channels, as a share. Infinite or NaN where one of the two is still or not finite.
+    ``third_octave_db`` in the level of a band, over bands and channels, dB; ``indicators`` in
+    RMS, kurtosis or crest factor, over channels, as a share. Infinite or NaN where one of the two
+    is still or not finite.
     """
 
     third_octave_db: Array
@@ -53,16 +55,18 @@ def agreement(found: Array, exact: Array, sampling_rate: float) -> Agreement:
 
 
 def third_octave_bands(n_samples: int, sampling_rate: float) -> tuple[Array, Array]:
-    """Lower and upper edges of the bands that a signal resolves, from that at 20 Hz to the usable band's end, Hz.
+    """Lower and upper edges of the bands that a signal resolves, from that at 20 Hz to the usable
+    band's end, Hz.
 
-    The usable band's end cuts the highest. Bands narrower than four lines of the signal's spectrum are left out: a
-    second resolves them from 20 Hz on, 50 ms from 400 Hz on.
+    The usable band's end cuts the highest. Bands narrower than four lines of the signal's
+    spectrum are left out: a second resolves them from 20 Hz on, 50 ms from 400 Hz on.
 
     Raises
     ------
     ValueError    if the signal resolves none
 
-    Source: IEC 61260-1:2014, mid-band frequencies 1000 G^(x/3) Hz, edges G^(+-1/6) from there, G = 10^0.3.
+    Source: IEC 61260-1:2014, mid-band frequencies 1000 G^(x/3) Hz, edges G^(+-1/6) from there, G
+    = 10^0.3.
     """
     highest = usable_band(sampling_rate)[1]
     lower = 1000.0 * 10.0 ** (
@@ -80,8 +84,8 @@ def third_octave_bands(n_samples: int, sampling_rate: float) -> tuple[Array, Arr
 def third_octave_power(signal: Array, sampling_rate: float) -> Array:
     """Mean square by third-octave band, (..., sample) to (..., band).
 
-    Of the power spectrum under a Hann window; a line that an edge crosses is shared in proportion. Bands as
-    ``third_octave_bands``.
+    Of the power spectrum under a Hann window; a line that an edge crosses is shared in
+    proportion. Bands as ``third_octave_bands``.
     """
     n_samples = signal.shape[-1]
     window = np.hanning(n_samples)
@@ -106,7 +110,8 @@ def third_octave_difference(found: Array, exact: Array, sampling_rate: float) ->
     ----------
     found, exact : (lane, channel, sample)
 
-    Left out are bands that lie more than 60 dB below the channel's loudest in both: noise covers them.
+    Left out are bands that lie more than 60 dB below the channel's loudest in both: noise covers
+    them.
     """
     powers, expected = (third_octave_power(signal, sampling_rate) for signal in (found, exact))
     threshold = 10.0 ** (-HEARD_DB / 10.0) * expected.max(axis=-1, keepdims=True)

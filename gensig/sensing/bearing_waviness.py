@@ -42,9 +42,11 @@ def bearing_orders(
     contact_angle: float,
     slip: float = 0.0,
 ) -> BearingOrders:
-    """Orders of a ball bearing whose cage lags by the share ``slip`` and whose balls roll on the outer race.
+    """Orders of a ball bearing whose cage lags by the share ``slip`` and whose balls roll on the
+    outer race.
 
-    Source: kinematics as in Harris & Kotzalas (2007), Essential Concepts of Bearing Technology, ch. 8.
+    Source: kinematics as in Harris & Kotzalas (2007), Essential Concepts of Bearing Technology,
+    ch. 8.
     """
     ratio = ball_diameter / pitch_diameter * math.cos(contact_angle)
     cage = 0.5 * (1.0 - ratio) * (1.0 - slip)
@@ -60,10 +62,11 @@ def bearing_orders(
 class Bearing(Nuisance):
     """The waviness of a sound ball bearing, which pushes with the stiffness of the gear's support.
 
-    Four families: the outer race as balls pass it, k BPFO in a fixed direction; the inner race, k BPFI plus and minus
-    one shaft order, forward and backward; the balls, 2 k BSF plus and minus one cage order; balls of unlike size, one
-    force that turns with the cage. Harmonic k has k^-p of the family's waviness (uniform in its logarithm), p the
-    ``harmonic_exponent``. Slip of the cage (uniform) and the angles of cage and balls are drawn for the record.
+    Four families: the outer race as balls pass it, k BPFO in a fixed direction; the inner race, k
+    BPFI plus and minus one shaft order, forward and backward; the balls, 2 k BSF plus and minus
+    one cage order; balls of unlike size, one force that turns with the cage. Harmonic k has k^-p
+    of the family's waviness (uniform in its logarithm), p the ``harmonic_exponent``. Slip of the
+    cage (uniform) and the angles of cage and balls are drawn for the record.
 
     Source: orders as in Wensing (1998), On the dynamics of ball bearings, ch. 2.
     """

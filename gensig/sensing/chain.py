@@ -29,12 +29,15 @@ SENSOR_NAME = re.compile(r"[A-Za-z][A-Za-z0-9_]{0,31}")
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Sensing:
-    """What is simulated, what stands between it and the record, how fast and under how much noise that is recorded.
+    """What is simulated, what stands between it and the record, how fast and under how much noise
+    that is recorded.
 
-    ``channels`` are the simulated accelerations. Without a ``path`` they are what the sensors feel; else it leads from
-    them to the ``sensors``. ``snr`` in dB; None records without noise. Its reference is the power of the same unit at
-    the same condition without the fault (``healthy_twin``), so the floor cannot tell the class. None for ``sensor``
-    and ``noise``: an ideal one, and white noise over the whole band. ``nuisances`` shake the bearings of every class.
+    ``channels`` are the simulated accelerations. Without a ``path`` they are what the sensors
+    feel; else it leads from them to the ``sensors``. ``snr`` in dB; None records without noise.
+    Its reference is the power of the same unit at the same condition without the fault
+    (``healthy_twin``), so the floor cannot tell the class. None for ``sensor`` and ``noise``: an
+    ideal one, and white noise over the whole band. ``nuisances`` shake the bearings of every
+    class.
     """
 
     sampling_rate: float = unit("hz")
@@ -197,7 +200,10 @@ class Sensing:
 
 
 def transverse_channel(name: str) -> str:
-    """The channel across another at the same bearing: pinion_y for pinion_x; '' where there is none."""
+    """The channel across another at the same bearing: pinion_y for pinion_x.
+
+    '' where there is none.
+    """
     gear, _, axis = name.rpartition("_")
     return f"{gear}_{'y' if axis == 'x' else 'x'}" if axis in ("x", "y") else ""
 
@@ -208,11 +214,13 @@ def power(signal: Array) -> Array:
 
 
 def detectability(residual: Array, noise_power: Array) -> float:
-    """How far the best possible detector tells a known residual from white noise: d' of a matched filter.
+    """How far the best possible detector tells a known residual from white noise: d' of a matched
+    filter.
 
-    Square root of the residual's energy over the noise power, summed over channels; NaN where a channel has no noise.
-    With d' the detector is right in a share Phi(d' / 2) of equally many records with and without the fault: 0.69 at 1,
-    0.93 at 3. It knows unit, phase, load and speed of the record, and the fault; no classifier can do better.
+    Square root of the residual's energy over the noise power, summed over channels; NaN where a
+    channel has no noise. With d' the detector is right in a share Phi(d' / 2) of equally many
+    records with and without the fault: 0.69 at 1, 0.93 at 3. It knows unit, phase, load and speed
+    of the record, and the fault; no classifier can do better.
 
     Parameters
     ----------

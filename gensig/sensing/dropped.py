@@ -15,8 +15,8 @@ def draw_dropped(
 ) -> NDArray[np.bool_]:
     """Which samples are lost, (sample,).
 
-    Samples travel in packets of ``n_run``; each is lost with probability ``share``, whatever befalls the others. The
-    first packet began anywhere before the record.
+    Samples travel in packets of ``n_run``; each is lost with probability ``share``, whatever
+    befalls the others. The first packet began anywhere before the record.
     """
     begun = int(rng.integers(n_run))
     lost = rng.random((begun + n_samples - 1) // n_run + 1) < share
@@ -26,8 +26,8 @@ def draw_dropped(
 def filled(signal: Array, dropped: NDArray[np.bool_], fill: str) -> Array:
     """The signal, (sensor, sample), with something else where it was lost.
 
-    ``hold`` repeats the last sample that came, before the first one that which comes first; ``zero`` is 0. So is what
-    is held where nothing came at all.
+    ``hold`` repeats the last sample that came, before the first one that which comes first;
+    ``zero`` is 0. So is what is held where nothing came at all.
     """
     if fill == "zero" or dropped.all():
         return np.where(dropped, 0.0, signal)

@@ -26,8 +26,9 @@ WIDEST = 4.0  # standard deviations
 class Encoder:
     """A disc with lines on a gear's shaft.
 
-    ``eccentricity_error`` is the largest amplitude of the once-per-turn error and ``line_error`` the standard deviation
-    of the place of each line, both in rad. ``quantised`` reads the last line that passed, otherwise between lines too.
+    ``eccentricity_error`` is the largest amplitude of the once-per-turn error and ``line_error``
+    the standard deviation of the place of each line, both in rad. ``quantised`` reads the last
+    line that passed, otherwise between lines too.
     """
 
     shaft: str
@@ -67,15 +68,18 @@ class Encoder:
 class Disc:
     """The disc of one gearbox.
 
-    ``index`` rad is the angle of the gear at which the encoder reads 0; ``places`` (line,) rad after it are those at
-    which its lines pass: nominally 0, 1, 2, ... times their spacing, with errors also beyond either end of a turn.
+    ``index`` rad is the angle of the gear at which the encoder reads 0; ``places`` (line,) rad
+    after it are those at which its lines pass: nominally 0, 1, 2, ... times their spacing, with
+    errors also beyond either end of a turn.
     """
 
     index: float
     places: Array
 
     def read(self, angle: Array, *, quantised: bool) -> Array:
-        """What the encoder says, (sample,) rad from its index on, at an angle of the gear, (sample,) rad."""
+        """What the encoder says, (sample,) rad from its index on, at an angle of the gear,
+        (sample,) rad.
+        """
         n_lines = len(self.places)
         places = np.concatenate([self.places + turn * 2.0 * math.pi for turn in (-1.0, 0.0, 1.0)])
         turns = np.floor((angle - self.index) / (2.0 * math.pi))
@@ -94,9 +98,11 @@ def draw_disc(rng: np.random.Generator, encoder: Encoder) -> Disc:
 def draw_lines(
     rng: np.random.Generator, n_lines: int, eccentricity_error: float, line_error: float
 ) -> Disc:
-    """A disc with its errors: index and eccentricity in any direction, the latter of any size up to the largest.
+    """A disc with its errors: index and eccentricity in any direction, the latter of any size up
+    to the largest.
 
-    A disc whose center is off the shaft's by e is misread by e / R sin(angle + direction) at a reading radius R.
+    A disc whose center is off the shaft's by e is misread by e / R sin(angle + direction) at a
+    reading radius R.
     """
     index, direction = rng.uniform(0.0, 2.0 * math.pi, 2)
     amplitude = eccentricity_error * float(rng.random())

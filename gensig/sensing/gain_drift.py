@@ -22,11 +22,12 @@ def draw_drift(
     n_samples: int,
     rate: float,
 ) -> Array:
-    """Factor of each sensor at every sample, (sensor, sample): the exponential of a mean-reverting walk.
+    """Factor of each sensor at every sample, (sensor, sample): the exponential of a
+    mean-reverting walk.
 
-    The walk is stationary, so it also holds what mounting and temperature are at the first sample. It is drawn exactly
-    at even points, x(k + 1) = a x(k) + scatter sqrt(1 - a^2) n(k) with a = exp(-step / correlation time), and is
-    straight between them.
+    The walk is stationary, so it also holds what mounting and temperature are at the first
+    sample. It is drawn exactly at even points, x(k + 1) = a x(k) + scatter sqrt(1 - a^2) n(k)
+    with a = exp(-step / correlation time), and is straight between them.
 
     Parameters
     ----------
@@ -34,8 +35,8 @@ def draw_drift(
     correlation_time : s        time after which exp(-1) of a deviation is expected to be left
     rate : Hz                   of the samples
 
-    Source: G. E. Uhlenbeck & L. S. Ornstein (1930), Physical Review 36, 823-841; its exact step: D. T. Gillespie
-    (1996), Physical Review E 54 (2), 2084-2091, eq. (1.9a).
+    Source: G. E. Uhlenbeck & L. S. Ornstein (1930), Physical Review 36, 823-841; its exact step:
+    D. T. Gillespie (1996), Physical Review E 54 (2), 2084-2091, eq. (1.9a).
     """
     step = correlation_time / POINTS_PER_TIME
     duration = (n_samples - 1) / rate

@@ -1,8 +1,9 @@
 """Limits of the flank deviations of a cylindrical gear by ISO 1328-1:2013, in m.
 
-All grow by the square root of 2 from one grade to the next. The standard rounds the values of its printed tables; here
-they are as the formulas give them, so that a limit changes smoothly with a drawn grade. Limits of pitch and cumulative
-pitch are arcs on the reference circle, those of the profile lengths along the line of action, runout is radial.
+All grow by the square root of 2 from one grade to the next. The standard rounds the values of its
+printed tables; here they are as the formulas give them, so that a limit changes smoothly with a
+drawn grade. Limits of pitch and cumulative pitch are arcs on the reference circle, those of the
+profile lengths along the line of action, runout is radial.
 """
 
 from __future__ import annotations
@@ -13,7 +14,8 @@ from gensig.errors import ConfigError
 from gensig.geometry.gear import Gear
 
 LOWEST_GRADE, HIGHEST_GRADE = 1, 11
-# what clause 1 covers: teeth, reference diameter and normal module in mm; face width (4 to 1200 mm) and helix angle
+# what clause 1 covers: teeth, reference diameter and normal module in mm; face width (4 to 1200
+# mm) and helix angle
 # (to 45 degrees) stand in none of the formulas below
 TEETH, DIAMETER, MODULE = (5, 1000), (5.0, 15_000.0), (0.5, 70.0)
 
@@ -21,7 +23,8 @@ TEETH, DIAMETER, MODULE = (5, 1000), (5.0, 15_000.0), (0.5, 70.0)
 def single_pitch_limit(gear: Gear, grade: float) -> float:
     """Limit of the single pitch deviation f_p, m of arc.
 
-    Source: ISO 1328-1:2013, f_pT = (0.001 d + 0.4 m + 5) sqrt(2)^(A - 5) with d and m in mm, result in micrometres.
+    Source: ISO 1328-1:2013, f_pT = (0.001 d + 0.4 m + 5) sqrt(2)^(A - 5) with d and m in mm,
+    result in micrometres.
     """
     return _limit(gear, grade, 0.001 * _diameter(gear) + 0.4 * _module(gear) + 5.0)
 
@@ -29,7 +32,8 @@ def single_pitch_limit(gear: Gear, grade: float) -> float:
 def cumulative_pitch_limit(gear: Gear, grade: float) -> float:
     """Limit of the total cumulative pitch (index) deviation F_p, m of arc.
 
-    Source: ISO 1328-1:2013, F_pT = (0.002 d + 0.55 sqrt(d) + 0.7 m + 12) sqrt(2)^(A - 5), units as above.
+    Source: ISO 1328-1:2013, F_pT = (0.002 d + 0.55 sqrt(d) + 0.7 m + 12) sqrt(2)^(A - 5), units
+    as above.
     """
     diameter = _diameter(gear)
     return _limit(

@@ -1,4 +1,7 @@
-"""Transfer path and sensors of one gearbox: from its bearings' accelerations to what is recorded of them."""
+"""Transfer path and sensors of one gearbox.
+
+From its bearings' accelerations to what is recorded of them.
+"""
 
 from __future__ import annotations
 
@@ -30,7 +33,8 @@ class Instrument:
     def measure(self, source: Array) -> Array:
         """What the sensors put out before noise and conversion.
 
-        Linear. Filters start from rest and settle in the first ``sensing.n_lead`` samples, which are left out.
+        Linear. Filters start from rest and settle in the first ``sensing.n_lead`` samples, which
+        are left out.
 
         Parameters
         ----------
@@ -56,7 +60,9 @@ class Instrument:
         return np.ascontiguousarray(signal[:, self.sensing.n_lead :])
 
     def drift(self, n_samples: int, rng: np.random.Generator) -> Array:
-        """Factor of each sensor's gain over one record, (sensor, sample), or (1, 1) of 1 where none drifts."""
+        """Factor of each sensor's gain over one record, (sensor, sample), or (1, 1) of 1 where
+        none drifts.
+        """
         sensor, n_sensors = self.sensing.sensor, len(self.sensing.channel_names)
         if sensor is None or not sensor.drift_scatter:
             return np.ones((1, 1))
@@ -64,7 +70,9 @@ class Instrument:
         return draw_drift(rng, sensor.drift_scatter, sensor.drift_time, n_sensors, n_samples, rate)
 
     def power(self, signal: Array) -> Array:
-        """Mean square without the mean in the band of the signal-to-noise ratio, (sensor,) (m/s2)^2."""
+        """Mean square without the mean in the band of the signal-to-noise ratio, (sensor,)
+        (m/s2)^2.
+        """
         noise = self.sensing.noise
         return (
             power(signal)
@@ -75,7 +83,10 @@ class Instrument:
     def record(
         self, clean: Array, noise_power: Array, rng: np.random.Generator
     ) -> tuple[Array, float]:
-        """Noise of the given power in the band added, offset and converter applied; and the share that clips."""
+        """Noise of the given power in the band added, offset and converter applied.
+
+        And the share that clips.
+        """
         noise, sensor = self.sensing.noise, self.sensing.sensor
         if noise is None or noise.is_white:
             noisy = add_noise(clean, noise_power, rng)
@@ -93,7 +104,10 @@ class Instrument:
         return sensor.digitised(noisy)
 
     def sent(self, signal: Array, rng: np.random.Generator) -> tuple[Array, float]:
-        """What of a record, (sensor, sample), reaches the file, losses filled; and the share of samples that do not."""
+        """What of a record, (sensor, sample), reaches the file, losses filled.
+
+        And the share of samples that do not.
+        """
         sensor = self.sensing.sensor
         if sensor is None or not sensor.dropped_fraction:
             return signal, 0.0
@@ -103,7 +117,9 @@ class Instrument:
         return filled(signal, dropped, sensor.dropped_fill), float(np.mean(dropped))
 
     def _at_sensors(self, source: Array) -> Array:
-        """Motion along the sensors' own axes, then, where it is known, across them, (line, sample)."""
+        """Motion along the sensors' own axes, then, where it is known, across them, (line,
+        sample).
+        """
         if self.path is not None:
             return self.path.apply(source, self.sensing.sampling_rate)
         sensor, names = self.sensing.sensor, self.sensing.channels

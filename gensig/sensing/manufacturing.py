@@ -1,4 +1,7 @@
-"""What differs from one specimen and one gearbox to the next; see ``docs/theory/manufacturing.md``."""
+"""What differs from one specimen and one gearbox to the next.
+
+See ``docs/theory/manufacturing.md``.
+"""
 
 from __future__ import annotations
 
@@ -39,13 +42,14 @@ RUNOUT_STEPS = (
 class Quality:
     """Manufacturing grade and scatter between gears and between gearboxes.
 
-    Every deviation of a gear uses the same share of its ISO 1328-1 limit, between ``used_share_low`` and
-    ``used_share_high``. ``iso1328_grade`` None makes perfect gears: only the supports scatter. ``tooth_share`` is the
-    part of the profile slope that differs from tooth to tooth, ``undulation_share`` that of the profile form that is
-    ``undulation_waves`` waves. Misalignment is uniform within plus and minus ``misalignment``, backlash within plus and
-    minus the share ``backlash_scatter`` of the nominal one. The support scatters are standard deviations of the
-    logarithm. Where the damping ratios are given, each support of a gearbox has one between them, and their scatter is
-    not read.
+    Every deviation of a gear uses the same share of its ISO 1328-1 limit, between
+    ``used_share_low`` and ``used_share_high``. ``iso1328_grade`` None makes perfect gears: only
+    the supports scatter. ``tooth_share`` is the part of the profile slope that differs from tooth
+    to tooth, ``undulation_share`` that of the profile form that is ``undulation_waves`` waves.
+    Misalignment is uniform within plus and minus ``misalignment``, backlash within plus and minus
+    the share ``backlash_scatter`` of the nominal one. The support scatters are standard
+    deviations of the logarithm. Where the damping ratios are given, each support of a gearbox has
+    one between them, and their scatter is not read.
     """
 
     iso1328_grade: float | None
@@ -102,7 +106,10 @@ class Quality:
 
     @property
     def support_damping_ratio(self) -> float | None:
-        """The ratio in the middle of its range on a logarithmic scale; None where supports give their damping."""
+        """The ratio in the middle of its range on a logarithmic scale.
+
+        None where supports give their damping.
+        """
         low, high = self.support_damping_ratio_low, self.support_damping_ratio_high
         return None if low is None or high is None else float(np.sqrt(low * high))
 
@@ -129,9 +136,11 @@ class Specimen:
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Gearbox:
-    """Housing, bearings and sensors: factors on the supports (pinion x, y, wheel x, y) and gains of the channels.
+    """Housing, bearings and sensors: factors on the supports (pinion x, y, wheel x, y) and gains
+    of the channels.
 
-    ``damping_ratio`` (support,) of the gears on their supports; None leaves the damping that the supports are given.
+    ``damping_ratio`` (support,) of the gears on their supports; None leaves the damping that the
+    supports are given.
     """
 
     stiffness_factor: Array
@@ -145,7 +154,8 @@ def draw_specimen(
 ) -> Specimen:
     """Draw a set of gears within its grade.
 
-    What is drawn does not depend on what is switched on, so that one key leaves the other deviations alone.
+    What is drawn does not depend on what is switched on, so that one key leaves the other
+    deviations alone.
 
     Raises
     ------
@@ -190,7 +200,8 @@ def _draw_gear(
         gear, quality.iso1328_grade, share, runout_share, angle, shape
     )
     turn = 2.0 * math.pi / gear.n_teeth * np.arange(gear.n_teeth) - angle
-    # the same turning point of an eccentric gear for all teeth in contact: its teeth do not step, see the theory
+    # the same turning point of an eccentric gear for all teeth in contact: its teeth do not step,
+    # see the theory
     error = eccentricity * np.cos(turn) + pitch_error
     tilt = -eccentricity / gear.base_radius * np.sin(turn)
     if not quality.profile_errors:
@@ -228,9 +239,10 @@ def _scaled_index(
 ) -> tuple[float, Array]:
     """Eccentricity in m and random pitch errors (tooth,) m that keep to the share of three limits.
 
-    The random part has no once-per-turn part of its own, so that all runout is the eccentricity's. It is as large as
-    the single pitch deviation allows; the eccentricity starts at ``runout_share`` of what the runout allows and shrinks
-    until the total index deviation fits. Arcs on the reference circle are cos(alpha) long along the line of action.
+    The random part has no once-per-turn part of its own, so that all runout is the
+    eccentricity's. It is as large as the single pitch deviation allows; the eccentricity starts
+    at ``runout_share`` of what the runout allows and shrinks until the total index deviation
+    fits. Arcs on the reference circle are cos(alpha) long along the line of action.
     """
     turn = 2.0 * math.pi / gear.n_teeth * np.arange(gear.n_teeth)
     random = shape - shape.mean()
@@ -286,7 +298,9 @@ def nominal_gearbox(n_channels: int) -> Gearbox:
 
 
 def with_damping_ratio(gearbox: Gearbox, rng: np.random.Generator, quality: Quality) -> Gearbox:
-    """The gearbox with a damping ratio for each of its four supports, log-uniform, where ``quality`` has a range."""
+    """The gearbox with a damping ratio for each of its four supports, log-uniform, where
+    ``quality`` has a range.
+    """
     low, high = quality.support_damping_ratio_low, quality.support_damping_ratio_high
     if low is None or high is None:
         return gearbox

@@ -1,4 +1,7 @@
-"""A transfer path that a user measured: frequency or impulse responses from every bearing channel to every sensor."""
+"""A transfer path that a user measured.
+
+Frequency or impulse responses from every bearing channel to every sensor.
+"""
 
 from __future__ import annotations
 
@@ -25,8 +28,9 @@ NON_CAUSAL = 0.05  # share of a response's energy that may come before time 0
 class MeasuredPath:
     """A CSV file, accelerations at the sensors over accelerations at the bearings.
 
-    Columns ``frequency_hz`` and ``<channel>_to_<sensor>_real`` and ``_imaginary``, or ``time_s`` and
-    ``<channel>_to_<sensor>``, the response to a single sample of 1 m/s2; one for every channel and sensor.
+    Columns ``frequency_hz`` and ``<channel>_to_<sensor>_real`` and ``_imaginary``, or ``time_s``
+    and ``<channel>_to_<sensor>``, the response to a single sample of 1 m/s2; one for every
+    channel and sensor.
     """
 
     file: str
@@ -45,7 +49,9 @@ class ImpulseResponses:
         return self.taps.shape[2] / self.sampling_rate
 
     def apply(self, source: Array, sampling_rate: float) -> Array:
-        """Accelerations at the sensors from those at the bearings, (channel, sample) to (sensor, sample)."""
+        """Accelerations at the sensors from those at the bearings, (channel, sample) to (sensor,
+        sample).
+        """
         from scipy.signal import oaconvolve
 
         if sampling_rate != self.sampling_rate:
@@ -92,9 +98,9 @@ def _impulse_responses(
 ) -> Array:
     """Causal impulse responses of frequency responses, (pair, line) to (pair, sample).
 
-    The response goes straight between the lines given and is held beyond them: records have nothing above the usable
-    band. Half of the inverse transform is time before 0; what a measurement has there is left out, and refused where
-    it is more than a trace.
+    The response goes straight between the lines given and is held beyond them: records have
+    nothing above the usable band. Half of the inverse transform is time before 0; what a
+    measurement has there is left out, and refused where it is more than a trace.
     """
     where = f"{KEY} = {file}"
     step = np.diff(frequency)

@@ -1,4 +1,7 @@
-"""What else a sensor hears: parts of noise, mixed by their shares of the power and set to one level."""
+"""What else a sensor hears.
+
+Parts of noise, mixed by their shares of the power and set to one level.
+"""
 
 from __future__ import annotations
 
@@ -26,7 +29,10 @@ SIDEBAND = 0.5  # assumed; amplitude of the first pair of sidebands of another m
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Place:
-    """Where noise is heard: names of the sensors, samples, rate, and white noise at the bearings as they hear it."""
+    """Where noise is heard.
+
+    Names of the sensors, samples, rate, and white noise at the bearings as they hear it.
+    """
 
     sensors: tuple[str, ...]
     n_samples: int
@@ -98,7 +104,10 @@ class ThroughPath(Part):
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Hum(Part):
-    """Mains pick-up: harmonic k has the amplitude 1 / k (assumed) and its own phase in each sensor."""
+    """Mains pick-up.
+
+    Harmonic k has the amplitude 1 / k (assumed) and its own phase in each sensor.
+    """
 
     mains: float = unit("hz")
     n_harmonics: int
@@ -116,7 +125,9 @@ class Hum(Part):
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Impulsive(Part):
-    """Knocks at random instants (Poisson, at least one), normal in size, each ringing at one mode."""
+    """Knocks at random instants (Poisson, at least one), normal in size, each ringing at one
+    mode.
+    """
 
     knocks: float = unit("hz")
     ring: float = unit("hz")
@@ -147,9 +158,9 @@ class Impulsive(Part):
 class Machine(Part):
     """Another machine: shaft orders, a bearing's tone family and a mesh, a third of the power each.
 
-    Harmonic k has the amplitude 1 / k, bearing and mesh tones have sidebands at one shaft order (assumed).
-    ``frequency_scatter`` is the largest share by which its speed differs in a record. Tones above the usable band are
-    left out.
+    Harmonic k has the amplitude 1 / k, bearing and mesh tones have sidebands at one shaft order
+    (assumed). ``frequency_scatter`` is the largest share by which its speed differs in a record.
+    Tones above the usable band are left out.
     """
 
     shaft: float = unit("hz")
@@ -193,7 +204,8 @@ class Machine(Part):
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Background(Part):
-    """A recording of a user: ``time_s`` and one column a sensor, or one column ``background`` for all.
+    """A recording of a user: ``time_s`` and one column a sensor, or one column ``background`` for
+    all.
 
     A record takes a stretch that begins anywhere; with one column each sensor takes its own.
     """
@@ -201,7 +213,9 @@ class Background(Part):
     file: str
 
     def table(self, place: Place) -> tuple[list[str], Array]:
-        """The recording, (column, sample), checked against the sensors, rate and length of a record."""
+        """The recording, (column, sample), checked against the sensors, rate and length of a
+        record.
+        """
         return _background(self.file, place.sensors, place.n_samples, place.sampling_rate)
 
     def make(self, rng: np.random.Generator, place: Place) -> Array:
@@ -236,16 +250,19 @@ def _background(
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Spectrum(Part):
-    """Gaussian noise of a given power density: a file with ``frequency_hz`` and one column a sensor, or ``background``.
+    """Gaussian noise of a given power density: a file with ``frequency_hz`` and one column a
+    sensor, or ``background``.
 
-    Only the form of a column counts; its level is that of ``sensing.snr_db``. It is linear between the lines given and
-    held beyond them. Every record and sensor has its own noise.
+    Only the form of a column counts; its level is that of ``sensing.snr_db``. It is linear
+    between the lines given and held beyond them. Every record and sensor has its own noise.
     """
 
     file: str
 
     def density(self, place: Place) -> tuple[Array, Array]:
-        """Frequencies (line,) in Hz and densities (sensor, line), checked against the sensors of a record."""
+        """Frequencies (line,) in Hz and densities (sensor, line), checked against the sensors of
+        a record.
+        """
         return _spectrum(self.file, place.sensors)
 
     def make(self, rng: np.random.Generator, place: Place) -> Array:
@@ -289,9 +306,11 @@ PARTS: dict[str, type[Part]] = {
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Noise:
-    """Parts of the noise, and the band over which the signal-to-noise ratio is meant, (low, high) in Hz or all.
+    """Parts of the noise, and the band over which the signal-to-noise ratio is meant, (low, high)
+    in Hz or all.
 
-    ``offsets`` in dB, one a sensor: that sensor's noise is so much louder than ``sensing.snr_db`` says. None is 0 dB.
+    ``offsets`` in dB, one a sensor: that sensor's noise is so much louder than ``sensing.snr_db``
+    says. None is 0 dB.
     """
 
     parts: tuple[Part, ...]
@@ -402,7 +421,10 @@ def unit_power(signal: Array) -> Array:
 
 
 def band_power(signal: Array, sampling_rate: float, band: tuple[float, ...] | None) -> Array:
-    """Mean square without the mean, in a band with both its ends, (sensor,); None is the whole band."""
+    """Mean square without the mean, in a band with both its ends, (sensor,).
+
+    None is the whole band.
+    """
     if band is None:
         return np.var(signal, axis=-1)
     n_samples = signal.shape[-1]

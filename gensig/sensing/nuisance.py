@@ -1,4 +1,7 @@
-"""What a sound machine shakes with beside its mesh: forces at orders of its shafts, drawn alike for every class."""
+"""What a sound machine shakes with beside its mesh.
+
+Forces at orders of its shafts, drawn alike for every class.
+"""
 
 from __future__ import annotations
 
@@ -34,8 +37,9 @@ from gensig.units import read, to_si, unit
 class Unbalance(Nuisance):
     """A residual unbalance that turns with the shaft, at a fixed angle from tooth 0 of its gear.
 
-    The residual is a share, uniform in ``used_share``, of what the grade permits at ``rated_speed`` of the pinion.
-    ``rotor_mass`` is that of all that turns with the gear; None takes the gear's.
+    The residual is a share, uniform in ``used_share``, of what the grade permits at
+    ``rated_speed`` of the pinion. ``rotor_mass`` is that of all that turns with the gear; None
+    takes the gear's.
 
     Source: ISO 21940-11, 4.4: e w = G mm/s at the highest speed of service; the force is m e w^2.
     """
@@ -78,13 +82,14 @@ class Unbalance(Nuisance):
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class CouplingMisalignment(Nuisance):
-    """Reactions of a misaligned coupling: radial at 1, 2, ... times the shaft in a fixed direction, torque at twice.
+    """Reactions of a misaligned coupling: radial at 1, 2, ... times the shaft in a fixed
+    direction, torque at twice.
 
-    ``force_share`` of the mean mesh force is drawn uniformly in its logarithm; order k has ``order_shares[k - 1]`` of
-    it. ``torque_share`` of the shaft's torque is drawn uniformly.
+    ``force_share`` of the mean mesh force is drawn uniformly in its logarithm; order k has
+    ``order_shares[k - 1]`` of it. ``torque_share`` of the shaft's torque is drawn uniformly.
 
-    Source: orders and direction as in Gibbons (1976) and Xu & Marangoni (1994); a universal joint at an angle b turns
-    its shaft unevenly by b^2 / 2 at twice the speed.
+    Source: orders and direction as in Gibbons (1976) and Xu & Marangoni (1994); a universal joint
+    at an angle b turns its shaft unevenly by b^2 / 2 at twice the speed.
     """
 
     force_share: tuple[float, ...]
@@ -118,11 +123,12 @@ class CouplingMisalignment(Nuisance):
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Looseness(Nuisance):
-    """A loose seat or foot: harmonics of the shaft up to ``n_orders`` and the half orders between, in one direction.
+    """A loose seat or foot: harmonics of the shaft up to ``n_orders`` and the half orders
+    between, in one direction.
 
-    ``force_share`` of the mean mesh force, uniform in its logarithm, is the amplitude of order 1; order k has k^-p of
-    it with p the ``harmonic_exponent``, half orders ``half_share`` (uniform) of that; order 1/2 counts as 1. Which of
-    two turns a record begins in is drawn for the record.
+    ``force_share`` of the mean mesh force, uniform in its logarithm, is the amplitude of order 1;
+    order k has k^-p of it with p the ``harmonic_exponent``, half orders ``half_share`` (uniform)
+    of that; order 1/2 counts as 1. Which of two turns a record begins in is drawn for the record.
 
     Source: orders as in Goldman & Muszynska (1999).
     """
@@ -162,10 +168,11 @@ class Looseness(Nuisance):
 class NeighbourMesh(Nuisance):
     """The mesh of another stage whose one gear sits on this gear's shaft.
 
-    It carries the shaft's torque on ``base_radius``, along a line of action at ``line_of_action`` from this gear's x.
-    ``dynamic_share`` of that mean force, uniform in its logarithm, is the amplitude of the first harmonic; harmonic k
-    has k^-p of it, p the ``harmonic_exponent``, and each one sideband of ``sideband_share`` (uniform) of that on either
-    side at one order of either shaft. Where the mate's teeth stand is drawn for the record.
+    It carries the shaft's torque on ``base_radius``, along a line of action at ``line_of_action``
+    from this gear's x. ``dynamic_share`` of that mean force, uniform in its logarithm, is the
+    amplitude of the first harmonic; harmonic k has k^-p of it, p the ``harmonic_exponent``, and
+    each one sideband of ``sideband_share`` (uniform) of that on either side at one order of
+    either shaft. Where the mate's teeth stand is drawn for the record.
     """
 
     n_teeth: int
@@ -203,7 +210,8 @@ class NeighbourMesh(Nuisance):
         )
         mate_angle = TURN * record_rng.random()
         along = fixed(self.line_of_action)
-        # the next stage's force holds the wheel's shaft back, that of the stage before drives the pinion's
+        # the next stage's force holds the wheel's shaft back, that of the stage before drives the
+        # pinion's
         along[2] = -SENSE[self.gear] * self.base_radius
         offsets = np.array([(0, 0), (1, 0), (-1, 0), (0, 1), (0, -1)])
         weight = np.array([1.0, sideband, sideband, sideband, sideband])
@@ -265,7 +273,8 @@ def draw_tones(
     units: Mapping[str, np.random.Generator],
     record_rng: np.random.Generator,
 ) -> list[Tones]:
-    """Forces of every part, each from random numbers of its own, so that a part more at the end changes none.
+    """Forces of every part, each from random numbers of its own, so that a part more at the end
+    changes none.
 
     ``units`` has one generator a level, ``record_rng`` is that of the record.
     """

@@ -24,8 +24,8 @@ JITTERS_IN_A_WIDTH = (
 class Tachometer:
     """Evenly spaced marks on a gear's shaft, each ``pulse_width_share`` of their spacing wide.
 
-    ``jitter`` in rad is the standard deviation of the place at which a pulse begins, drawn anew for every pulse, which
-    ends a width later.
+    ``jitter`` in rad is the standard deviation of the place at which a pulse begins, drawn anew
+    for every pulse, which ends a width later.
     """
 
     shaft: str
@@ -76,10 +76,12 @@ def draw_mark(rng: np.random.Generator) -> float:
 def pulse_train(
     tacho: Tachometer, mark: float, angle: Array, sampling_rate: float, rng: np.random.Generator
 ) -> Array:
-    """What the tachometer puts out, (sample,): 1 in a pulse, 0 between, at an edge the share that is high.
+    """What the tachometer puts out, (sample,): 1 in a pulse, 0 between, at an edge the share that
+    is high.
 
-    A sample is the mean over one sampling interval around its instant, as a converter integrates. So an edge has its
-    exact instant in the two samples around it (``gensig.signals.tacho.pulse_times``).
+    A sample is the mean over one sampling interval around its instant, as a converter integrates.
+    So an edge has its exact instant in the two samples around it
+    (``gensig.signals.tacho.pulse_times``).
 
     Parameters
     ----------

@@ -1,4 +1,7 @@
-"""What a nuisance is: forces on one gear that follow angles of its machine, and how they are drawn."""
+"""What a nuisance is.
+
+Forces on one gear that follow angles of its machine, and how they are drawn.
+"""
 
 from __future__ import annotations
 
@@ -17,7 +20,8 @@ from gensig.units import from_si
 Array = NDArray[np.float64]
 Complex = NDArray[np.complex128]
 
-# From x to y is +1. The pinion turns the other way: its friction moment is -rho F_f for a force +F_f along its x.
+# From x to y is +1. The pinion turns the other way: its friction moment is -rho F_f for a force
+# +F_f along its x.
 SENSE = {"pinion": -1.0, "wheel": 1.0}
 TURN = 2.0 * math.pi
 MOST_HARMONICS = 50
@@ -27,10 +31,11 @@ MOST_HARMONICS = 50
 class Tones:
     """Forces on one gear that follow angles: of its shaft, of what rolls on it, of what it drives.
 
-    Each of ``base`` (base,) is an angle's order, its turns per turn of the gear's shaft. Tone t is
-    Re(force_t e^(i phase_t)), where the phase is the sum of ``multiple`` (tone, base) times base times the shaft's
-    angle from its tooth 0 on. ``force`` (tone, 3) acts on the gear's x and y in N and on its rotation in N m; it is
-    that at the set speed and torque, and grows as ``follows`` says: speed_squared, torque or nothing.
+    Each of ``base`` (base,) is an angle's order, its turns per turn of the gear's shaft. Tone t
+    is Re(force_t e^(i phase_t)), where the phase is the sum of ``multiple`` (tone, base) times
+    base times the shaft's angle from its tooth 0 on. ``force`` (tone, 3) acts on the gear's x and
+    y in N and on its rotation in N m; it is that at the set speed and torque, and grows as
+    ``follows`` says: speed_squared, torque or nothing.
     """
 
     gear: str
@@ -47,9 +52,11 @@ class Tones:
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Nuisance(ABC):
-    """One cause of vibration at one gear's shaft. Ranges are [low, high]; both ends alike give one value.
+    """One cause of vibration at one gear's shaft. Ranges are [low, high]; both ends alike give
+    one value.
 
-    ``level`` says what the machine's part of it is drawn for: the gearbox, or the specimen, a set of gears.
+    ``level`` says what the machine's part of it is drawn for: the gearbox, or the specimen, a set
+    of gears.
     """
 
     level: ClassVar[str] = "gearbox"
@@ -63,12 +70,17 @@ class Nuisance(ABC):
     def draw(
         self, unit_rng: np.random.Generator, record_rng: np.random.Generator, dynamics: PairDynamics
     ) -> Tones:
-        """The forces of one unit, and what differs from one of its records to the next: angles that no tooth tells."""
+        """The forces of one unit, and what differs from one of its records to the next.
+
+        Angles that no tooth tells.
+        """
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Shaft:
-    """Speed in rad/s, its share of the pinion's, and torque in N m of one gear's shaft at the set point."""
+    """Speed in rad/s, its share of the pinion's, and torque in N m of one gear's shaft at the set
+    point.
+    """
 
     speed: float
     speed_ratio: float
@@ -94,7 +106,10 @@ def make_tones(gear: str, base: list[float], multiple: Any, force: Any, follows:
 
 
 def turning(gear: str) -> Complex:
-    """A unit force that turns with the shaft: along x first, a quarter of a turn later along y by the gear's sense."""
+    """A unit force that turns with the shaft.
+
+    Along x first, a quarter of a turn later along y by the gear's sense.
+    """
     return np.array([1.0, -1j * SENSE[gear], 0.0])
 
 
@@ -114,7 +129,10 @@ def logarithmic(rng: np.random.Generator, ends: tuple[float, ...]) -> float:
 
 
 def check_number(key: str, value: float, least: float, most: float) -> None:
-    """ConfigError for an SI value out of bounds; ``key`` is its name at the file boundary, with its unit."""
+    """ConfigError for an SI value out of bounds.
+
+    ``key`` is its name at the file boundary, with its unit.
+    """
     if not least <= value <= most:
         low, given, high = (f"{from_si(key, one):g}" for one in (least, value, most))
         raise ConfigError(f"{key} = {given} must lie in {low}..{high}")

@@ -1,7 +1,9 @@
-"""Instantaneous speed by a toothed wheel and a magnetic pick-up: the time from tooth to tooth, taken by a clock.
+"""Instantaneous speed by a toothed wheel and a magnetic pick-up: the time from tooth to tooth,
+taken by a clock.
 
-What torsional vibration of engines is measured with at a flywheel's starter ring or a gear, where an incremental
-encoder (`gensig.sensing.encoder`) has no room; the engine paper's pick-ups give a square wave, an edge a tooth.
+What torsional vibration of engines is measured with at a flywheel's starter ring or a gear, where
+an incremental encoder (`gensig.sensing.encoder`) has no room; the engine paper's pick-ups give a
+square wave, an edge a tooth.
 """
 
 from __future__ import annotations
@@ -26,9 +28,9 @@ SLOWEST_CLOCK = 1e4  # Hz
 class ToothedWheel:
     """A wheel on a node of the shaft line, each tooth of which gives one edge.
 
-    ``eccentricity_error`` is the largest amplitude of the once-per-turn error and ``tooth_error`` the standard
-    deviation of the place of each tooth, both rad; ``clock_frequency`` in Hz is that of the counter that takes the
-    times of the edges.
+    ``eccentricity_error`` is the largest amplitude of the once-per-turn error and ``tooth_error``
+    the standard deviation of the place of each tooth, both rad; ``clock_frequency`` in Hz is that
+    of the counter that takes the times of the edges.
     """
 
     node: int
@@ -64,7 +66,8 @@ def draw_wheel(rng: np.random.Generator, wheel: ToothedWheel) -> Disc:
 
 
 def passage_times(wheel: ToothedWheel, disc: Disc, angle: Array, sampling_rate: float) -> Array:
-    """Times at which teeth pass the pick-up, (passage,) s from the first sample, as the clock reads them.
+    """Times at which teeth pass the pick-up, (passage,) s from the first sample, as the clock
+    reads them.
 
     Parameters
     ----------

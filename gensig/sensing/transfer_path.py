@@ -1,4 +1,7 @@
-"""From the bearings to the sensor positions: nothing, a bank of housing modes, or what a user measured."""
+"""From the bearings to the sensor positions.
+
+Nothing, a bank of housing modes, or what a user measured.
+"""
 
 from __future__ import annotations
 
@@ -22,8 +25,9 @@ SETTLED = 5.0  # time constants after which 0.7 % of a transient is left
 class ModalPath:
     """Ranges from which the housing of a gearbox is drawn, [low, high] each.
 
-    The number of modes is uniform over whole numbers, frequencies and damping ratios are uniform in their logarithm.
-    ``transmissibility`` is the RMS gain from one bearing channel to a sensor well below all modes.
+    The number of modes is uniform over whole numbers, frequencies and damping ratios are uniform
+    in their logarithm. ``transmissibility`` is the RMS gain from one bearing channel to a sensor
+    well below all modes.
     """
 
     n_modes: tuple[int, ...]
@@ -57,8 +61,9 @@ def _check_range(key: str, ends: tuple[float, ...], least: float, most: float) -
 class Housing:
     """The modes of one housing.
 
-    ``natural_frequency`` (mode,) Hz, ``damping_ratio`` (mode,), ``from_bearings`` (mode, channel) and ``to_sensors``
-    (line, mode), the participations; the lines are the sensors' own axes, then their transverse axes.
+    ``natural_frequency`` (mode,) Hz, ``damping_ratio`` (mode,), ``from_bearings`` (mode, channel)
+    and ``to_sensors`` (line, mode), the participations; the lines are the sensors' own axes, then
+    their transverse axes.
     """
 
     natural_frequency: Array
@@ -72,10 +77,12 @@ class Housing:
         return SETTLED / float(np.min(2.0 * np.pi * self.natural_frequency * self.damping_ratio))
 
     def apply(self, source: Array, sampling_rate: float) -> Array:
-        """Accelerations at the sensors from those at the bearings, (channel, sample) to (line, sample).
+        """Accelerations at the sensors from those at the bearings, (channel, sample) to (line,
+        sample).
 
-        Each mode is the ramp-invariant form of w^2 / (s^2 + 2 zeta w s + w^2): exact for inputs that go straight from
-        sample to sample, poles where the continuous ones are. Linear and causal.
+        Each mode is the ramp-invariant form of w^2 / (s^2 + 2 zeta w s + w^2): exact for inputs
+        that go straight from sample to sample, poles where the continuous ones are. Linear and
+        causal.
         """
         from scipy.signal import sosfilt
 
@@ -107,7 +114,10 @@ def mode_section(natural_frequency: float, damping_ratio: float, sampling_rate: 
 def draw_housing(
     rng: np.random.Generator, path: ModalPath, n_channels: int, n_sensors: int
 ) -> Housing:
-    """The modes of one gearbox; modes are sorted by frequency, signs and sizes of participations are normal."""
+    """The modes of one gearbox.
+
+    Modes are sorted by frequency, signs and sizes of participations are normal.
+    """
     n_modes = int(rng.integers(path.n_modes[0], path.n_modes[1], endpoint=True))
 
     def logarithmic(ends: tuple[float, ...]) -> Array:

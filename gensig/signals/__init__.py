@@ -1,1 +1,4 @@
-"""Signal processing on plain arrays: indicators, synchronous averages, spectra. No physics, no files."""
+"""Signal processing on plain arrays.
+
+Indicators, synchronous averages, spectra. No physics, no files.
+"""

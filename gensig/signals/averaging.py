@@ -1,7 +1,9 @@
-"""Synchronous averaging: the angle domain at constant speed, the average turn, its regular part and what is left.
+"""Synchronous averaging: the angle domain at constant speed, the average turn, its regular part
+and what is left.
 
-Time-synchronous averaging: S. Braun (1975), Acustica 32, 69-77; P. D. McFadden (1989), "Interpolation techniques for
-time domain averaging of gear vibration", Mechanical Systems and Signal Processing 3 (1), 87-97.
+Time-synchronous averaging: S. Braun (1975), Acustica 32, 69-77; P. D. McFadden (1989),
+"Interpolation techniques for time domain averaging of gear vibration", Mechanical Systems and
+Signal Processing 3 (1), 87-97.
 """
 
 from __future__ import annotations
@@ -36,8 +38,8 @@ def resample_to_angle(
 ) -> FloatArray:
     """Cut a signal into whole turns, sampled uniformly in shaft angle.
 
-    The shaft turns at constant speed, known by its mean; the first turn starts at the first sample, the remainder of
-    a turn at the end is dropped.
+    The shaft turns at constant speed, known by its mean; the first turn starts at the first
+    sample, the remainder of a turn at the end is dropped.
 
     Parameters
     ----------
@@ -74,7 +76,8 @@ def resample_to_angle(
 
 
 def interpolate(x: FloatArray, position: FloatArray) -> FloatArray:
-    """Values of a signal, (..., sample), between its samples, by the cubic B-spline of `resample_to_angle`.
+    """Values of a signal, (..., sample), between its samples, by the cubic B-spline of
+    `resample_to_angle`.
 
     Parameters
     ----------
@@ -116,13 +119,17 @@ def time_synchronous_average(
     *,
     min_turns: int = 1,
 ) -> FloatArray:
-    """Average turn of a shaft at constant speed: `resample_to_angle`, then `average_turn` with its ``min_turns``."""
+    """Average turn of a shaft at constant speed.
+
+    `resample_to_angle`, then `average_turn` with its ``min_turns``.
+    """
     turns = resample_to_angle(signal, sampling_rate, rotation_frequency, samples_per_turn)
     return average_turn(turns, min_turns=min_turns)
 
 
 def average_turn(turns: ArrayLike, *, min_turns: int = MIN_TURNS) -> FloatArray:
-    """Mean turn of a shaft: what repeats every turn stays, the rest falls with the square root of the turns.
+    """Mean turn of a shaft: what repeats every turn stays, the rest falls with the square root of
+    the turns.
 
     Parameters
     ----------
@@ -157,7 +164,8 @@ def remove_orders(average: ArrayLike, orders: Iterable[int]) -> FloatArray:
 
 
 def regular_signal(average: ArrayLike, n_teeth: int, *, n_sidebands: int = 1) -> FloatArray:
-    """What a sound gear makes: every mesh harmonic with the lowest sidebands, without the lowest shaft orders.
+    """What a sound gear makes: every mesh harmonic with the lowest sidebands, without the lowest
+    shaft orders.
 
     Parameters
     ----------
@@ -170,8 +178,9 @@ def regular_signal(average: ArrayLike, n_teeth: int, *, n_sidebands: int = 1) ->
     With 1 it is what `difference_signal` takes away, less the mean and the shaft orders: for the energy ratio those of
     unbalance and misalignment are no sign of the mesh.
 
-    Source: regular mesh components of M. Lebold, K. McClintic, R. Campbell, C. Byington & K. Maynard (2000), "Review of
-    vibration analysis methods for gearbox diagnostics and prognostics", Proc. 54th MFPT Meeting, 623-634.
+    Source: regular mesh components of M. Lebold, K. McClintic, R. Campbell, C. Byington & K.
+    Maynard (2000), "Review of vibration analysis methods for gearbox diagnostics and
+    prognostics", Proc. 54th MFPT Meeting, 623-634.
     """
     kept = _mesh_orders(average, n_teeth, n_sidebands)
     return remove_orders(average, set(range(np.shape(average)[-1] // 2 + 1)) - kept)
@@ -198,7 +207,8 @@ def difference_signal(average: ArrayLike, n_teeth: int, *, n_shaft_orders: int =
 
     Parameters as `residual_signal`.
 
-    Source: difference signal of Zakrajsek, Townsend & Decker (1993), NASA TM-105950, after R. M. Stewart (1977).
+    Source: difference signal of Zakrajsek, Townsend & Decker (1993), NASA TM-105950, after R. M.
+    Stewart (1977).
     """
     return remove_orders(
         average, _mesh_orders(average, n_teeth, 1).union(range(n_shaft_orders + 1))
@@ -206,7 +216,9 @@ def difference_signal(average: ArrayLike, n_teeth: int, *, n_shaft_orders: int =
 
 
 def _mesh_orders(average: ArrayLike, n_teeth: int, n_sidebands: int) -> set[int]:
-    """Orders of the mesh harmonics and their sidebands, of those that half the samples of a turn can hold."""
+    """Orders of the mesh harmonics and their sidebands, of those that half the samples of a turn
+    can hold.
+    """
     top = np.shape(average)[-1] // 2
     mesh = range(n_teeth, top + n_sidebands + 1, n_teeth)
     return {order + k for order in mesh for k in range(-n_sidebands, n_sidebands + 1)}

@@ -1,7 +1,8 @@
 """Envelope of a band and its spectrum: impacts that repeat show as lines at their rate.
 
-McFadden & Smith (1984), "Vibration monitoring of rolling element bearings by the high-frequency resonance technique",
-Tribology International 17 (1), 3-10; Randall & Antoni (2011), Mechanical Systems and Signal Processing 25 (2), 485-520.
+McFadden & Smith (1984), "Vibration monitoring of rolling element bearings by the high-frequency
+resonance technique", Tribology International 17 (1), 3-10; Randall & Antoni (2011), Mechanical
+Systems and Signal Processing 25 (2), 485-520.
 """
 
 from __future__ import annotations
@@ -17,7 +18,8 @@ FloatArray = NDArray[np.floating]
 def band_pass(
     signal: ArrayLike, sampling_rate: float, band: tuple[float, float], *, order: int = 4
 ) -> FloatArray:
-    """Butterworth band-pass run forwards and backwards: no phase shift, twice the order in attenuation.
+    """Butterworth band-pass run forwards and backwards: no phase shift, twice the order in
+    attenuation.
 
     Parameters
     ----------
@@ -43,7 +45,8 @@ def band_pass(
 def envelope(
     signal: ArrayLike, sampling_rate: float, band: tuple[float, float] | None = None
 ) -> FloatArray:
-    """Magnitude of the analytic signal, of the band if one is given and otherwise of the signal less its mean.
+    """Magnitude of the analytic signal, of the band if one is given and otherwise of the signal
+    less its mean.
 
     Parameters
     ----------
@@ -65,7 +68,8 @@ def envelope(
 def mesh_envelope(
     average: ArrayLike, n_teeth: int, *, harmonic: int = 1, n_sidebands: int | None = None
 ) -> FloatArray:
-    """Amplitude of one mesh harmonic over a turn, from the band of its sidebands: amplitude demodulation.
+    """Amplitude of one mesh harmonic over a turn, from the band of its sidebands: amplitude
+    demodulation.
 
     Parameters
     ----------
@@ -82,9 +86,9 @@ def mesh_envelope(
     ------
     ValueError    if the average has too few samples for the band, or the sidebands reach order 0
 
-    Source: P. D. McFadden (1986), "Detecting fatigue cracks in gears by amplitude and phase demodulation of the meshing
-    vibration", J. Vibration, Acoustics, Stress and Reliability in Design 108 (2), 165-170; here the harmonic itself
-    stays in, so that the mean is its amplitude.
+    Source: P. D. McFadden (1986), "Detecting fatigue cracks in gears by amplitude and phase
+    demodulation of the meshing vibration", J. Vibration, Acoustics, Stress and Reliability in
+    Design 108 (2), 165-170; here the harmonic itself stays in, so that the mean is its amplitude.
     """
     turn = np.asarray(average, dtype=float)
     n_samples = turn.shape[-1]

@@ -1,8 +1,10 @@
-"""Indicators of a history: each record of a machine judged by all records of it up to then, in the order of time.
+"""Indicators of a history: each record of a machine judged by all records of it up to then, in
+the order of time.
 
-J. J. Zakrajsek, D. P. Townsend & H. J. Decker (1993), "An analysis of gear fault detection methods as applied to
-pitting fatigue failure data", NASA TM-105950 (NA4); J. J. Zakrajsek, R. F. Handschuh & H. J. Decker (1994),
-"Application of fault detection techniques to spiral bevel gear fatigue data", NASA TM-106467 (NB4).
+J. J. Zakrajsek, D. P. Townsend & H. J. Decker (1993), "An analysis of gear fault detection
+methods as applied to pitting fatigue failure data", NASA TM-105950 (NA4); J. J. Zakrajsek, R. F.
+Handschuh & H. J. Decker (1994), "Application of fault detection techniques to spiral bevel gear
+fatigue data", NASA TM-106467 (NB4).
 """
 
 from __future__ import annotations
@@ -18,10 +20,12 @@ FloatArray = NDArray[np.floating]
 
 
 def na4(averages: ArrayLike, n_teeth: int) -> FloatArray:
-    """Fourth moment of the residual signal over the squared mean variance of all records up to then.
+    """Fourth moment of the residual signal over the squared mean variance of all records up to
+    then.
 
-    Where damage grows, the moment grows with the fourth power of the residual and the mean variance follows late. So
-    it goes on rising where FM4, whose own variance rises too, falls back to 3 as damage spreads over the teeth.
+    Where damage grows, the moment grows with the fourth power of the residual and the mean
+    variance follows late. So it goes on rising where FM4, whose own variance rises too, falls
+    back to 3 as damage spreads over the teeth.
 
     Parameters
     ----------
@@ -43,7 +47,8 @@ def na4(averages: ArrayLike, n_teeth: int) -> FloatArray:
 def nb4(
     averages: ArrayLike, n_teeth: int, *, harmonic: int = 1, n_sidebands: int | None = None
 ) -> FloatArray:
-    """As `na4`, of the envelope of one mesh harmonic: teeth under load that share it differently modulate the mesh.
+    """As `na4`, of the envelope of one mesh harmonic: teeth under load that share it differently
+    modulate the mesh.
 
     Parameters
     ----------

@@ -1,6 +1,7 @@
 """Impacts of a faulted tooth: how many a turn, how far they stand out, and how fast they ring down.
 
-All functions take the residual turns of the faulted shaft (`gensig.signals.synchronous.residual_turns`).
+All functions take the residual turns of the faulted shaft
+(`gensig.signals.synchronous.residual_turns`).
 """
 
 from __future__ import annotations

@@ -1,6 +1,8 @@
-"""Condition indicators: one number for a signal, or for the average turn of a gear. Batched over leading axes.
+"""Condition indicators: one number for a signal, or for the average turn of a gear. Batched over
+leading axes.
 
-What each is blind to: ``docs/theory/indicators.md``. Those of an average are NaN where it is NaN: of too few turns.
+What each is blind to: ``docs/theory/indicators.md``. Those of an average are NaN where it is NaN:
+of too few turns.
 """
 
 from __future__ import annotations
@@ -64,7 +66,8 @@ def crest_factor(signal: ArrayLike) -> FloatArray:
 
 
 def fm0(average: ArrayLike, n_teeth: int, *, n_harmonics: int | None = None) -> FloatArray:
-    """Peak to peak of the average turn over the sum of the mesh's amplitudes: 2 for a mesh that is one sine.
+    """Peak to peak of the average turn over the sum of the mesh's amplitudes: 2 for a mesh that
+    is one sine.
 
     Parameters
     ----------
@@ -80,8 +83,8 @@ def fm0(average: ArrayLike, n_teeth: int, *, n_harmonics: int | None = None) -> 
     ------
     ValueError    if the average has too few samples for the first mesh harmonic
 
-    Source: R. M. Stewart (1977), "Some useful data analysis techniques for gearbox diagnostics", ISVR Southampton,
-    MHM/R/10/77.
+    Source: R. M. Stewart (1977), "Some useful data analysis techniques for gearbox diagnostics",
+    ISVR Southampton, MHM/R/10/77.
     """
     turn = np.asarray(average, dtype=float)
     n_held = (turn.shape[-1] - 1) // 2 // n_teeth
@@ -92,7 +95,8 @@ def fm0(average: ArrayLike, n_teeth: int, *, n_harmonics: int | None = None) -> 
 
 
 def fm4(average: ArrayLike, n_teeth: int) -> FloatArray:
-    """Kurtosis of the difference signal: a fault of one or two teeth makes it peak; 3 for Gaussian noise.
+    """Kurtosis of the difference signal: a fault of one or two teeth makes it peak; 3 for
+    Gaussian noise.
 
     Parameters
     ----------
@@ -103,24 +107,27 @@ def fm4(average: ArrayLike, n_teeth: int) -> FloatArray:
     -------
     (...) dimensionless; NaN where nothing is left without the regular mesh components
 
-    Source: FM4 of R. M. Stewart (1977), ISVR Southampton, MHM/R/10/77, in the form of NASA TM-105950 (1993).
+    Source: FM4 of R. M. Stewart (1977), ISVR Southampton, MHM/R/10/77, in the form of NASA
+    TM-105950 (1993).
     """
     return _standardised_moment(_difference(average, n_teeth), 2)
 
 
 def m6a(average: ArrayLike, n_teeth: int) -> FloatArray:
-    """Sixth moment of the difference signal over its cubed variance, 15 for noise: peaks count more than in `fm4`.
+    """Sixth moment of the difference signal over its cubed variance, 15 for noise: peaks count
+    more than in `fm4`.
 
     Parameters, returns : as `fm4`
 
-    Source: H. R. Martin (1989), "Statistical moment analysis as a means of surface damage detection", Proc. 7th
-    International Modal Analysis Conference, 1016-1021.
+    Source: H. R. Martin (1989), "Statistical moment analysis as a means of surface damage
+    detection", Proc. 7th International Modal Analysis Conference, 1016-1021.
     """
     return _standardised_moment(_difference(average, n_teeth), 3)
 
 
 def m8a(average: ArrayLike, n_teeth: int) -> FloatArray:
-    """Eighth moment of the difference signal over the fourth power of its variance: 105 for Gaussian noise.
+    """Eighth moment of the difference signal over the fourth power of its variance: 105 for
+    Gaussian noise.
 
     Parameters, returns, source : as `m6a`
     """
@@ -128,7 +135,8 @@ def m8a(average: ArrayLike, n_teeth: int) -> FloatArray:
 
 
 def energy_ratio(average: ArrayLike, n_teeth: int) -> FloatArray:
-    """RMS of the difference signal over that of the regular mesh with its first sidebands: wear of all teeth raises it.
+    """RMS of the difference signal over that of the regular mesh with its first sidebands: wear
+    of all teeth raises it.
 
     Parameters
     ----------
@@ -139,8 +147,9 @@ def energy_ratio(average: ArrayLike, n_teeth: int) -> FloatArray:
     -------
     (...) dimensionless; NaN without any mesh
 
-    Source: N. S. Swansson (1980), Conf. on Lubrication, Friction and Wear in Engineering, Institution of Engineers
-    Australia, 262-267, in the form of Lebold et al. (2000), see `gensig.signals.averaging.regular_signal`.
+    Source: N. S. Swansson (1980), Conf. on Lubrication, Friction and Wear in Engineering,
+    Institution of Engineers Australia, 262-267, in the form of Lebold et al. (2000), see
+    `gensig.signals.averaging.regular_signal`.
     """
     turn = np.asarray(average, dtype=float)
     mesh = rms(regular_signal(turn, n_teeth))
@@ -167,7 +176,8 @@ def sideband_ratio(
     ------
     ValueError    if the average has too few samples for the first mesh harmonic with its sidebands
 
-    Source: sideband energy ratio of Hanna, Hatch, Kalb, Weiss & Luo (2011), here summed over several harmonics.
+    Source: sideband energy ratio of Hanna, Hatch, Kalb, Weiss & Luo (2011), here summed over
+    several harmonics.
     """
     amplitude = np.abs(np.fft.rfft(np.asarray(average, dtype=float), axis=-1))
     reach = min(n_sidebands, (n_teeth - 1) // 2)
@@ -190,7 +200,10 @@ def _difference(average: ArrayLike, n_teeth: int) -> FloatArray:
 
 
 def _standardised_moment(signal: ArrayLike, half_order: int) -> FloatArray:
-    """Central moment of twice the half order over that power of the standard deviation; NaN for a constant signal."""
+    """Central moment of twice the half order over that power of the standard deviation.
+
+    NaN for a constant signal.
+    """
     x = np.asarray(signal, dtype=float)
     squared = np.square(x - x.mean(axis=-1, keepdims=True))
     return _ratio(np.mean(squared**half_order, axis=-1), squared.mean(axis=-1) ** half_order)

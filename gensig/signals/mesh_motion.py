@@ -1,8 +1,9 @@
 """Speed from the mesh: where its harmonics stand, and how their phase wanders.
 
-Search over a comb of harmonics, then demodulation of the phase: R. B. Randall (2011), "Vibration-based condition
-monitoring", Wiley, sections 3.3 and 3.6.2; several harmonics weighted as by F. Bonnardot, M. El Badaoui, R. B. Randall,
-J. Daniere & F. Guillet (2005), Mechanical Systems and Signal Processing 19 (4), 766-785.
+Search over a comb of harmonics, then demodulation of the phase: R. B. Randall (2011),
+"Vibration-based condition monitoring", Wiley, sections 3.3 and 3.6.2; several harmonics weighted
+as by F. Bonnardot, M. El Badaoui, R. B. Randall, J. Daniere & F. Guillet (2005), Mechanical
+Systems and Signal Processing 19 (4), 766-785.
 """
 
 from __future__ import annotations
@@ -47,11 +48,12 @@ class Teeth:
 class Motion:
     """How the mesh moves through a recording.
 
-    ``mesh_frequency`` Hz, mean; ``cycles`` (sample,) mesh cycles since the first sample. ``scatter`` is the standard
-    deviation of the speed over its mean, ``correlation_time`` s; both None where the speed is steadier than
-    ``detection_limit``, the scatter that would have been seen, which is None where one harmonic alone was heard.
-    ``followed_time`` s is the correlation time that noise has after the lines are followed: a drift has a longer one.
-    ``line_db`` (harmonic,) dB is how far the lines stand out, at the sensor that hears each best.
+    ``mesh_frequency`` Hz, mean; ``cycles`` (sample,) mesh cycles since the first sample.
+    ``scatter`` is the standard deviation of the speed over its mean, ``correlation_time`` s; both
+    None where the speed is steadier than ``detection_limit``, the scatter that would have been
+    seen, which is None where one harmonic alone was heard. ``followed_time`` s is the correlation
+    time that noise has after the lines are followed: a drift has a longer one. ``line_db``
+    (harmonic,) dB is how far the lines stand out, at the sensor that hears each best.
     """
 
     mesh_frequency: float
@@ -118,7 +120,10 @@ def in_hertz(speed_rpm: float) -> str:
 
 
 def _least_line_db(turns: float) -> float:
-    """What a line must stand above the median beside it: in few segments noise alone does so too."""
+    """What a line must stand above the median beside it.
+
+    In few segments noise alone does so too.
+    """
     from scipy.stats import gamma
 
     n_segments = max(1.0, 2.0 * turns / TURNS_A_SEGMENT - 1.0)
@@ -129,7 +134,9 @@ def _least_line_db(turns: float) -> float:
 def _search(
     recording: Recording, teeth: Teeth, nominal: float, highest: float
 ) -> tuple[float, Array]:
-    """Mesh frequency to a fraction of a line, and how far its harmonics stand out, (harmonic,) dB."""
+    """Mesh frequency to a fraction of a line, and how far its harmonics stand out, (harmonic,)
+    dB.
+    """
     from scipy.ndimage import median_filter
     from scipy.signal import welch
 
@@ -152,7 +159,10 @@ def _search(
 def _follow(
     recording: Recording, teeth: Teeth, mesh: float, heard: NDArray[np.intp], line_db: Array
 ) -> Motion:
-    """Phase of the harmonics that are heard, in rounds; then what they agree on beyond their noise."""
+    """Phase of the harmonics that are heard, in rounds.
+
+    Then what they agree on beyond their noise.
+    """
     rate, n_samples = recording.sampling_rate, recording.acceleration.shape[1]
     cycles: Array = mesh * np.arange(n_samples, dtype=np.float64) / rate
     slow = mesh / teeth.most
@@ -177,10 +187,12 @@ def _follow(
 
 
 def _deviation(signal: Array, cycles: Array, used: list[int], width: float, rate: float) -> Array:
-    """What the mesh frequency is above that of ``cycles``, (group, sample) Hz: of all lines, then of every other one.
+    """What the mesh frequency is above that of ``cycles``, (group, sample) Hz: of all lines, then
+    of every other one.
 
-    Each line is shifted to rest and kept within ``width`` Hz; its frequency is Im(z* dz/dt) / |z|^2. Lines are averaged
-    with the weight harmonic^2 power / noise, which is that of the least squares fit of one common frequency.
+    Each line is shifted to rest and kept within ``width`` Hz; its frequency is Im(z* dz/dt) /
+    |z|^2. Lines are averaged with the weight harmonic^2 power / noise, which is that of the least
+    squares fit of one common frequency.
     """
     n_samples = signal.shape[1]
     frequency = np.fft.fftfreq(n_samples, 1.0 / rate)
@@ -214,7 +226,10 @@ def _told(
     slow: float,
     line_db: Array,
 ) -> Motion:
-    """Drift where it is above the noise of the lines; its correlation time is where the correlation falls to 1/e."""
+    """Drift where it is above the noise of the lines.
+
+    Its correlation time is where the correlation falls to 1/e.
+    """
     variance = float(np.var(deviation))
     limit = None if noise is None else float(np.sqrt(np.mean(noise**2)))
     scatter = correlation = None

@@ -1,4 +1,7 @@
-"""Recordings of users: accelerations of some sensors at one rate. Their content is data; every mistake is one line."""
+"""Recordings of users: accelerations of some sensors at one rate. Their content is data.
+
+Every mistake is one line.
+"""
 
 from __future__ import annotations
 
@@ -75,7 +78,10 @@ class RecordingFile:
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Recording:
-    """What some sensors felt: names, (sensor, sample) m/s2 without the mean, and samples per second."""
+    """What some sensors felt.
+
+    Names, (sensor, sample) m/s2 without the mean, and samples per second.
+    """
 
     sensors: tuple[str, ...]
     acceleration: Array
@@ -227,7 +233,8 @@ def _read_csv(file: str, rate: float | None, rate_option: str) -> tuple[list[str
     kept = [place for place, name in enumerate(names) if name != "time_s"]
     if not kept:
         raise ConfigError(f"{file}: there is no column beside time_s; give one a sensor")
-    # times are often printed with few digits: a rate within their rounding of a whole number is that number
+    # times are often printed with few digits: a rate within their rounding of a whole number is
+    # that number
     whole = round(found)
     precise = float(whole) if math.isclose(found, whole, rel_tol=2e-6) else found
     return [names[place] for place in kept], values[kept], rate if rate is not None else precise

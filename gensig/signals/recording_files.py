@@ -1,4 +1,7 @@
-"""Files of recordings: WAV, numpy, HDF5 and MATLAB. Numbers only: nothing is unpickled, no link is followed."""
+"""Files of recordings.
+
+WAV, numpy, HDF5 and MATLAB. Numbers only: nothing is unpickled, no link is followed.
+"""
 
 from __future__ import annotations
 
@@ -80,7 +83,10 @@ def read_npz(file: str, array: str | None) -> Content:
 
 
 def read_hdf5(file: str, array: str | None, *, from_matlab: bool = False) -> Content:
-    """One array of an HDF5 file; the rate may be an array or an attribute of the file or of the array."""
+    """One array of an HDF5 file.
+
+    The rate may be an array or an attribute of the file or of the array.
+    """
     import h5py
 
     with _one_line(file, "it is no HDF5 file"), h5py.File(Path(file).expanduser(), "r") as content:
@@ -105,7 +111,9 @@ def read_hdf5(file: str, array: str | None, *, from_matlab: bool = False) -> Con
 
 
 def read_mat(file: str, array: str | None) -> Content:
-    """One array of a MATLAB file of version 4, 5 or 7 (scipy) or 7.3 (HDF5), samples along its longer side."""
+    """One array of a MATLAB file of version 4, 5 or 7 (scipy) or 7.3 (HDF5), samples along its
+    longer side.
+    """
     import h5py
     from scipy import io
 

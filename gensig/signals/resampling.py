@@ -1,4 +1,5 @@
-"""From one rate to another, by the low-pass of the simulated recorder: flat to 0.39 of the lower rate, shut from half.
+"""From one rate to another, by the low-pass of the simulated recorder: flat to 0.39 of the lower
+rate, shut from half.
 
 Rates may be samples a second or samples a turn.
 """
@@ -48,7 +49,8 @@ class RateChange:
     def apply(self, signal: ArrayLike) -> FloatArray:
         """Signal (..., sample) at the new rate; beyond its ends it counts as zero.
 
-        Source: `scipy.signal.resample_poly` with a Kaiser-window low-pass as in ``gensig.dynamics.decimation``.
+        Source: `scipy.signal.resample_poly` with a Kaiser-window low-pass as in
+        ``gensig.dynamics.decimation``.
         """
         x = np.asarray(signal, dtype=float)
         if self.is_none:
@@ -61,7 +63,8 @@ class RateChange:
     def apply_to_part(
         self, read: Callable[[int, int], FloatArray], n_found: int, start: int, stop: int
     ) -> FloatArray:
-        """Samples from start to stop of `apply`, read and computed from what they need of the signal.
+        """Samples from start to stop of `apply`, read and computed from what they need of the
+        signal.
 
         Parameters
         ----------

@@ -1,8 +1,9 @@
-"""The angle domain of a shaft whose speed varies, by its angle, or without a tachometer by the phase of the mesh.
+"""The angle domain of a shaft whose speed varies, by its angle, or without a tachometer by the
+phase of the mesh.
 
-Phase demodulation as a tachometer: F. Bonnardot, M. El Badaoui, R. B. Randall, J. Daniere & F. Guillet (2005), "Use of
-the acceleration signal of a gearbox in order to perform angular resampling", Mechanical Systems and Signal Processing
-19 (4), 766-785.
+Phase demodulation as a tachometer: F. Bonnardot, M. El Badaoui, R. B. Randall, J. Daniere & F.
+Guillet (2005), "Use of the acceleration signal of a gearbox in order to perform angular
+resampling", Mechanical Systems and Signal Processing 19 (4), 766-785.
 """
 
 from __future__ import annotations

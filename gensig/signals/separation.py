@@ -1,4 +1,7 @@
-"""What repeats with either gear of a pair, told apart tooth by tooth: neither average holds a part of the other's."""
+"""What repeats with either gear of a pair, told apart tooth by tooth.
+
+Neither average holds a part of the other's.
+"""
 
 from __future__ import annotations
 
@@ -17,7 +20,8 @@ RIDGE = 1e-3  # of one passage of a tooth: decides what passes too seldom to be 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class GearTurns:
-    """A signal taken apart into the mean passage of a mesh and what each tooth of either gear adds to it.
+    """A signal taken apart into the mean passage of a mesh and what each tooth of either gear
+    adds to it.
 
     Attributes
     ----------

@@ -1,7 +1,7 @@
 """Spectral kurtosis: in which band a signal comes in bursts.
 
-J. Antoni (2006), "The spectral kurtosis: a useful tool for characterising non-stationary signals", Mechanical Systems
-and Signal Processing 20 (2), 282-307.
+J. Antoni (2006), "The spectral kurtosis: a useful tool for characterising non-stationary
+signals", Mechanical Systems and Signal Processing 20 (2), 282-307.
 """
 
 from __future__ import annotations
@@ -17,7 +17,8 @@ MAIN_LOBE = 2  # lines from the middle of a Hann window's main lobe to its first
 def spectral_kurtosis(
     signal: ArrayLike, sampling_rate: float, window_samples: int
 ) -> tuple[FloatArray, FloatArray]:
-    """Kurtosis over time of the short-time spectrum, by frequency: 0 for noise, -1 for a tone, more for bursts.
+    """Kurtosis over time of the short-time spectrum, by frequency: 0 for noise, -1 for a tone,
+    more for bursts.
 
     Parameters
     ----------

@@ -26,7 +26,8 @@ def amplitude_spectrum(
     frequency : (bin,) Hz
     amplitude : (..., bin) in the unit of the signal
 
-    Source: Heinzel, Ruediger & Schilling (2002), "Spectrum and spectral density estimation by the DFT", eqs. 19 and 24.
+    Source: Heinzel, Ruediger & Schilling (2002), "Spectrum and spectral density estimation by the
+    DFT", eqs. 19 and 24.
     """
     from scipy.signal import get_window
 
@@ -70,7 +71,8 @@ def order_spectrum(
 
 
 def spectrum_of_turns(turns: ArrayLike) -> tuple[FloatArray, FloatArray]:
-    """Amplitude spectrum over the orders of a shaft, of turns cut at any course of the speed: order tracking.
+    """Amplitude spectrum over the orders of a shaft, of turns cut at any course of the speed:
+    order tracking.
 
     Parameters
     ----------

@@ -1,4 +1,7 @@
-"""A speed that wanders, read off the harmonics of the mesh in a spectrogram: coarse, but sure of its lines."""
+"""A speed that wanders, read off the harmonics of the mesh in a spectrogram.
+
+Coarse, but sure of its lines.
+"""
 
 from __future__ import annotations
 
@@ -39,7 +42,8 @@ def wandering_mesh_cycles(
     options: str,
     longer: str,
 ) -> FloatArray:
-    """Mesh cycles since the first sample, (sample,), where the speed stays near a stated one but wanders.
+    """Mesh cycles since the first sample, (sample,), where the speed stays near a stated one but
+    wanders.
 
     Parameters
     ----------
@@ -128,10 +132,11 @@ def mesh_frequency_course(
     ------
     ValueError    if the recording is shorter than a frame, or the search reaches sidebands or ``highest``
 
-    Source: Q. Leclere, H. Andre & J. Antoni (2016), "A multi-order probabilistic approach for instantaneous angular
-    speed tracking", Mechanical Systems and Signal Processing 81, 375-386: spectrum of each frame over its local floor,
-    read at every harmonic of a candidate as its probability, multiplied over the harmonics. Their smoothing is replaced
-    by the most probable whole course (Viterbi) with normal steps.
+    Source: Q. Leclere, H. Andre & J. Antoni (2016), "A multi-order probabilistic approach for
+    instantaneous angular speed tracking", Mechanical Systems and Signal Processing 81, 375-386:
+    spectrum of each frame over its local floor, read at every harmonic of a candidate as its
+    probability, multiplied over the harmonics. Their smoothing is replaced by the most probable
+    whole course (Viterbi) with normal steps.
     """
     from scipy.signal import stft
 
@@ -177,7 +182,9 @@ def _floor(power: FloatArray) -> FloatArray:
 
 
 def _most_probable(likelihood: FloatArray, candidates: FloatArray) -> NDArray[np.intp]:
-    """(frame,) indices of the candidates along the best course, logarithms of probability (frame, candidate)."""
+    """(frame,) indices of the candidates along the best course, logarithms of probability (frame,
+    candidate).
+    """
     change = -0.5 * np.square((candidates[:, None] - candidates[None, :]) / STEP_SHARE)  # to, from
     total, origin = likelihood[0], []
     for row in likelihood[1:]:

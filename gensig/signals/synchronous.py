@@ -1,4 +1,7 @@
-"""What a signal holds of a shaft's turns: mesh harmonics by order, and the share that does not repeat."""
+"""What a signal holds of a shaft's turns.
+
+Mesh harmonics by order, and the share that does not repeat.
+"""
 
 from __future__ import annotations
 
@@ -64,7 +67,8 @@ def nonsynchronous_share(turns: ArrayLike) -> FloatArray:
 
 
 def residual_turns(turns: ArrayLike, n_teeth: int, *, n_shaft_orders: int = 2) -> FloatArray:
-    """Turns without the mean, the lowest shaft orders and every mesh harmonic; what does not repeat stays.
+    """Turns without the mean, the lowest shaft orders and every mesh harmonic; what does not
+    repeat stays.
 
     Parameters
     ----------

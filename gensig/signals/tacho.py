@@ -1,7 +1,7 @@
 """From a tachometer's pulses to speed and to the angle domain: computed order tracking.
 
-K. R. Fyfe & E. D. S. Munck (1997), "Analysis of computed order tracking", Mechanical Systems and Signal Processing 11
-(2), 187-205.
+K. R. Fyfe & E. D. S. Munck (1997), "Analysis of computed order tracking", Mechanical Systems and
+Signal Processing 11 (2), 187-205.
 """
 
 from __future__ import annotations
@@ -63,8 +63,8 @@ def resample_by_pulses(
 ) -> FloatArray:
     """Cut a signal into whole turns, sampled uniformly in shaft angle, at any course of the speed.
 
-    The first turn starts at the first pulse; what comes before it and after the last whole turn is left out. Their
-    mean is `gensig.signals.averaging.average_turn`.
+    The first turn starts at the first pulse; what comes before it and after the last whole turn
+    is left out. Their mean is `gensig.signals.averaging.average_turn`.
 
     Parameters
     ----------

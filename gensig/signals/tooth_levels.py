@@ -1,4 +1,6 @@
-"""How loud a gear is at each of its teeth, and at which tooth that changed against an earlier record of the machine."""
+"""How loud a gear is at each of its teeth, and at which tooth that changed against an earlier
+record of the machine.
+"""
 
 from __future__ import annotations
 
@@ -25,7 +27,8 @@ def tooth_levels(
     band: tuple[float, float],
     start: float = 0.0,
 ) -> FloatArray:
-    """Level of a band while each tooth of a gear passes, mean of the decibels over the whole turns of the signal.
+    """Level of a band while each tooth of a gear passes, mean of the decibels over the whole
+    turns of the signal.
 
     Parameters
     ----------

@@ -48,7 +48,8 @@ class MachineMesh:
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Machine(ABC):
-    """A machine with gears: material, set-point, sensors, quality and solver; each kind says how it moves.
+    """A machine with gears: material, set-point, sensors, quality and solver; each kind says how
+    it moves.
 
     The kinds are final: none overrides a method that another one defines.
     """
@@ -98,7 +99,10 @@ class Machine(ABC):
     @property
     @abstractmethod
     def torque_of(self) -> str:
-        """The torque that ``operating`` sets, in words; empty where it is the driving shaft's own."""
+        """The torque that ``operating`` sets, in words.
+
+        Empty where it is the driving shaft's own.
+        """
 
     @property
     @abstractmethod
@@ -136,7 +140,10 @@ class Machine(ABC):
 
     @abstractmethod
     def driven_tooth(self, tooth_pinion: int, drawn: int) -> int:
-        """Tooth of the driven gear that meets one of the pinion at the start; ``drawn`` if any may."""
+        """Tooth of the driven gear that meets one of the pinion at the start.
+
+        ``drawn`` if any may.
+        """
 
     @abstractmethod
     def draw_discs(self, rng: np.random.Generator) -> tuple[Disc, ...]:
@@ -162,7 +169,10 @@ class Machine(ABC):
         specimen: Specimen | None = None,
         gearbox: Gearbox | None = None,
     ) -> CleanRecord:
-        """Simulate one record; what is not given is perfect, nominal, and starts with teeth 0 at A."""
+        """Simulate one record.
+
+        What is not given is perfect, nominal, and starts with teeth 0 at A.
+        """
         run = Run(
             system=self, faults=tuple(faults), start=start, specimen=specimen, gearbox=gearbox
         )

@@ -1,4 +1,7 @@
-"""Flank modifications that are best for a range of torques and misalignments: least ripple, least load, and between."""
+"""Flank modifications that are best for a range of torques and misalignments.
+
+Least ripple, least load, and between.
+"""
 
 from __future__ import annotations
 
@@ -16,7 +19,8 @@ from gensig.systems.sliced_pair import SlicedPair
 
 Array = NDArray[np.float64]
 
-# of the search, in normal modules: depth and height as the paper on transmission error takes them, section 2
+# of the search, in normal modules: depth and height as the paper on transmission error takes
+# them, section 2
 LARGEST_DEPTH, LARGEST_HEIGHT = 0.02, 0.65
 N_VARIABLES = (
     9  # tip and root relief, each with depth and height, of both gears; crowning of the pair
@@ -32,7 +36,10 @@ REFUSED = 1e3  # times the unmodified value, for flanks that overlap or lose con
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Cases:
-    """What a modification must be good for: every torque (N m) with every misalignment (m over the face)."""
+    """What a modification must be good for.
+
+    Every torque (N m) with every misalignment (m over the face).
+    """
 
     torques: tuple[float, ...]
     misalignments: tuple[float, ...]
@@ -56,7 +63,10 @@ class Optimum:
 def judge(
     system: SlicedPair, modification: PairModification, cases: Cases, *, n_phases: int = 64
 ) -> Optimum:
-    """Worst ripple and worst line load over the cases; the modification's own misalignment is added to theirs."""
+    """Worst ripple and worst line load over the cases.
+
+    The modification's own misalignment is added to theirs.
+    """
     ripple, line_load = 0.0, 0.0
     for misalignment in cases.misalignments:
         askew = replace(modification, misalignment=modification.misalignment + misalignment)
@@ -93,7 +103,8 @@ def optimise(
     -------
     optima that none of the others beats in both, by rising ripple
 
-    Source: differential evolution of Storn & Price (1997) as ``scipy.optimize.differential_evolution`` has it.
+    Source: differential evolution of Storn & Price (1997) as
+    ``scipy.optimize.differential_evolution`` has it.
     """
     search = replace(
         system, slices=replace(system.slices, n_slices=min(N_SLICES, system.slices.n_slices))
@@ -143,7 +154,9 @@ def optimise(
 
 
 def _spread(seen: Mapping[bytes, tuple[float, float]], n_points: int) -> list[Array]:
-    """Points of all that were tried that no other beats, at most so many, spread evenly over the front's length."""
+    """Points of all that were tried that no other beats, at most so many, spread evenly over the
+    front's length.
+    """
     order = sorted(seen, key=lambda key: seen[key])
     front = [order[0]]
     for key in order:
@@ -160,7 +173,9 @@ def _spread(seen: Mapping[bytes, tuple[float, float]], n_points: int) -> list[Ar
 def _minimum(
     objective: Callable[[Array], float], start: Sequence[Array], *, seed: int, generations: int
 ) -> Array:
-    """Best point of the unit box, (variable,), from a random population that holds the given ones."""
+    """Best point of the unit box, (variable,), from a random population that holds the given
+    ones.
+    """
     from scipy.optimize import differential_evolution
     from scipy.stats import qmc
 

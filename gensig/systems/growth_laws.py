@@ -1,4 +1,7 @@
-"""Laws of growth of a machine's gears: of a spur mesh by its one pair in contact, of slices by their own loads."""
+"""Laws of growth of a machine's gears.
+
+Of a spur mesh by its one pair in contact, of slices by their own loads.
+"""
 
 from __future__ import annotations
 
@@ -28,7 +31,10 @@ N_TORQUES = 3  # how slices share the load hangs little on the torque
 def crack_law(
     machine: Machine, crack: Crack, options: CrackGrowthOptions, torques: tuple[float, float]
 ) -> CrackGrowth:
-    """The law of a crack like ``crack``; ``torques`` in N m are the least and the greatest that it meets."""
+    """The law of a crack like ``crack``.
+
+    ``torques`` in N m are the least and the greatest that it meets.
+    """
     if not isinstance(machine, HelicalPair):
         return _spur_crack_law(machine.pair, machine.material, crack, options)
     return _sliced_crack_law(_for_lives(machine.flanks), crack, options, torques)
@@ -41,7 +47,10 @@ def pit_law(
     first: float,
     torques: tuple[float, float],
 ) -> PitGrowth:
-    """The law of pits like ``pits``, the first ones ``first`` times as large; ``torques`` as in ``crack_law``."""
+    """The law of pits like ``pits``, the first ones ``first`` times as large.
+
+    ``torques`` as in ``crack_law``.
+    """
     if not isinstance(machine, HelicalPair):
         return pit_growth(machine.pair, machine.material, pits, options, first)
     looked = _between(torques)
@@ -50,7 +59,10 @@ def pit_law(
 
 
 def _for_lives(flanks: SlicedPair) -> SlicedPair:
-    """The pair as laws of growth take it: contact on its path only, like the spur laws, and calibrated cracks."""
+    """The pair as laws of growth take it.
+
+    Contact on its path only, like the spur laws, and calibrated cracks.
+    """
     mesh = replace(flanks.mesh, law="paper", crack="calibrated", allow_extrapolation=True)
     return replace(flanks, mesh=mesh)
 

@@ -1,4 +1,7 @@
-"""A helical gear pair on its bearings: the slices of its flanks, its records, and both from one configuration."""
+"""A helical gear pair on its bearings.
+
+The slices of its flanks, its records, and both from one configuration.
+"""
 
 from __future__ import annotations
 
@@ -20,9 +23,11 @@ from gensig.systems.stiffness_curves import StiffnessCurves
 @final
 @dataclass(frozen=True, slots=True, kw_only=True)
 class HelicalPair(GearPairMachine):
-    """One machine whose teeth are cut into slices; with no helix it is a spur pair that also moves along its axes.
+    """One machine whose teeth are cut into slices; with no helix it is a spur pair that also
+    moves along its axes.
 
-    ``flanks`` is the same pair at rest, for its transmission error, load over the flanks and stiffness.
+    ``flanks`` is the same pair at rest, for its transmission error, load over the flanks and
+    stiffness.
     """
 
     flanks: SlicedPair

@@ -1,4 +1,7 @@
-"""A sliced pair at work: how hot its gears get, what each effect of heat does to its mesh stiffness."""
+"""A sliced pair at work.
+
+How hot its gears get, what each effect of heat does to its mesh stiffness.
+"""
 
 from __future__ import annotations
 
@@ -173,7 +176,10 @@ def heated(
 
 
 def as_configured(duty: Duty) -> SlicedPair:
-    """The pair with the effects that its ``heat`` switches on; the pair itself where it switches none."""
+    """The pair with the effects that its ``heat`` switches on.
+
+    The pair itself where it switches none.
+    """
     heat = duty.heat
     if not heat.is_any:
         return duty.system
@@ -243,8 +249,9 @@ def sweep(duty: Duty, name: str, values: Sequence[float]) -> list[dict[str, Vari
 def flash_skin_growth(duty: Duty, state: HotState) -> float:
     """How far the flash temperature lifts the surface of a flank, m: an upper bound.
 
-    The heat of one passing contact reaches sqrt(g t / (rho c)) deep in the time t that the contact's width takes to
-    pass; that skin, held by the cold tooth around it, expands by (1 + nu) / (1 - nu) times its free expansion.
+    The heat of one passing contact reaches sqrt(g t / (rho c)) deep in the time t that the
+    contact's width takes to pass; that skin, held by the cold tooth around it, expands by (1 +
+    nu) / (1 - nu) times its free expansion.
     """
     pair, material, heat = duty.system.pair, duty.system.material, duty.heat
     load = float(state.contact.line_load.max())
@@ -296,7 +303,9 @@ def _flash_along_path(duty: Duty, contact: LoadedContact) -> tuple[Array, Array]
 
 
 def _grown(pair: GearPair, growth: PairGrowth, strain: float) -> GearPair:
-    """The pair made larger by its common strain, each gear as wide as its teeth and with the bore that its body has."""
+    """The pair made larger by its common strain, each gear as wide as its teeth and with the bore
+    that its body has.
+    """
     pinion, wheel = (
         replace(
             gear,

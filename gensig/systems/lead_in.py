@@ -1,4 +1,6 @@
-"""Records that begin earlier, so that the filters behind them have settled at the first sample that is kept."""
+"""Records that begin earlier, so that the filters behind them have settled at the first sample
+that is kept.
+"""
 
 from __future__ import annotations
 
@@ -15,9 +17,11 @@ from gensig.systems.run import CleanRecord, Run, Start
 
 
 def simulate_with_lead_in(runs: Sequence[Run[Machine]]) -> list[CleanRecord | SimulationError]:
-    """As ``simulate_together``, but every acceleration has its ``sensing.n_lead`` samples before the record too.
+    """As ``simulate_together``, but every acceleration has its ``sensing.n_lead`` samples before
+    the record too.
 
-    All else that a record tells is of the record alone, but for ``contact_loss_fraction``, which counts both.
+    All else that a record tells is of the record alone, but for ``contact_loss_fraction``, which
+    counts both.
     """
     results = simulate_together([earlier(run) for run in runs])
     return [
@@ -27,7 +31,10 @@ def simulate_with_lead_in(runs: Sequence[Run[Machine]]) -> list[CleanRecord | Si
 
 
 def earlier(run: Run[Machine]) -> Run[Machine]:
-    """The same motion from ``sensing.n_lead`` samples before its first one: teeth and phase turned back."""
+    """The same motion from ``sensing.n_lead`` samples before its first one.
+
+    Teeth and phase turned back.
+    """
     n_lead = run.system.sensing.n_lead
     if n_lead == 0:
         return run

@@ -12,7 +12,8 @@ from gensig.errors import ConfigError
 
 
 def mesh_signals(mesh: MeshState | None, n_samples: int, n_pairs: int) -> dict[str, NDArray[Any]]:
-    """The mesh state as a shard takes it, ``n_pairs`` rows of pairs; of a failed record nothing is known.
+    """The mesh state as a shard takes it, ``n_pairs`` rows of pairs; of a failed record nothing
+    is known.
 
     Raises
     ------

@@ -1,4 +1,7 @@
-"""Nuisances in a record: their forces follow its shafts' angles, its linear machine answers, bearings hear it."""
+"""Nuisances in a record.
+
+Their forces follow its shafts' angles, its linear machine answers, bearings hear it.
+"""
 
 from __future__ import annotations
 
@@ -32,10 +35,12 @@ def with_nuisances(
     units: Mapping[str, np.random.Generator],
     record_rng: np.random.Generator,
 ) -> CleanRecord:
-    """A record whose bearings also feel what ``sensing.nuisances`` lists; without any, the record itself.
+    """A record whose bearings also feel what ``sensing.nuisances`` lists; without any, the record
+    itself.
 
-    The machine that answers is the sound one whatever the run's faults: nothing but the shaft's own angle, which the
-    forces follow, differs from one class to another. ``units`` has a generator a level, see ``draw_tones``.
+    The machine that answers is the sound one whatever the run's faults: nothing but the shaft's
+    own angle, which the forces follow, differs from one class to another. ``units`` has a
+    generator a level, see ``draw_tones``.
     """
     nuisances = run.system.sensing.nuisances
     if not nuisances:
@@ -61,10 +66,11 @@ def nuisance_acceleration(
     -------
     (channel, n_lead + sample) m/s2, or rad/s2 for a rotation
 
-    Every tone has the amplitude and phase lag of steady turning at the nominal speed of the instant (assumed; taken
-    once a block, straight in between) and the phase of the shaft's actual angle. Tones above the usable band are left
-    out. Before the record the shaft turns as the nominal course says. The sum is made at every few samples of its
-    fastest tone and goes by cubic splines in between, which leaves less than 1e-4 of it but at the last few samples.
+    Every tone has the amplitude and phase lag of steady turning at the nominal speed of the
+    instant (assumed; taken once a block, straight in between) and the phase of the shaft's actual
+    angle. Tones above the usable band are left out. Before the record the shaft turns as the
+    nominal course says. The sum is made at every few samples of its fastest tone and goes by
+    cubic splines in between, which leaves less than 1e-4 of it but at the last few samples.
     """
     from scipy.interpolate import CubicSpline
 
@@ -112,7 +118,10 @@ def nuisance_acceleration(
 
 
 def _frequencies(dynamics: PairDynamics, tones: Tones, speed: Array) -> Array:
-    """Circular frequencies at speeds of the pinion in rad/s, (speed, tone) rad/s; below 0 against the shaft's sense."""
+    """Circular frequencies at speeds of the pinion in rad/s, (speed, tone) rad/s.
+
+    Below 0 against the shaft's sense.
+    """
     return np.asarray(speed[:, None] * shaft(dynamics, tones.gear).speed_ratio * tones.order)
 
 

@@ -127,7 +127,10 @@ class GearPairMachine(Machine):
         return ()
 
     def check(self) -> None:
-        """Raise for what would stop every record: drive, fits out of range, channels, step length."""
+        """Raise for what would stop every record.
+
+        Drive, fits out of range, channels, step length.
+        """
         self.require_drive()
         self.mesh_table()
         self.quality.check_covered(self.pair.pinion, self.pair.wheel)
@@ -205,10 +208,11 @@ def _finer(run: PairRun) -> PairRun:
 
 
 def simulate_pairs(runs: Sequence[PairRun]) -> list[CleanRecord | SimulationError]:
-    """Records of runs, in the order given; runs that share rate, duration and law are integrated in one call.
+    """Records of runs, in the order given; runs that share rate, duration and law are integrated
+    in one call.
 
-    The bits of a record do not depend on the other runs. A motion that does not stay finite gives its error in place
-    of its record.
+    The bits of a record do not depend on the other runs. A motion that does not stay finite gives
+    its error in place of its record.
     """
     found: dict[int, CleanRecord | SimulationError] = {}
     machines: dict[int, PairDynamics] = {}

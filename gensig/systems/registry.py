@@ -114,8 +114,8 @@ def _read_machine(config: Configuration, pair: GearPair) -> dict[str, Any]:
 
 
 def read_sliced_pair(config: Configuration) -> SlicedPair:
-    """Build a spur or helical pair cut into slices from the boundary keys of a configuration, whatever its system; as
-    hot as its ``heat`` makes it."""
+    """Build a spur or helical pair cut into slices from the boundary keys of a configuration,
+    whatever its system; as hot as its ``heat`` makes it."""
     _refuse_line(config)
     heat = read_heat(config)
     return as_configured(read_duty(config)) if heat.is_any else read_cold_pair(config)
@@ -230,7 +230,9 @@ def _read_gear(name: str, gear: Section, helix_angle: float) -> Gear:
 
 
 def _read_body(gear: Gear, values: Section, material: Material) -> Body:
-    """Mass and inertia as given, or those of a solid disc on the pitch circle less the bore where null."""
+    """Mass and inertia as given, or those of a solid disc on the pitch circle less the bore where
+    null.
+    """
     derived = solid_disc(
         gear.pitch_radius, gear.bore_radius, gear.face_width, material.density_kg_per_m3
     )

@@ -1,4 +1,7 @@
-"""Root stress of a gear pair: at ISO's load point, and through the mesh under the loads that its flanks share."""
+"""Root stress of a gear pair.
+
+At ISO's load point, and through the mesh under the loads that its flanks share.
+"""
 
 from __future__ import annotations
 
@@ -39,9 +42,9 @@ WIDEST = 64.0  # times the force at ISO's load point: the search for the force o
 class RootHistory:
     """Root stress of one tooth pair from its first touch to its last.
 
-    ``roll`` (point,) m of the pinion along the line of action, 0 where the pair enters at A (the first slice of a
-    helical one); ``share`` (point,) of the load on this pair; ``stress`` by gear, (point,) Pa, the largest over the
-    face.
+    ``roll`` (point,) m of the pinion along the line of action, 0 where the pair enters at A (the
+    first slice of a helical one); ``share`` (point,) of the load on this pair; ``stress`` by
+    gear, (point,) Pa, the largest over the face.
     """
 
     roll: Array
@@ -51,7 +54,9 @@ class RootHistory:
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class GearStress:
-    """Nominal stress sigma_F0 and sigma_F with the load factors in Pa, every factor, and the safety of one gear."""
+    """Nominal stress sigma_F0 and sigma_F with the load factors in Pa, every factor, and the
+    safety of one gear.
+    """
 
     factors: RootFactors
     nominal: float
@@ -63,7 +68,8 @@ class GearStress:
 class RootStrength:
     """A pair with sound teeth, its strength and the torque on its pinion in N m.
 
-    ``sliced`` says that the face is cut into slices: helical pairs, and spur ones with modified flanks.
+    ``sliced`` says that the face is cut into slices: helical pairs, and spur ones with modified
+    flanks.
     """
 
     flanks: SlicedPair
@@ -98,7 +104,9 @@ class RootStrength:
         return max(self.factors, key=lambda name: self.factors[name].stress_per_force)
 
     def force_for(self, stress: float) -> float:
-        """Tangential force F_t in N that gives the decisive gear this sigma_F in Pa, load factors included."""
+        """Tangential force F_t in N that gives the decisive gear this sigma_F in Pa, load factors
+        included.
+        """
         if not (math.isfinite(stress) and stress > 0.0):
             raise ConfigError(
                 f"a root stress of {stress * 1e-6:g} MPa cannot be asked for; give a positive one"
@@ -111,7 +119,9 @@ class RootStrength:
         return replace(self, flanks=replace(self.flanks, torque=torque))
 
     def force_over_mesh_for(self, stress: float) -> float:
-        """Tangential force F_t in N under which the largest stress over the mesh, of either gear, is ``stress`` Pa."""
+        """Tangential force F_t in N under which the largest stress over the mesh, of either gear,
+        is ``stress`` Pa.
+        """
         from scipy.optimize import brentq
 
         radius = self.pair.pinion.pitch_radius
@@ -159,9 +169,11 @@ class RootStrength:
         return found
 
     def history(self, *, n_phases: int = N_PHASES) -> RootHistory:
-        """Root stress through the mesh under the static loads of the flanks, K_A, K_gamma and K_v in the force.
+        """Root stress through the mesh under the static loads of the flanks, K_A, K_gamma and K_v
+        in the force.
 
-        Of the face and transverse load factors it knows nothing: the loads that the mesh finds are in their place.
+        Of the face and transverse load factors it knows nothing: the loads that the mesh finds
+        are in their place.
         """
         force = self.flanks.mesh_force * self.strength.force_factor
         pitch = self.pair.base_pitch
@@ -184,7 +196,10 @@ class RootStrength:
         )
 
     def _whole(self, phases: Array, force: float) -> tuple[Array, Array, dict[str, Array]]:
-        """Pairs of a spur pair as wholes: roll, share of the load and stress by gear, (point,) each."""
+        """Pairs of a spur pair as wholes.
+
+        Roll, share of the load and stress by gear, (point,) each.
+        """
         mesh = self.flanks.mesh
         flanks = self.flanks
         table = loaded_pair_table(
@@ -201,7 +216,10 @@ class RootStrength:
         return states.position.ravel(), load.ravel() / force, stress
 
     def _sliced(self, phases: Array, force: float) -> tuple[Array, Array, dict[str, Array]]:
-        """The same slice by slice, the largest of the face; slices bend each other as in the mesh."""
+        """The same slice by slice, the largest of the face.
+
+        Slices bend each other as in the mesh.
+        """
         mesh, pair, slices = self.flanks.sliced_mesh(), self.pair, self.flanks.slices
         contact = loaded_contact(mesh, phases, force)
         roll = contact.position[:, :, 0] + mesh.lag[0]

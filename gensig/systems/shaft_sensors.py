@@ -23,9 +23,11 @@ SWITCHES = {
 
 
 def gear_angle(system: Machine, shaft: str, start: Start, shaft_angle: Array) -> Array:
-    """Angle of a gear in its own sense of rotation, 0 where its tooth 0 enters contact, (sample,) rad.
+    """Angle of a gear in its own sense of rotation, 0 where its tooth 0 enters contact, (sample,)
+    rad.
 
-    The wheel's is that of the pinion over the ratio: its lag under load and its own vibration are left out.
+    The wheel's is that of the pinion over the ratio: its lag under load and its own vibration are
+    left out.
 
     Parameters
     ----------

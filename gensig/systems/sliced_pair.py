@@ -1,4 +1,7 @@
-"""A spur or helical pair at rest: what its loaded flanks do over one mesh period, slice by slice."""
+"""A spur or helical pair at rest.
+
+What its loaded flanks do over one mesh period, slice by slice.
+"""
 
 from __future__ import annotations
 
@@ -38,7 +41,8 @@ SOUND_PERIODS = 2  # told on either side of a fault
 
 @dataclass(frozen=True, slots=True, kw_only=True, eq=False)
 class TransmissionError:
-    """Static transmission error under load and what goes with it, over one mesh period, or as many as see a fault.
+    """Static transmission error under load and what goes with it, over one mesh period, or as
+    many as see a fault.
 
     Parameters
     ----------
@@ -70,7 +74,8 @@ class TransmissionError:
 class SlicedPair:
     """A gear pair with sound teeth, its flank modification, and the pinion's torque in N m.
 
-    ``growth`` is what heat does to flanks beyond growing the pair as a whole, see ``gensig.systems.hot_pair``.
+    ``growth`` is what heat does to flanks beyond growing the pair as a whole, see
+    ``gensig.systems.hot_pair``.
     """
 
     pair: GearPair
@@ -99,7 +104,10 @@ class SlicedPair:
         )
 
     def deviation(self) -> Array | None:
-        """How far all flanks stand back at the table's positions, (slice, node) m; None for perfect ones."""
+        """How far all flanks stand back at the table's positions, (slice, node) m.
+
+        None for perfect ones.
+        """
         if not self.modification.is_any and self.growth is None:
             return None
         position, place = node_positions(self.pair, self.mesh), slice_places(self.pair, self.slices)
@@ -123,7 +131,8 @@ class SlicedPair:
     def transmission_error(
         self, faults: Sequence[Fault] = (), *, n_phases: int = N_PHASES
     ) -> TransmissionError:
-        """Loaded contact over one mesh period, or over all in which a fault is seen and two sound ones on either side.
+        """Loaded contact over one mesh period, or over all in which a fault is seen and two sound
+        ones on either side.
 
         The first faulty tooth of either gear meets that of the other, or a sound one.
 
@@ -153,13 +162,18 @@ class SlicedPair:
         )  # fmt: skip
 
     def single_pair(self, n_positions: int = 401) -> tuple[Array, Array]:
-        """Stiffness of one pair from its first touch to its last: positions s of the first slice in m, and N/m."""
+        """Stiffness of one pair from its first touch to its last.
+
+        Positions s of the first slice in m, and N/m.
+        """
         mesh = self.sliced_mesh()
         position = np.linspace(0.0, self.pair.path_of_contact + float(mesh.lag.max()), n_positions)
         return position, single_pair_stiffness(mesh, position, self.mesh_force)
 
     def faulty_pair(self, faults: Sequence[Fault], position: Array) -> Array:
-        """The same at given positions for the first faulty teeth, slices that the set torque closes, (phase,) N/m."""
+        """The same at given positions for the first faulty teeth, slices that the set torque
+        closes, (phase,) N/m.
+        """
         mesh, sound = self.sliced_mesh(faults), self.sliced_mesh()
         within = float(loaded_contact(sound, self.phases(), self.mesh_force).approach.mean())
         pinion, wheel = (
@@ -171,7 +185,9 @@ class SlicedPair:
 
 
 def _seen(mesh: SlicedMesh) -> tuple[int, int, Meeting, tuple[int, int] | None]:
-    """First mesh period and number of those that show what is unlike in the teeth, what meets, and the odd pairs."""
+    """First mesh period and number of those that show what is unlike in the teeth, what meets,
+    and the odd pairs.
+    """
     start, span, turn = [0, 0], -1, 0
     for gear, side in enumerate((mesh.pinion, mesh.wheel)):
         count = np.bincount(side.kind)

@@ -52,7 +52,10 @@ class SpurPair(GearPairMachine):
     def stiffness_curves(
         self, faults: Sequence[Fault] = (), *, n_positions: int = 201, points_per_tooth: int = 100
     ) -> StiffnessCurves:
-        """Single-pair and mesh stiffness with their parts; contact ratios below 1 are allowed, nothing need turn."""
+        """Single-pair and mesh stiffness with their parts.
+
+        Contact ratios below 1 are allowed, nothing need turn.
+        """
         table, whole = self.mesh_table(faults), sound_teeth(self.pair, self.modification)
         return stiffness_curves(
             self,
@@ -66,15 +69,16 @@ class SpurPair(GearPairMachine):
     def long_relief(self) -> PairModification:
         """Linear tip reliefs that make up for the deflection under the set torque, of teeth as cut.
 
-        From the tips down to where a pair begins to carry alone (point B of the wheel, D of the pinion), as deep as
-        the pair deflects there less the body's part, which the next pair shares.
+        From the tips down to where a pair begins to carry alone (point B of the wheel, D of the
+        pinion), as deep as the pair deflects there less the body's part, which the next pair
+        shares.
 
         Raises
         ------
         GeometryError    for a contact ratio outside 1..2: no pair, or none but one, ever carries alone
 
-        Source: Welbourn's rule as in Lin, Oswald & Townsend (1989), see ``docs/theory/spur_mesh.md``; the shared part
-        is ours.
+        Source: Welbourn's rule as in Lin, Oswald & Townsend (1989), see
+        ``docs/theory/spur_mesh.md``; the shared part is ours.
         """
         pair = self.pair
         if not 1.0 <= pair.transverse_contact_ratio < 2.0:

@@ -1,4 +1,7 @@
-"""Quasi-static curves of one mesh of spur teeth: of a pair, or of the mesh of a drive line that records follow."""
+"""Quasi-static curves of one mesh of spur teeth.
+
+Of a pair, or of the mesh of a drive line that records follow.
+"""
 
 from __future__ import annotations
 
@@ -21,7 +24,10 @@ Array = NDArray[np.float64]
 
 
 class LoadedMesh(Protocol):
-    """A mesh under a set torque: geometry, material, mesh options, and the force along the line of action in N."""
+    """A mesh under a set torque.
+
+    Geometry, material, mesh options, and the force along the line of action in N.
+    """
 
     @property
     def pair(self) -> GearPair:
@@ -44,10 +50,11 @@ class LoadedMesh(Protocol):
 class StiffnessCurves:
     """Quasi-static mesh of one pair.
 
-    Per contact position (from A, base pitches): stiffness of a single pair that carries the whole load, sound and
-    (where a tooth is faulty) faulty, how much later the faulty one touches, and the compliance terms by gear. The
-    faulty pair is that of the first faulty tooth of either gear. Per roll angle of the faulted gear (pinion when
-    sound): mesh stiffness as the tangent dF/d(approach) under the set torque. SI units, angles in rad.
+    Per contact position (from A, base pitches): stiffness of a single pair that carries the whole
+    load, sound and (where a tooth is faulty) faulty, how much later the faulty one touches, and
+    the compliance terms by gear. The faulty pair is that of the first faulty tooth of either
+    gear. Per roll angle of the faulted gear (pinion when sound): mesh stiffness as the tangent
+    dF/d(approach) under the set torque. SI units, angles in rad.
     """
 
     contact_position: Array
@@ -62,7 +69,10 @@ class StiffnessCurves:
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class SinglePair:
-    """One pair under the whole load: compliance terms by gear in m/N, gap in m, 1 where it has flank to touch."""
+    """One pair under the whole load.
+
+    Compliance terms by gear in m/N, gap in m, 1 where it has flank to touch.
+    """
 
     terms: dict[str, dict[str, Array]]
     gap: Array
@@ -85,7 +95,8 @@ def stiffness_curves(
     n_positions: int,
     points_per_tooth: int,
 ) -> StiffnessCurves:
-    """Single-pair and mesh stiffness with their parts; contact ratios below 1 are allowed, nothing need turn.
+    """Single-pair and mesh stiffness with their parts; contact ratios below 1 are allowed,
+    nothing need turn.
 
     ``whole`` are the sound teeth by gear, as designed.
     """
@@ -112,7 +123,8 @@ def single_pair(
 ) -> SinglePair:
     """The pair of each gear's first faulty tooth, sound where there is none, under the whole load.
 
-    Half of the contact term of sound flanks belongs to either gear, what a fault adds to it to the faulty one.
+    Half of the contact term of sound flanks belongs to either gear, what a fault adds to it to
+    the faulty one.
     """
     odd = faulty_teeth(machine.pair, faults, whole)
     structure = machine.material.in_plane(machine.mesh.elasticity)

@@ -1,4 +1,7 @@
-"""What holds a gear: supports as given, or stiffness from its bearings and shaft; damping as given, or from a ratio."""
+"""What holds a gear: supports as given, or stiffness from its bearings and shaft.
+
+Damping as given, or from a ratio.
+"""
 
 from __future__ import annotations
 
@@ -37,7 +40,8 @@ class Holding:
 
 
 def read_holding(gear: Gear, values: Section) -> Holding:
-    """Bearing and shaft of the boundary keys of one gear; a shaft whose diameter is null fills the bore.
+    """Bearing and shaft of the boundary keys of one gear; a shaft whose diameter is null fills
+    the bore.
 
     Raises
     ------
@@ -56,7 +60,10 @@ def read_holding(gear: Gear, values: Section) -> Holding:
 
 
 def on_bearings(kind: Any, quality: Quality) -> bool:
-    """Whether ``system.supports`` asks for stiffness from bearings; ConfigError for what cannot be used."""
+    """Whether ``system.supports`` asks for stiffness from bearings.
+
+    ConfigError for what cannot be used.
+    """
     if kind not in KINDS:
         raise ConfigError(f"system.supports = {kind!r}; allowed: {', '.join(KINDS)}")
     if kind == AS_GIVEN:
@@ -72,7 +79,8 @@ def on_bearings(kind: Any, quality: Quality) -> bool:
 def put_on_bearings(
     body: Body, gear: Gear, holding: Holding, material: Material, force: float
 ) -> Body:
-    """The gear held by its shaft and bearings under the static mesh ``force`` in N; its damping is left to a ratio.
+    """The gear held by its shaft and bearings under the static mesh ``force`` in N; its damping
+    is left to a ratio.
 
     Along the axis and against tilting it is held as given: radial contact says nothing of that.
 
@@ -94,11 +102,12 @@ def put_on_bearings(
 
 
 def held_axially(body: Body, gear: Gear, values: Section) -> Body:
-    """A gear that also moves along its axis and tilts; what its source does not say of that follows from the rest.
+    """A gear that also moves along its axis and tilts; what its source does not say of that
+    follows from the rest.
 
-    Tilting is held by half of the mean radial stiffness at either end of ``shaft.span_mm``, k span^2 / 4, the axis by
-    ``AXIAL_SHARE`` of it, and dampers are to radial ones as springs are. A uniform disc of the gear's mass, inertia and
-    face width tilts with J / 2 + m b^2 / 12.
+    Tilting is held by half of the mean radial stiffness at either end of ``shaft.span_mm``, k
+    span^2 / 4, the axis by ``AXIAL_SHARE`` of it, and dampers are to radial ones as springs are.
+    A uniform disc of the gear's mass, inertia and face width tilts with J / 2 + m b^2 / 12.
 
     Raises
     ------
@@ -136,11 +145,12 @@ def held_axially(body: Body, gear: Gear, values: Section) -> Body:
 
 
 def in_gearbox(body: Body, gearbox: Gearbox, axes: slice, quality: Quality) -> Body:
-    """A gear on its support in one gearbox; ``axes`` are the two places of its x and y among the four supports.
+    """A gear on its support in one gearbox; ``axes`` are the two places of its x and y among the
+    four supports.
 
-    Stiffness scatters about what it is, along the axis and in tilting as the mean of both radial ones. So does damping,
-    unless ``quality`` has a range of damping ratios: then the ratio is the gearbox's, and without one the middle of the
-    range.
+    Stiffness scatters about what it is, along the axis and in tilting as the mean of both radial
+    ones. So does damping, unless ``quality`` has a range of damping ratios: then the ratio is the
+    gearbox's, and without one the middle of the range.
     """
     support, stiffness, damping = (
         body.support,

@@ -1,4 +1,7 @@
-"""The wear of a configuration's gears: its mesh, its wear law, and what the life leaves on the flanks as a fault."""
+"""The wear of a configuration's gears.
+
+Its mesh, its wear law, and what the life leaves on the flanks as a fault.
+"""
 
 from __future__ import annotations
 
@@ -74,7 +77,8 @@ def wear_fault(case: WearCase, depth: Array) -> dict[str, Any]:
 
 
 def flank_profile(case: WearCase, side: int, depth: Array, n_profile: int = N_PROFILE) -> Array:
-    """Depth at curvature radii evenly spaced from the lower end of the involute to the tip, (profile,) m.
+    """Depth at curvature radii evenly spaced from the lower end of the involute to the tip,
+    (profile,) m.
 
     Parameters
     ----------

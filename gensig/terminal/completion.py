@@ -1,6 +1,7 @@
 """Shell completion: the verb that prints what to source, and the candidates for a half-typed word.
 
-``argcomplete`` asks the command itself at a press of the tab key; nothing of it is loaded at any other time.
+``argcomplete`` asks the command itself at a press of the tab key; nothing of it is loaded at any
+other time.
 """
 
 from __future__ import annotations
@@ -67,7 +68,10 @@ def _offer(action: argparse.Action, verb: str, primary: str) -> None:
 
 
 def candidates(prefix: str, typed: Sequence[str], arguments: Any, primary: str) -> dict[str, str]:
-    """Groups, their options, keys of the chosen options, each with its line; paths for the keys that take one."""
+    """Groups, their options, keys of the chosen options, each with its line.
+
+    Paths for the keys that take one.
+    """
     from argcomplete.completers import FilesCompleter
 
     from gensig.options.files import groups, option_keys, options, section_keys, sections

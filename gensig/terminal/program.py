@@ -1,4 +1,7 @@
-"""What both commands have in common: one line for a mistake, exit statuses, nearest names for flags."""
+"""What both commands have in common.
+
+One line for a mistake, exit statuses, nearest names for flags.
+"""
 
 from __future__ import annotations
 
@@ -127,7 +130,10 @@ def refuse_verb(
 
 
 def guarded(program: str, run: Callable[[], int], *, interrupted: str) -> int:
-    """Exit status of ``run``; a mistake, a file that cannot be used and an interruption are one line on stderr."""
+    """Exit status of ``run``.
+
+    A mistake, a file that cannot be used and an interruption are one line on stderr.
+    """
     try:
         status = run()
         sys.stdout.flush()

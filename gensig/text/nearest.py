@@ -12,7 +12,9 @@ NEAR, FAR = (
 
 
 def hint(name: str, known: Iterable[str], *, n: int = 3, listed: int = 24) -> str:
-    """'did you mean 'crack' or 'chipped'?', or where nothing is near 'there is ...' with at most ``listed`` names."""
+    """'did you mean 'crack' or 'chipped'?', or where nothing is near 'there is ...' with at most
+    ``listed`` names.
+    """
     names = [str(one) for one in known]
     close = near(name, names, n=n)
     if close:
@@ -25,7 +27,10 @@ def hint(name: str, known: Iterable[str], *, n: int = 3, listed: int = 24) -> st
 
 
 def near(name: str, names: Iterable[str], *, n: int = 3, cutoff: float = NEAR) -> list[str]:
-    """At most ``n`` names that are spelled much alike, or that ``name`` begins; case does not count."""
+    """At most ``n`` names that are spelled much alike, or that ``name`` begins.
+
+    Case does not count.
+    """
     by_lower = {one.lower(): one for one in reversed(list(names))}
     wanted = str(name).lower()
     found = difflib.get_close_matches(wanted, by_lower, n=n, cutoff=cutoff)

@@ -1,7 +1,9 @@
-"""One self-contained HTML page out of sections of text, tables, figures and charts; every text is escaped.
+"""One self-contained HTML page out of sections of text, tables, figures and charts; every text is
+escaped.
 
-Charts are drawn in the browser by plotly.js, which is copied into the page once, from data that is copied into it too.
-The page reads nothing else: its content security policy lets no script run but those two, and nothing be fetched.
+Charts are drawn in the browser by plotly.js, which is copied into the page once, from data that
+is copied into it too. The page reads nothing else: its content security policy lets no script run
+but those two, and nothing be fetched.
 """
 
 from __future__ import annotations
@@ -28,7 +30,10 @@ class Table:
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Card:
-    """One answer in large type: what it is about, the number, its interval, what it says, and what it claims."""
+    """One answer in large type.
+
+    What it is about, the number, its interval, what it says, and what it claims.
+    """
 
     title: str
     value: str
@@ -44,7 +49,10 @@ class Card:
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Select:
-    """A drop-down of charts: a label, and groups of (value, text); a group without a title stands alone."""
+    """A drop-down of charts: a label, and groups of (value, text).
+
+    A group without a title stands alone.
+    """
 
     name: str
     label: str
@@ -104,7 +112,10 @@ class Section:
 
 
 def write_page(path: Path, *, title: str, lead: Sequence[str], sections: Sequence[Section]) -> None:
-    """Write the page; the figures lie beside it and are copied into it, so that it can be sent alone."""
+    """Write the page.
+
+    The figures lie beside it and are copied into it, so that it can be sent alone.
+    """
 
     def embedded(name: str) -> str:
         return "data:image/png;base64," + base64.b64encode(

@@ -1,4 +1,7 @@
-"""Tables that users give: measured responses and backgrounds. Their content is data; every mistake is one line."""
+"""Tables that users give: measured responses and backgrounds. Their content is data.
+
+Every mistake is one line.
+"""
 
 from __future__ import annotations
 

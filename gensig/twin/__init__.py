@@ -1,1 +1,4 @@
-"""A machine like a measured one: what healthy recordings tell of it, as a configuration whose faults can be made."""
+"""A machine like a measured one.
+
+What healthy recordings tell of it, as a configuration whose faults can be made.
+"""

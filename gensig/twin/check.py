@@ -1,4 +1,6 @@
-"""Does the twin agree with measurements that nothing was fitted to? Levels by band and indicators, by sensor."""
+"""Does the twin agree with measurements that nothing was fitted to? Levels by band and
+indicators, by sensor.
+"""
 
 from __future__ import annotations
 
@@ -35,9 +37,10 @@ INDICATOR_UNITS = ("dB", "", "", "dB")
 class Check:
     """Held-out measurement beside healthy records of the twin.
 
-    ``band`` (band,) Hz mid-bands; ``measured_db`` (sensor, band) and ``twin_db`` (record, sensor, band) third-octave
-    levels over 1 m/s2; ``fitted_db`` (sensor, band) those of what was fitted to. ``measured`` (sensor, indicator) and
-    ``twin`` (record, sensor, indicator) as ``INDICATORS``; the level is the RMS over 1 m/s2.
+    ``band`` (band,) Hz mid-bands; ``measured_db`` (sensor, band) and ``twin_db`` (record, sensor,
+    band) third-octave levels over 1 m/s2; ``fitted_db`` (sensor, band) those of what was fitted
+    to. ``measured`` (sensor, indicator) and ``twin`` (record, sensor, indicator) as
+    ``INDICATORS``; the level is the RMS over 1 m/s2.
     """
 
     sensors: tuple[str, ...]
@@ -56,7 +59,9 @@ class Check:
 
     @property
     def share_within(self) -> Array:
-        """Share of bands in which the measurement lies between the twin's least and greatest, (sensor,)."""
+        """Share of bands in which the measurement lies between the twin's least and greatest,
+        (sensor,).
+        """
         within = (self.measured_db >= self.twin_db.min(axis=0)) & (
             self.measured_db <= self.twin_db.max(axis=0)
         )
@@ -64,7 +69,9 @@ class Check:
 
     @property
     def agrees(self) -> NDArray[np.bool_]:
-        """Whether the measured indicator lies between the twin's least and greatest, (sensor, indicator)."""
+        """Whether the measured indicator lies between the twin's least and greatest, (sensor,
+        indicator).
+        """
         return np.asarray(
             (self.measured >= self.twin.min(axis=0)) & (self.measured <= self.twin.max(axis=0))
         )
@@ -114,7 +121,9 @@ def check(
 
 
 def _healthy_records(config: Configuration) -> tuple[Sequence[Array], Sequence[Array]]:
-    """Accelerations (sensor, sample) and shaft angles (sample,) of healthy records, each of another set of gears."""
+    """Accelerations (sensor, sample) and shaft angles (sample,) of healthy records, each of
+    another set of gears.
+    """
     plan: dict[str, Any] = {
         "n_records": N_RECORDS, "n_units": N_RECORDS, "n_gearboxes": 1, "conditions_per_unit": None, "n_repeats": 1,
         "classes": ["healthy"], "design": "latin_hypercube", "vary": {}, "sham": False,

@@ -1,4 +1,7 @@
-"""From a healthy recording to the values of a configuration: speed and drift, grade, transfer path, noise."""
+"""From a healthy recording to the values of a configuration.
+
+Speed and drift, grade, transfer path, noise.
+"""
 
 from __future__ import annotations
 
@@ -52,11 +55,12 @@ SURE = 3.0  # standard deviations above the floor from which the power of lines 
 class Fit:
     """What a recording tells of its machine.
 
-    ``own_scatter`` is the scatter of the speed, over its mean, that the pitch errors of the fitted grade make by
-    themselves: the same estimate of simulated records that have no other.
-    ``gain`` (sensor, band) is the size of the transfer path at ``gain_frequency`` (band,) Hz, ``heard`` (sensor, band)
-    where it was measured rather than filled in; ``density`` (sensor, line) (m/s2)^2/Hz the noise at ``noise_frequency``
-    (line,) Hz; ``snr`` (sensor,) dB over the whole band.
+    ``own_scatter`` is the scatter of the speed, over its mean, that the pitch errors of the
+    fitted grade make by themselves: the same estimate of simulated records that have no other.
+    ``gain`` (sensor, band) is the size of the transfer path at ``gain_frequency`` (band,) Hz,
+    ``heard`` (sensor, band) where it was measured rather than filled in; ``density`` (sensor,
+    line) (m/s2)^2/Hz the noise at ``noise_frequency`` (line,) Hz; ``snr`` (sensor,) dB over the
+    whole band.
     """
 
     sensors: tuple[str, ...]
@@ -73,7 +77,10 @@ class Fit:
 
     @property
     def drift(self) -> float | None:
-        """Scatter of the speed beyond that of the pitch errors; None where there is none to be seen."""
+        """Scatter of the speed beyond that of the pitch errors.
+
+        None where there is none to be seen.
+        """
         scatter, correlation = self.motion.scatter, self.motion.correlation_time
         if scatter is None or scatter < CLEAR * self.own_scatter:
             return None
@@ -177,8 +184,9 @@ def fit_path(
 ) -> tuple[Array, Array, NDArray[np.bool_]]:
     """Gain from the simulated bearing to each sensor, from half the mesh frequency up.
 
-    Root of the measured over the simulated power of the shafts' orders, in sixths of an octave. Where the orders are
-    not heard the gain is interpolated, but not above what would have been heard.
+    Root of the measured over the simulated power of the shafts' orders, in sixths of an octave.
+    Where the orders are not heard the gain is interpolated, but not above what would have been
+    heard.
 
     Returns
     -------
@@ -210,9 +218,10 @@ def fit_noise(
 ) -> tuple[Array, Array, Array]:
     """Density of what does not turn with the gears, and the signal-to-noise ratio.
 
-    Above half the mesh frequency that is the mean between the shafts' orders, less what the model has there (orders
-    that both gears make together). Below, the model has next to nothing of what a machine does (unbalance, alignment,
-    couplings): all that it lacks is counted as noise. Where the model explains all, a tenth of the floor is left.
+    Above half the mesh frequency that is the mean between the shafts' orders, less what the model
+    has there (orders that both gears make together). Below, the model has next to nothing of what
+    a machine does (unbalance, alignment, couplings): all that it lacks is counted as noise. Where
+    the model explains all, a tenth of the floor is left.
 
     Returns
     -------
@@ -259,7 +268,10 @@ def _through(simulated: Lines, frequency: Array, gain: Array) -> Array:
 
 
 def gain_at(wanted: Array, frequency: Array, gain: Array) -> Array:
-    """A gain between the frequencies at which it is known: straight in the logarithms, held beyond them."""
+    """A gain between the frequencies at which it is known.
+
+    Straight in the logarithms, held beyond them.
+    """
     axis = np.log(np.maximum(wanted, 1e-3))
     return np.asarray(np.exp(np.interp(axis, np.log(frequency), np.log(np.maximum(gain, 1e-300)))))
 
@@ -267,7 +279,9 @@ def gain_at(wanted: Array, frequency: Array, gain: Array) -> Array:
 def _mean_density(
     lines: Lines, power: Array, counted: Array, wanted: Array, half: float, least: int
 ) -> Array:
-    """Mean over ``half`` octaves and ``least`` bins to either side of the bins counted, (sensor, line) 1/Hz."""
+    """Mean over ``half`` octaves and ``least`` bins to either side of the bins counted, (sensor,
+    line) 1/Hz.
+    """
     reach = least * lines.width
     first = np.searchsorted(lines.frequency, np.minimum(wanted * 2.0**-half, wanted - reach))
     last = np.searchsorted(lines.frequency, np.maximum(wanted * 2.0**half, wanted + reach))
@@ -288,13 +302,15 @@ def _mean(powers: Sequence[Array]) -> Array:
 def minimum_phase(
     frequency: Array, gain: Array, sampling_rate: float, step: float
 ) -> tuple[Array, NDArray[np.complex128]]:
-    """Causal response with the given gain and the least delay, at even frequencies from 0 to half the rate.
+    """Causal response with the given gain and the least delay, at even frequencies from 0 to half
+    the rate.
 
     Returns
     -------
     frequency (line,) Hz, response (line,)
 
-    Source: A. V. Oppenheim & R. W. Schafer, "Discrete-time signal processing", real cepstrum folded to positive times.
+    Source: A. V. Oppenheim & R. W. Schafer, "Discrete-time signal processing", real cepstrum
+    folded to positive times.
     """
     n_lines = math.floor(0.5 * sampling_rate / step)
     n_fft = 2 * 8 * n_lines  # eight lines between those given, so that the cepstrum does not fold

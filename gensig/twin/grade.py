@@ -1,4 +1,7 @@
-"""Pitch errors from the sidebands of the mesh: how strong they are beside it, against the same in simulations."""
+"""Pitch errors from the sidebands of the mesh.
+
+How strong they are beside it, against the same in simulations.
+"""
 
 from __future__ import annotations
 
@@ -26,11 +29,12 @@ AUDIBLE = 4.0  # a harmonic counts where it is this many times its floor
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Grade:
-    """ISO 1328 grade at which simulated sidebands are as strong as measured ones, and the grades between which 90 % of
-    the simulated sets of gears agree with the measurement.
+    """ISO 1328 grade at which simulated sidebands are as strong as measured ones, and the grades
+    between which 90 % of the simulated sets of gears agree with the measurement.
 
-    ``ratio_db`` is the median over sensors and harmonics of sideband over mesh power, ``n_ratios`` their number;
-    ``is_bounded`` False where the measurement lies beyond what any grade gives, or nothing was heard.
+    ``ratio_db`` is the median over sensors and harmonics of sideband over mesh power,
+    ``n_ratios`` their number; ``is_bounded`` False where the measurement lies beyond what any
+    grade gives, or nothing was heard.
     """
 
     grade: float
@@ -51,9 +55,11 @@ def sideband_orders(teeth: Teeth, harmonic: int) -> Array:
 
 
 def sideband_ratios(lines: Lines, teeth: Teeth) -> Array:
-    """Power of the sidebands over that of the mesh line, (sensor, harmonic) dB; NaN where the mesh is not heard.
+    """Power of the sidebands over that of the mesh line, (sensor, harmonic) dB; NaN where the
+    mesh is not heard.
 
-    A ratio of neighbours on the frequency axis: a transfer path that changes little between them leaves it alone.
+    A ratio of neighbours on the frequency axis: a transfer path that changes little between them
+    leaves it alone.
     """
     highest = float(lines.frequency[-1]) / lines.mesh_frequency
     ratios = np.full((len(lines.power), N_HARMONICS), np.nan)
@@ -72,7 +78,8 @@ def sideband_ratios(lines: Lines, teeth: Teeth) -> Array:
 def simulated_records(
     system: Machine, grades: Sequence[float], n_specimens: int, seed: int
 ) -> list[list[CleanRecord]]:
-    """Healthy records of the simulated bearing, by grade and specimen; specimens are the same for every grade.
+    """Healthy records of the simulated bearing, by grade and specimen; specimens are the same for
+    every grade.
 
     Raises
     ------
@@ -109,7 +116,8 @@ def simulated_lines(record: CleanRecord, system: Machine) -> Lines:
 
 
 def fit_grade(measured: Lines, simulated: Sequence[Sequence[Lines]], teeth: Teeth) -> Grade:
-    """Grade at which the median difference of measured and simulated ratios is zero, and its interval.
+    """Grade at which the median difference of measured and simulated ratios is zero, and its
+    interval.
 
     Parameters
     ----------
@@ -117,7 +125,8 @@ def fit_grade(measured: Lines, simulated: Sequence[Sequence[Lines]], teeth: Teet
     """
     ratios = sideband_ratios(measured, teeth)
     n_ratios = int(np.isfinite(ratios).sum())
-    # (grade, specimen): by how much a simulated set of gears has stronger sidebands than the measured one
+    # (grade, specimen): by how much a simulated set of gears has stronger sidebands than the
+    # measured one
     excess = np.array(
         [[_excess(sideband_ratios(one, teeth), ratios) for one in row] for row in simulated]
     )
@@ -153,6 +162,8 @@ def _excess(simulated: Array, measured: Array) -> float:
 
 
 def _crossing(excess: Array) -> float:
-    """Grade at which a curve that rises with the grade passes zero, between the ends of ``GRADES``."""
+    """Grade at which a curve that rises with the grade passes zero, between the ends of
+    ``GRADES``.
+    """
     rising = np.maximum.accumulate(excess) + 1e-9 * np.arange(len(excess))
     return float(np.interp(0.0, rising, GRADES))

@@ -1,4 +1,7 @@
-"""What turns with the gears and what does not: power at the orders of both shafts, and the density between them."""
+"""What turns with the gears and what does not.
+
+Power at the orders of both shafts, and the density between them.
+"""
 
 from __future__ import annotations
 
@@ -26,8 +29,9 @@ LEAST_FREE = 40  # bins free of lines on which a floor rests
 class Lines:
     """Power spectrum over mesh orders of signals sampled evenly in the angle of the mesh.
 
-    ``power`` (sensor, bin) (m/s2)^2, ``frequency`` (bin,) Hz at the mean speed, ``is_line`` (bin,) True at the orders
-    of either shaft, ``floor`` (sensor, bin) (m/s2)^2 the median power of bins without lines, as a mean.
+    ``power`` (sensor, bin) (m/s2)^2, ``frequency`` (bin,) Hz at the mean speed, ``is_line``
+    (bin,) True at the orders of either shaft, ``floor`` (sensor, bin) (m/s2)^2 the median power
+    of bins without lines, as a mean.
     """
 
     power: Array
@@ -48,7 +52,10 @@ class Lines:
         return float(self.frequency[1])
 
     def at(self, orders: Array) -> Array:
-        """Power above the floor of the lines at some mesh orders, (sensor, order) (m/s2)^2; it may be negative."""
+        """Power above the floor of the lines at some mesh orders, (sensor, order) (m/s2)^2.
+
+        It may be negative.
+        """
         bins = np.rint(orders * self.n_cycles).astype(np.intp)[:, None] + np.arange(
             -SPREAD, SPREAD + 1
         )
@@ -64,8 +71,9 @@ def find_lines(signal: Array, cycles: Array, sampling_rate: float, teeth: Teeth)
     signal : (sensor, sample) m/s2
     cycles : (sample,)    mesh cycles since the first sample, rising
 
-    Source of the angle resampling: K. R. Fyfe & E. D. S. Munck (1997), Mechanical Systems and Signal Processing 11 (2),
-    187-205; orders as ``gensig.signals.spectrum.order_spectrum``, for a speed that wanders.
+    Source of the angle resampling: K. R. Fyfe & E. D. S. Munck (1997), Mechanical Systems and
+    Signal Processing 11 (2), 187-205; orders as ``gensig.signals.spectrum.order_spectrum``, for a
+    speed that wanders.
     """
     from scipy.interpolate import CubicSpline
     from scipy.signal import resample
@@ -102,7 +110,9 @@ def find_lines(signal: Array, cycles: Array, sampling_rate: float, teeth: Teeth)
 
 
 def _floor(power: Array, is_line: NDArray[np.bool_]) -> Array:
-    """Median of the bins without lines over ln 2, the mean of noise that lines of others do not raise, in stretches."""
+    """Median of the bins without lines over ln 2, the mean of noise that lines of others do not
+    raise, in stretches.
+    """
     free = np.flatnonzero(~is_line)
     n_stretches = max(1, len(free) // LEAST_FREE)
     stretches = np.array_split(free, n_stretches)
@@ -114,7 +124,9 @@ def _floor(power: Array, is_line: NDArray[np.bool_]) -> Array:
 
 
 def band_centers(lowest: float, sampling_rate: float) -> Array:
-    """Centers of overlapping bands, twelve an octave, up to the end of the usable band, (band,) Hz."""
+    """Centers of overlapping bands, twelve an octave, up to the end of the usable band, (band,)
+    Hz.
+    """
     highest = usable_band(sampling_rate)[1]
     n_bands = max(2, math.floor(BANDS_AN_OCTAVE * math.log2(highest / lowest)) + 1)
     return np.asarray(highest * 2.0 ** (np.arange(-n_bands + 1, 1) / BANDS_AN_OCTAVE))

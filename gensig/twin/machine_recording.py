@@ -1,4 +1,7 @@
-"""The recording of a twin: read like any other, its channels named as sensors of a configuration."""
+"""The recording of a twin.
+
+Read like any other, its channels named as sensors of a configuration.
+"""
 
 from __future__ import annotations
 

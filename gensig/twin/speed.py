@@ -9,7 +9,8 @@ from gensig.signals.recording import Recording
 
 
 def find_motion(recording: Recording, teeth: Teeth, speed_rpm: float) -> Motion:
-    """Speed and its drift, see `gensig.signals.mesh_motion.find_motion`, in the band that the twin has too.
+    """Speed and its drift, see `gensig.signals.mesh_motion.find_motion`, in the band that the
+    twin has too.
 
     Raises
     ------

@@ -1,4 +1,6 @@
-"""The machine that a row speaks of, composed from its overrides and kept for the rows that follow."""
+"""The machine that a row speaks of, composed from its overrides and kept for the rows that
+follow.
+"""
 
 from __future__ import annotations
 
@@ -59,7 +61,10 @@ class Case:
 
     @property
     def faulty_kinds(self) -> dict[str, int]:
-        """Table rows of the first faulty tooth, as ``pair_compliance`` takes them; empty when sound."""
+        """Table rows of the first faulty tooth, as ``pair_compliance`` takes them.
+
+        Empty when sound.
+        """
         if not self.faults:
             return {}
         fault = self.faults[0]
@@ -90,7 +95,10 @@ class Case:
 
 @lru_cache(maxsize=512)
 def read_case(overrides: tuple[str, ...]) -> Case:
-    """Compose the machine and the selected fault; overrides that begin with ``fault`` are the fault's."""
+    """Compose the machine and the selected fault.
+
+    Overrides that begin with ``fault`` are the fault's.
+    """
     machine = tuple(word for word in overrides if not word.startswith("fault"))
     fault = _read_faults(tuple(word for word in overrides if word.startswith("fault")))
     return Case(overrides=overrides, system=_read_machine(machine), faults=fault)
@@ -177,10 +185,11 @@ def pair_dynamics(case: Case) -> PairDynamics:
 
 @lru_cache(maxsize=64)
 def record(case: Case) -> Array:
-    """Acceleration of the pinion's bearing along the line of action over 15 turns of the pinion, (sample,) m/s2.
+    """Acceleration of the pinion's bearing along the line of action over 15 turns of the pinion,
+    (sample,) m/s2.
 
-    Perfect teeth, no noise, steady state; the first sample is tooth 0 at A. Raises ConfigError where 15 turns are no
-    whole number of samples.
+    Perfect teeth, no noise, steady state; the first sample is tooth 0 at A. Raises ConfigError
+    where 15 turns are no whole number of samples.
     """
     system = case.system
     turn = 2.0 * np.pi / system.operating.speed

@@ -254,7 +254,9 @@ def summary(results: Sequence[Result]) -> str:
 
 
 def shortfalls(results: Sequence[Result]) -> list[str]:
-    """One line for each value that differs and each claim that does not hold, the unexpected ones marked."""
+    """One line for each value that differs and each claim that does not hold, the unexpected ones
+    marked.
+    """
     return [
         f"{'' if result.as_expected else 'UNEXPECTED '}{result.row.id}: printed {result.row.printed}, computed "
         f"{_computed(result)}{' ' if result.row.unit else ''}{result.row.unit} ({result.verdict})"
@@ -284,7 +286,9 @@ def _head(result: Result) -> str:
 
 
 def _table(results: Sequence[Result], *, head: str = "") -> str:
-    """One line for each group of rows whose id differs in its last part only and that have the same verdict."""
+    """One line for each group of rows whose id differs in its last part only and that have the
+    same verdict.
+    """
     groups: dict[tuple[str, ...], list[Result]] = {}
     for result in results:
         row = result.row

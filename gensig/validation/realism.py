@@ -1,9 +1,10 @@
 """Simulated records beside measured ranges: how they are judged, stored and shown.
 
-``realism_ranges.csv`` holds the published ranges: ``id``, ``at`` (which conditions), ``unit``, ``low``, ``high``
-(empty: open; both empty: shown without a range) and ``source``. ``realism_results.csv`` holds what ``python -m
-benchmarks.realism --stored`` found; its first line says what was compared, and which commit froze the simulation
-before. The column ``reason`` is written by hand and kept by later runs.
+``realism_ranges.csv`` holds the published ranges: ``id``, ``at`` (which conditions), ``unit``,
+``low``, ``high`` (empty: open; both empty: shown without a range) and ``source``.
+``realism_results.csv`` holds what ``python -m benchmarks.realism --stored`` found; its first line
+says what was compared, and which commit froze the simulation before. The column ``reason`` is
+written by hand and kept by later runs.
 """
 
 from __future__ import annotations
@@ -50,7 +51,10 @@ class Range:
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Comparison(Range):
-    """A range and what was simulated beside it: median, 5 and 95 % points, number of values, verdict."""
+    """A range and what was simulated beside it.
+
+    Median, 5 and 95 % points, number of values, verdict.
+    """
 
     median: float
     p5: float
@@ -74,7 +78,10 @@ class Comparison(Range):
 
 
 def judge(low: float | None, high: float | None, p5: float, p95: float) -> str:
-    """*Inside*: the central 90 % lie within the range; *overlaps*: a part of them; *misses*: none."""
+    """*Inside*: the central 90 % lie within the range.
+
+    *overlaps*: a part of them; *misses*: none.
+    """
     if math.isnan(p5) or math.isnan(p95):
         return NOTHING
     if low is None and high is None:
@@ -110,7 +117,10 @@ def read_ranges(path: Path = RANGES) -> dict[Place, Range]:
 
 
 def write_results(path: Path, heading: str, found: Sequence[Comparison]) -> None:
-    """Store comparisons under one line that says what they are; the reasons of a former file stay."""
+    """Store comparisons under one line that says what they are.
+
+    The reasons of a former file stay.
+    """
     former = {one.place: one.reason for one in read_results(path)[1]} if path.exists() else {}
     names = [field.name for field in fields(Comparison)]
     with path.open("w", encoding="utf-8", newline="") as file:

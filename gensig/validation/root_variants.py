@@ -1,4 +1,6 @@
-"""Other readings of the tooth root, to measure what the true transition curve and theta_f = b1/r buy."""
+"""Other readings of the tooth root, to measure what the true transition curve and theta_f = b1/r
+buy.
+"""
 
 from __future__ import annotations
 
@@ -20,9 +22,11 @@ from gensig.geometry.tooth_profile import (
 
 
 def straight_root_profile(gear: Gear) -> ToothProfile:
-    """Outline whose involute runs down to the base circle and goes on straight, with constant thickness, to the root.
+    """Outline whose involute runs down to the base circle and goes on straight, with constant
+    thickness, to the root.
 
-    Where the root circle is the larger one the involute runs down to it, and nothing straight is left.
+    Where the root circle is the larger one the involute runs down to it, and nothing straight is
+    left.
     """
     lowest = math.sqrt(max(gear.root_radius**2 - gear.base_radius**2, 0.0))
     tip = math.sqrt(gear.tip_radius**2 - gear.base_radius**2)
@@ -46,7 +50,10 @@ def straight_root_tooth(gear: Gear) -> Tooth:
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class _GearOnRootAngle(Gear):
-    """A gear whose body takes another theta_f than b1/r; overrides a property so that the tested formula runs."""
+    """A gear whose body takes another theta_f than b1/r.
+
+    Overrides a property so that the tested formula runs.
+    """
 
     body_half_angle: float
 

@@ -1,12 +1,14 @@
 """Printed figures as data: one CSV per source, one row per figure or claim.
 
-The columns: ``id``; ``quantity`` and ``at``, what is computed and where (``gensig.validation.verdicts.KINDS``);
-``overrides``, the configuration it belongs to; ``printed``, ``unit`` and ``tolerance``; ``kind``; ``expected``, a
-verdict other than the good one that is known and explained; ``source`` (section, equation or table); ``reason``.
+The columns: ``id``; ``quantity`` and ``at``, what is computed and where
+(``gensig.validation.verdicts.KINDS``); ``overrides``, the configuration it belongs to;
+``printed``, ``unit`` and ``tolerance``; ``kind``; ``expected``, a verdict other than the good one
+that is known and explained; ``source`` (section, equation or table); ``reason``.
 
-A value is reproduced when it deviates from the printed one by at most ``tolerance`` times the printed one, or by half
-a unit of the last printed digit where that is more. A claim prints its criterion, such as ``> 1.5``. A row that
-prints nothing shows a number beside those that are printed.
+A value is reproduced when it deviates from the printed one by at most ``tolerance`` times the
+printed one, or by half a unit of the last printed digit where that is more. A claim prints its
+criterion, such as ``> 1.5``. A row that prints nothing shows a number beside those that are
+printed.
 """
 
 from __future__ import annotations
@@ -117,7 +119,10 @@ class Row:
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Result:
-    """What became of one row; ``computed`` is in the row's unit, ``deviation`` relative to the printed value."""
+    """What became of one row.
+
+    ``computed`` is in the row's unit, ``deviation`` relative to the printed value.
+    """
 
     row: Row
     computed: float

@@ -1,4 +1,7 @@
-"""Figure of an engine's dampers: tooth force over the speeds and over a cycle, and root stress over the mesh."""
+"""Figure of an engine's dampers.
+
+Tooth force over the speeds and over a cycle, and root stress over the mesh.
+"""
 
 from __future__ import annotations
 
@@ -24,7 +27,9 @@ def plot_dampers(
     speeds: NDArray[np.float64],
     path: Path,
 ) -> None:
-    """Worst tooth force over the run, tooth force over a cycle, orders of it, and root stress over the mesh."""
+    """Worst tooth force over the run, tooth force over a cycle, orders of it, and root stress
+    over the mesh.
+    """
     figure, axes = pyplot.subplots(2, 2, figsize=(12, 7.6), layout="constrained")
     for name, state in states.items():
         colour, width = LOOKS[name]

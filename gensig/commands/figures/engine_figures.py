@@ -22,7 +22,10 @@ WATERFALL_HZ = 400.0
 
 
 def plot_response(line: EngineLine, found: ResponseResult, path: Path) -> None:
-    """Cycle, torques, speeds and angular displacement spectra; below these what else was asked for, row by row."""
+    """Cycle, torques, speeds and angular displacement spectra.
+
+    Below these what else was asked for, row by row.
+    """
     blocks = {"run": 1 if found.run else 0, "time": 2 if found.in_time else 0}
     blocks |= {"roots": 1 if found.roots else 0, "sweep": 3 if found.sweep else 0}
     blocks |= {"linear": 0 if turns_evenly(line) else 1}

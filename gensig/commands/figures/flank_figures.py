@@ -76,7 +76,8 @@ def plot_sliced_stiffness(
     sound: TransmissionError,
     faulty: Array | None = None,
 ) -> None:
-    """Stiffness of one pair along its way, faulty too, and of the mesh over two periods or all that see a fault.
+    """Stiffness of one pair along its way, faulty too, and of the mesh over two periods or all
+    that see a fault.
 
     ``sound`` is the mesh without the fault, drawn beside it.
     """
@@ -179,8 +180,8 @@ def _load_map(figure: Any, axes: Any, system: SlicedPair, result: TransmissionEr
 
 
 def _sharing(axes: Any, system: SlicedPair, result: TransmissionError) -> None:
-    """Share of one pair from its first touch to its last, put together from the pairs of one period; or of all pairs
-    while a fault is seen."""
+    """Share of one pair from its first touch to its last, put together from the pairs of one
+    period; or of all pairs while a fault is seen."""
     if result.odd_pairs is not None:
         _sharing_of_all(axes, system, result)
         return

@@ -32,7 +32,9 @@ def plot_stiffness(
     *,
     sound: StiffnessCurves,
 ) -> None:
-    """Single pair, mesh over one revolution and as it is when ``sound``, load sharing and compliance terms."""
+    """Single pair, mesh over one revolution and as it is when ``sound``, load sharing and
+    compliance terms.
+    """
     figure, axes = pyplot.subplots(2, 2, figsize=(11, 7.2), layout="constrained")
     _single_pair(axes[0, 0], curves, faults)
     _mesh(axes[0, 1], system, curves, faults, sound)
@@ -80,7 +82,8 @@ def _mesh(
 ) -> None:
     angle = np.degrees(curves.roll_angle)
     if faults:
-        # A sound mesh has the period of a tooth, so that its turn of the pinion fits a turn of the wheel too.
+        # A sound mesh has the period of a tooth, so that its turn of the pinion fits a turn of
+        # the wheel too.
         without = np.resize(sound.mesh_stiffness, angle.shape)
         axes.plot(angle, without / 1e8, color=GREY, linewidth=0.7, label="sound")
     label = f"with {faults[0].kind}" if faults else None
@@ -154,7 +157,8 @@ def plot_record(
     *,
     name: str | None = None,
 ) -> None:
-    """Signal, spectrum and envelope spectrum of the most telling channel, shaft and mesh frequencies marked.
+    """Signal, spectrum and envelope spectrum of the most telling channel, shaft and mesh
+    frequencies marked.
 
     ``name`` is that of the record in the title; None takes its class and severity.
     """

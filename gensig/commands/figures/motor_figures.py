@@ -1,4 +1,7 @@
-"""Figures of a line that a motor turns: mean torques by node and what its meshes carry, names of what turns a line."""
+"""Figures of a line that a motor turns.
+
+Mean torques by node and what its meshes carry, names of what turns a line.
+"""
 
 from __future__ import annotations
 

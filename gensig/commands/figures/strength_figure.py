@@ -20,7 +20,9 @@ from gensig.systems.root_strength import GearStress, RootHistory, RootStrength
 def plot_root_stress(
     system: RootStrength, gears: dict[str, GearStress], history: RootHistory, path: Path
 ) -> None:
-    """Root stress of both gears over the mesh, the load share of the pair, and the tooth of the decisive gear."""
+    """Root stress of both gears over the mesh, the load share of the pair, and the tooth of the
+    decisive gear.
+    """
     figure, axes = pyplot.subplots(1, 2, figsize=(11, 4.8), layout="constrained")
     _stress(axes[0], system, gears, history)
     _tooth(axes[1], system, gears[system.decisive])
@@ -65,7 +67,9 @@ def _stress(
 
 
 def _tooth(axis: Any, system: RootStrength, found: GearStress) -> None:
-    """Outline in the normal section with the 30 degree tangents, mm from the centreline and above the root circle."""
+    """Outline in the normal section with the 30 degree tangents, mm from the centreline and above
+    the root circle.
+    """
     real = system.pair.gears[system.decisive]
     virtual, section = virtual_gear(real), root_section(real)
     floor = virtual.tip_radius - (real.tip_radius - real.root_radius)
@@ -116,6 +120,8 @@ def _tooth(axis: Any, system: RootStrength, found: GearStress) -> None:
 
 
 def _spur(gear: Gear) -> Gear:
-    """The spur gear with, to the nearest whole number of teeth, the tooth form of the normal section."""
+    """The spur gear with, to the nearest whole number of teeth, the tooth form of the normal
+    section.
+    """
     n_teeth = round(virtual_gear(gear).n_teeth)
     return replace(gear, n_teeth=n_teeth, helix_angle=0.0, bore_radius=0.1 * gear.normal_module)

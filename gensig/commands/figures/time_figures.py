@@ -1,4 +1,7 @@
-"""Figures of an engine's line in time, teeth free to part: tooth loads, root stress, spectra, sweeps up and down."""
+"""Figures of an engine's line in time, teeth free to part.
+
+Tooth loads, root stress, spectra, sweeps up and down.
+"""
 
 from __future__ import annotations
 
@@ -32,7 +35,10 @@ ROOT_LOOKS = {
 
 
 def time_rows(axes: Any, line: EngineLine, found: ResponseResult, response: TimeResponse) -> None:
-    """Two rows: speeds and spectra at the nodes; tooth loads of all meshes and the course of one, (2, 2) axes."""
+    """Two rows: speeds and spectra at the nodes.
+
+    Tooth loads of all meshes and the course of one, (2, 2) axes.
+    """
     _speeds(axes[0, 0], line, found, response)
     _spectra(axes[0, 1], line, found, response)
     mean, amplitudes = found.response.element_forces(line.linear()[1])
@@ -43,7 +49,9 @@ def time_rows(axes: Any, line: EngineLine, found: ResponseResult, response: Time
 
 
 def root_row(axes: Any, line: EngineLine, found: ResponseResult) -> None:
-    """Root stress over the roll of the pair that bears most, and the largest of each pair of a cycle, (2,) axes."""
+    """Root stress over the roll of the pair that bears most, and the largest of each pair of a
+    cycle, (2,) axes.
+    """
     assert found.mesh is not None
     in_cycle = passes_of_a_cycle(line, found.mesh)
     for name, root in found.roots.items():
@@ -136,7 +144,10 @@ def _speeds(axes: Any, line: EngineLine, found: ResponseResult, response: TimeRe
 
 
 def _spectra(axes: Any, line: EngineLine, found: ResponseResult, response: TimeResponse) -> None:
-    """Angular displacement by frequency; grey lines at the half orders, or the mesh frequencies where none fires."""
+    """Angular displacement by frequency.
+
+    Grey lines at the half orders, or the mesh frequencies where none fires.
+    """
     rate = found.response.speed / (2.0 * np.pi)
     of_motor = turner(line) == "motor"
     orders = (
@@ -264,7 +275,9 @@ def _waterfall(figure: Any, axes: Any, way: SweepWay, column: int, top: float) -
 
 
 def _both_ways(axes: Any, found: ResponseResult, sweep: Sweep, column: int) -> None:
-    """Fluctuation up and down with three standard errors, and the linear one where there is a run."""
+    """Fluctuation up and down with three standard errors, and the linear one where there is a
+    run.
+    """
     factor = from_si("speed_rpm", 1.0)
     for way, colour, label in ((sweep.up, SOUND, "up"), (sweep.down, FAULTY, "down")):
         rpm, mean, error = (

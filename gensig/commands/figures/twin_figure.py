@@ -1,4 +1,7 @@
-"""The figure of a twin: its levels beside those that were held out, and the path that was fitted."""
+"""The figure of a twin.
+
+Its levels beside those that were held out, and the path that was fitted.
+"""
 
 from __future__ import annotations
 
@@ -12,7 +15,9 @@ from gensig.twin.fitting import Fit
 
 
 def plot_twin(fitted: Fit, check: Check, path: Path) -> None:
-    """Third-octave levels with the range of the twin's records, and gain and noise over frequency, a row a sensor."""
+    """Third-octave levels with the range of the twin's records, and gain and noise over
+    frequency, a row a sensor.
+    """
     n_sensors = len(fitted.sensors)
     figure, axes = pyplot.subplots(
         n_sensors, 2, figsize=(11, 2.8 * n_sensors), squeeze=False, layout="constrained"

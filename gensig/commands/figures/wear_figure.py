@@ -1,4 +1,7 @@
-"""Figure of a wear life: sliding and pressure, wear along both flanks, curvature, and the way to the end."""
+"""Figure of a wear life.
+
+Sliding and pressure, wear along both flanks, curvature, and the way to the end.
+"""
 
 from __future__ import annotations
 
@@ -37,7 +40,10 @@ SHOWN = (10, 20, 30, 40)  # snapshots: quarters of the life
 def plot_wear_life(
     life: WearLife, speed: float, content: Mapping[str, Any], lives: LifeMap | None, path: Path
 ) -> None:
-    """Six panels; the last is the map of lives where there is one, else the greatest depths over time."""
+    """Six panels.
+
+    The last is the map of lives where there is one, else the greatest depths over time.
+    """
     figure, axes = pyplot.subplots(2, 3, figsize=(15, 8), layout="constrained")
     place = np.array(content["position_mm"])
     _sliding(axes[0, 0], place, content)

@@ -1,4 +1,7 @@
-"""Verbs on the loaded flanks of a pair, slice by slice: transmission-error, and stiffness of a helical pair."""
+"""Verbs on the loaded flanks of a pair, slice by slice.
+
+Transmission-error, and stiffness of a helical pair.
+"""
 
 from __future__ import annotations
 
@@ -59,7 +62,10 @@ def transmission_error(arguments: Namespace) -> int:
 
 
 def added_um(sound: TransmissionError, faulty: TransmissionError) -> list[float]:
-    """How much more the gears approach with a fault than without, um; ``sound`` is of one mesh period."""
+    """How much more the gears approach with a fault than without, um.
+
+    ``sound`` is of one mesh period.
+    """
     return ((faulty.error - np.tile(sound.error, faulty.n_periods)) * 1e6).tolist()
 
 

@@ -1,4 +1,7 @@
-"""``gensig modify-flank``: the modifications of a pair that are best for a range of torques and misalignments."""
+"""``gensig modify-flank``.
+
+The modifications of a pair that are best for a range of torques and misalignments.
+"""
 
 from __future__ import annotations
 
@@ -23,7 +26,9 @@ GROUP = "modification"
 
 
 def modify_flank(arguments: Namespace) -> int:
-    """Search, print the front, write the chosen modification as an option of the group ``modification``."""
+    """Search, print the front, write the chosen modification as an option of the group
+    ``modification``.
+    """
     if arguments.points < 1:
         raise ConfigError(
             f"--points {arguments.points}: give 1 for the least ripple alone, 3 or more for a front"
@@ -69,7 +74,10 @@ def _say(done: int, total: int) -> None:
 
 
 def _chosen(front: Sequence[Optimum], before: Optimum) -> Optimum:
-    """The point nearest to none of both, each counted by its value before: the knee of the front."""
+    """The point nearest to none of both, each counted by its value before.
+
+    The knee of the front.
+    """
     return min(
         front,
         key=lambda one: (one.ripple / before.ripple) ** 2 + (one.line_load / before.line_load) ** 2,

@@ -142,7 +142,9 @@ def _range(values: Array, form: str) -> str:
 
 
 def simulate(arguments: Namespace) -> int:
-    """One record, as ``generate`` would make it, with every value as configured rather than drawn."""
+    """One record, as ``generate`` would make it, with every value as configured rather than
+    drawn.
+    """
     from gensig.plan.make import make_plan
     from gensig.record.simulate import simulate_record
 

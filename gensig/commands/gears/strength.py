@@ -18,7 +18,10 @@ from gensig.systems.root_strength import GearStress, RootHistory, RootStrength, 
 
 
 def root_stress(arguments: Namespace) -> int:
-    """Root stress over the mesh, at ISO's load point, and safety factors: JSON, a figure, or a summary."""
+    """Root stress over the mesh, at ISO's load point, and safety factors.
+
+    JSON, a figure, or a summary.
+    """
     check_outputs(arguments)
     config = read_configuration(arguments)
     if read_faults(config["fault"]):
@@ -47,7 +50,10 @@ def root_stress(arguments: Namespace) -> int:
 def root_stress_content(
     system: RootStrength, gears: dict[str, GearStress], history: RootHistory
 ) -> dict[str, Any]:
-    """The keys of ``gensig root-stress --json``; at the top those of the gear with the higher stress."""
+    """The keys of ``gensig root-stress --json``.
+
+    At the top those of the gear with the higher stress.
+    """
     pair, strength = system.pair, system.strength
     by_gear = {name: _gear_content(gears[name], history.stress[name]) for name in gears}
     return {

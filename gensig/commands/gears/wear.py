@@ -1,4 +1,7 @@
-"""``gensig wear-life``: wear along both flanks, the life to a threshold, lives over torque and speed."""
+"""``gensig wear-life``.
+
+Wear along both flanks, the life to a threshold, lives over torque and speed.
+"""
 
 from __future__ import annotations
 
@@ -89,7 +92,10 @@ def wear_life_content(
     laws: tuple[FittedLaw, ...] = (),
     vibration: WornVibration | None = None,
 ) -> dict[str, Any]:
-    """The keys of ``gensig wear-life --json``; where there are several slices, the greatest of them."""
+    """The keys of ``gensig wear-life --json``.
+
+    Where there are several slices, the greatest of them.
+    """
     case = life.case
     path, pair, options, new, worn = (
         case.path,

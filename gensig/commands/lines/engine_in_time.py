@@ -1,4 +1,7 @@
-"""What ``gensig forced-response`` finds with teeth free to part: an operating point, a sweep, root stress."""
+"""What ``gensig forced-response`` finds with teeth free to part.
+
+An operating point, a sweep, root stress.
+"""
 
 from __future__ import annotations
 

@@ -1,4 +1,7 @@
-"""The verb forced-response: what an engine's torques do to its drive line, steadily, at one speed and over a run."""
+"""The verb forced-response.
+
+What an engine's torques do to its drive line, steadily, at one speed and over a run.
+"""
 
 from __future__ import annotations
 

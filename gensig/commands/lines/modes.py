@@ -22,7 +22,10 @@ SHOWN = 12  # modes in the summary
 
 
 def modes(arguments: Namespace) -> int:
-    """Natural frequencies, damping ratios, shapes and energy shares: JSON, a figure, or a summary."""
+    """Natural frequencies, damping ratios, shapes and energy shares.
+
+    JSON, a figure, or a summary.
+    """
     check_outputs(arguments)
     config = read_configuration(arguments)
     line = read_line(config)
@@ -40,7 +43,10 @@ def modes(arguments: Namespace) -> int:
 
 
 def read_line(config: Configuration) -> DriveLine:
-    """The drive line of a configuration; a single pair is one of two nodes, or more with a motor and a load."""
+    """The drive line of a configuration.
+
+    A single pair is one of two nodes, or more with a motor and a load.
+    """
     if read_faults(config["fault"]):
         raise ConfigError(
             f"fault={config['fault']['kind']}: modes are those of sound teeth at mean stiffness; take fault=healthy"
@@ -84,7 +90,9 @@ def mesh_names(line: DriveLine) -> list[str]:
 
 
 def _print_modes(line: DriveLine, found: Modes, content: Mapping[str, Any]) -> None:
-    """The lowest modes, each with the motions that have most of the kinetic energy, and where a mesh is the spring."""
+    """The lowest modes, each with the motions that have most of the kinetic energy, and where a
+    mesh is the spring.
+    """
     matrices, n_nodes = line.matrices(), len(line.line.nodes)
     n_lateral = len(matrices.coordinate_names) - n_nodes
     counts = {

@@ -19,9 +19,9 @@ from gensig.driveline.sweep import Sweep
 class ResponseResult:
     """Forced response of a drive line: operating point, steady vibration and a run of speeds.
 
-    ``seen`` is half the peak to peak of the speed at each toothed wheel, rad/s. In ``in_time`` and
-    ``sweep`` teeth may part. ``roots`` are root stresses by name: linear or in time, with dampers or
-    without. ``nodes`` are those whose speed is shown.
+    ``seen`` is half the peak to peak of the speed at each toothed wheel, rad/s. In ``in_time``
+    and ``sweep`` teeth may part. ``roots`` are root stresses by name: linear or in time, with
+    dampers or without. ``nodes`` are those whose speed is shown.
     """
 
     torques: LineTorques
@@ -39,8 +39,8 @@ class ResponseResult:
 class DamperState:
     """A drive line before or after tuning its dampers.
 
-    ``largest`` (speed,) N is the greatest tooth force over the range of speeds; the rest holds at the
-    reference speed.
+    ``largest`` (speed,) N is the greatest tooth force over the range of speeds; the rest holds at
+    the reference speed.
     """
 
     line: EngineLine

@@ -1,4 +1,7 @@
-"""The verb tune-damper: torsional dampers that make the worst tooth force of an engine's mesh least."""
+"""The verb tune-damper.
+
+Torsional dampers that make the worst tooth force of an engine's mesh least.
+"""
 
 from __future__ import annotations
 
@@ -37,7 +40,9 @@ DIGITS = 4  # of the sizes that are written, and judged
 
 
 def tune_damper(arguments: Namespace) -> int:
-    """Search, write the line with its dampers as an option of the group ``system``, print both states."""
+    """Search, write the line with its dampers as an option of the group ``system``, print both
+    states.
+    """
     check_outputs(arguments)
     target = option_file(arguments.out, GROUP, force=arguments.force)
     config = read_configuration(arguments)
@@ -109,7 +114,9 @@ def tuning_content(
 def option_text(
     machine: Mapping[str, Any], dampers: Sequence[TorsionalDamper], content: Mapping[str, Any]
 ) -> str:
-    """The whole machine as YAML that the group ``system`` takes, the new dampers behind those that it had."""
+    """The whole machine as YAML that the group ``system`` takes, the new dampers behind those
+    that it had.
+    """
     low, high = content["run_speeds_rpm"][0], content["run_speeds_rpm"][-1]
     head = (
         f"# Dampers by gensig tune-damper: worst force of mesh {content['mesh']} from {low:g} to {high:g} r/min at "

@@ -1,4 +1,7 @@
-"""A pair of gears from its data sheet: what a sheet does not print is derived or assumed, and said so."""
+"""A pair of gears from its data sheet.
+
+What a sheet does not print is derived or assumed, and said so.
+"""
 
 from __future__ import annotations
 
@@ -31,7 +34,8 @@ MODULES = (0.1, 50.0)  # mm
 class DataSheet:
     """What is known of a pair of gears, in the units of data sheets; pairs are of pinion and wheel.
 
-    ``bores`` are diameters in mm, ``supports`` radial stiffness in N/m, speed and torque those of the pinion.
+    ``bores`` are diameters in mm, ``supports`` radial stiffness in N/m, speed and torque those of
+    the pinion.
     """
 
     name: str
@@ -71,7 +75,9 @@ class DataSheet:
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class GearOption:
-    """The group ``gear`` of a configuration, a remark for each of its values, and the machine that it makes."""
+    """The group ``gear`` of a configuration, a remark for each of its values, and the machine
+    that it makes.
+    """
 
     gear: dict[str, Any]
     remarks: dict[str, str]
@@ -202,18 +208,19 @@ def gear_option(sheet: DataSheet) -> GearOption:
 def least_backlash(center_distance_mm: float, module_mm: float) -> float:
     """Recommended least normal backlash of industrial gears, micrometres, rounded.
 
-    Source: ISO/TR 10064-2:1996, j_bn = 2/3 (0.06 + 0.0005 a + 0.03 m_n) mm, for steel gears in ferrous housings. That
-    it holds below 15 m/s and for modules of 1.5 to 18 mm is from memory of the report, not checked against its text;
-    for others it is an assumption.
+    Source: ISO/TR 10064-2:1996, j_bn = 2/3 (0.06 + 0.0005 a + 0.03 m_n) mm, for steel gears in
+    ferrous housings. That it holds below 15 m/s and for modules of 1.5 to 18 mm is from memory of
+    the report, not checked against its text; for others it is an assumption.
     """
     return round(2e3 / 3.0 * (0.06 + 0.0005 * center_distance_mm + 0.03 * module_mm), 1)
 
 
 def tip_rounding(pressure_angle_deg: float, addendum: float = ADDENDUM) -> float:
-    """Rounding of the rack's tip over the module: that of ISO 53-A, or what its tip has room for at other angles.
+    """Rounding of the rack's tip over the module: that of ISO 53-A, or what its tip has room for
+    at other angles.
 
-    The circle may reach neither the working flank, c / (1 - sin(alpha)), nor over the middle of the rack's tip,
-    (pi / 4 - (h_a + c) tan(alpha)) cos(alpha) / (1 - sin(alpha)).
+    The circle may reach neither the working flank, c / (1 - sin(alpha)), nor over the middle of
+    the rack's tip, (pi / 4 - (h_a + c) tan(alpha)) cos(alpha) / (1 - sin(alpha)).
     """
     alpha = math.radians(pressure_angle_deg)
     if not 10.0 <= pressure_angle_deg <= 35.0:  # the geometry says so

@@ -1,4 +1,7 @@
-"""The experiment of a gearbox of one's own: a plan over its rated speed and torque, at the bearings or as measured."""
+"""The experiment of a gearbox of one's own.
+
+A plan over its rated speed and torque, at the bearings or as measured.
+"""
 
 from __future__ import annotations
 
@@ -25,7 +28,10 @@ GRADE_STEP = math.sqrt(2.0)  # between the limits of neighbouring grades of ISO 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Wishes:
-    """What was asked of the experiment; None where it was left out. Ranges are shares of the rated values."""
+    """What was asked of the experiment.
+
+    None where it was left out. Ranges are shares of the rated values.
+    """
 
     base: str = PLAIN
     rate: float | None = None
@@ -135,7 +141,9 @@ def _quality(wishes: Wishes) -> list[str]:
 
 
 def _couplings(option: GearOption) -> list[str]:
-    """Motor and load of the realistic experiment, as bodies of the same shape for the rated torque."""
+    """Motor and load of the realistic experiment, as bodies of the same shape for the rated
+    torque.
+    """
     base = _realistic()
     torque = option.gear["rated_torque_nm"]
     lines = ["system:"]

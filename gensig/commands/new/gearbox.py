@@ -150,7 +150,10 @@ def _sheet(arguments: Namespace) -> DataSheet:
 
 
 def doubts(option: GearOption) -> list[str]:
-    """What no pair of steel gears has, or what gensig will not simulate: perhaps another unit was meant."""
+    """What no pair of steel gears has, or what gensig will not simulate.
+
+    Perhaps another unit was meant.
+    """
     told, found = option.derived(), []
     ratio, speed, torque = (
         told["transverse_contact_ratio"],

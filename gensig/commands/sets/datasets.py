@@ -126,7 +126,10 @@ def _generate_share(executor: Executor, arguments: Namespace) -> int:
 def _asked(
     out: Path, overrides: Sequence[str], config_dir: str | None = None
 ) -> Configuration | None:
-    """The configuration that a folder's own words and those typed now make; None where they ask for no other bits."""
+    """The configuration that a folder's own words and those typed now make.
+
+    None where they ask for no other bits.
+    """
     words = [word for word in overrides if not _is_free(word)]
     if not words:
         return None
@@ -185,7 +188,10 @@ def resume(arguments: Namespace) -> int:
 
 
 def finalize(arguments: Namespace) -> int:
-    """Close a data set whose shards were made by tasks of an array job; accept an edited card of a closed one."""
+    """Close a data set whose shards were made by tasks of an array job.
+
+    Accept an edited card of a closed one.
+    """
     from gensig.dataset.storage.checksums import accept_edits
 
     out = Path(arguments.folder)
@@ -233,7 +239,10 @@ def _say_failed(out: Path, n_failed: int, n_records: int) -> None:
 
 
 def plan(arguments: Namespace) -> int:
-    """Dry run: how many records, how many bytes, how long; with --freeze the folder is made, ready for array jobs."""
+    """Dry run: how many records, how many bytes, how long.
+
+    With --freeze the folder is made, ready for array jobs.
+    """
     from gensig.plan.notes import plan_notes
     from gensig.production.folder import begin_folder
     from gensig.production.prediction import predict
@@ -264,7 +273,10 @@ def plan(arguments: Namespace) -> int:
 
 
 def reproduce(arguments: Namespace) -> int:
-    """Simulate records again from what is recorded of them; the exit status is 0 only where they agree."""
+    """Simulate records again from what is recorded of them.
+
+    The exit status is 0 only where they agree.
+    """
     from gensig.production.reproduction import ACCEPTED
     from gensig.production.reproduction import reproduce as reproduce_records
 

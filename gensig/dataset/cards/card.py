@@ -1,4 +1,7 @@
-"""The data card: README.md and croissant.json of a folder, facts from the files beside caveats that always hold."""
+"""The data card.
+
+README.md and croissant.json of a folder, facts from the files beside caveats that always hold.
+"""
 
 import html
 import re
@@ -67,7 +70,9 @@ CAVEATS = """- The records are simulated. A model trained on them alone has prov
 
 
 def write_card(out: Path, *, figures: bool = True) -> None:
-    """Write `README.md`, its figures and `croissant.json` of a data-set folder whose shards are all done."""
+    """Write `README.md`, its figures and `croissant.json` of a data-set folder whose shards are
+    all done.
+    """
     with open_dataset(out, allow_incomplete=True) as data:
         pictures = write_class_figures(data) if figures else {}
         write_text(out / CROISSANT, croissant_text(data, CAVEATS))
@@ -75,7 +80,8 @@ def write_card(out: Path, *, figures: bool = True) -> None:
 
 
 def card_text(data: Dataset, pictures: Mapping[str, str] | None = None) -> str:
-    """The card as Markdown after Hugging Face front matter; every text that comes from a file is escaped.
+    """The card as Markdown after Hugging Face front matter; every text that comes from a file is
+    escaped.
 
     Parameters
     ----------
@@ -114,7 +120,10 @@ def _gallery(pictures: Mapping[str, str]) -> str:
 
 
 def front_matter(data: Dataset) -> str:
-    """YAML that the Hugging Face hub and its `load_dataset` read: licence, tags, size, and where the records are."""
+    """YAML that the Hugging Face hub and its `load_dataset` read.
+
+    Licence, tags, size, and where the records are.
+    """
     size = next((name for limit, name in SIZES if data.n_records < limit), "n>10M")
     content = {
         "pretty_name": plain(data.folder.resolve().name),
@@ -220,7 +229,10 @@ def _splits(data: Dataset) -> list[tuple[object, ...]]:
 
 
 def torque_words(data: Dataset) -> str:
-    """Whose torque `torque_nm` is: a drive line's is that of its load, whichever mesh its records follow."""
+    """Whose torque `torque_nm` is.
+
+    A drive line's is that of its load, whichever mesh its records follow.
+    """
     return f"torque of the {plain(data.attributes.get('torque_of', 'driving shaft'))}"
 
 

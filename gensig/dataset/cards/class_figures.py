@@ -1,4 +1,7 @@
-"""One small picture a class: a record of it over two turns of the driving shaft, and its spectrum, on common axes."""
+"""One small picture a class.
+
+A record of it over two turns of the driving shaft, and its spectrum, on common axes.
+"""
 
 from __future__ import annotations
 
@@ -45,7 +48,8 @@ class ClassExample:
 
 
 def write_class_figures(data: Dataset) -> dict[str, str]:
-    """Write a PNG for each class that has a usable record; path in the folder by class name, {} without matplotlib.
+    """Write a PNG for each class that has a usable record; path in the folder by class name, {}
+    without matplotlib.
 
     The same records, with the same version of matplotlib, give the same bytes.
     """

@@ -1,4 +1,7 @@
-"""croissant.json: the data set described for machines (MLCommons Croissant 1.0, with the Responsible-AI fields)."""
+"""croissant.json.
+
+The data set described for machines (MLCommons Croissant 1.0, with the Responsible-AI fields).
+"""
 
 import json
 from typing import Any
@@ -52,7 +55,10 @@ _TYPES = {"U": "sc:Text", "i": "sc:Integer", "f": "sc:Float"}
 
 
 def croissant_text(data: Dataset, caveats: str) -> str:
-    """The description as JSON-LD: facts from the manifest, the plan and the shards; `caveats` as limitations."""
+    """The description as JSON-LD: facts from the manifest, the plan and the shards.
+
+    `caveats` as limitations.
+    """
     manifest = data.manifest
     name = "".join(c if c.isprintable() else " " for c in data.folder.resolve().name)
     facts = (
@@ -141,7 +147,10 @@ def _distribution(data: Dataset) -> list[dict[str, Any]]:
 
 
 def _plan_records(plan: Plan) -> dict[str, Any]:
-    """What is known of each record before it is simulated; the shards, as HDF5, Croissant can list but not read."""
+    """What is known of each record before it is simulated.
+
+    The shards, as HDF5, Croissant can list but not read.
+    """
     fields = []
     for name, values in plan.columns.items():
         column = COLUMNS.get(name)

@@ -1,4 +1,7 @@
-"""A data set in other formats: one HDF5 file, Parquet, npz, wav; record by record, so that memory stays small."""
+"""A data set in other formats: one HDF5 file, Parquet, npz, wav.
+
+Record by record, so that memory stays small.
+"""
 
 import csv
 import shutil
@@ -38,7 +41,8 @@ def export(
     samples: bool = False,
     one_channel: bool = False,
 ) -> dict[str, int]:
-    """Write a data set in another format, under a name that does not exist yet; whole or not at all.
+    """Write a data set in another format, under a name that does not exist yet; whole or not at
+    all.
 
     Parameters
     ----------
@@ -58,7 +62,8 @@ def export(
     DatasetError    for a format or option that does not exist, a data set that is incomplete or damaged, a name that is
                     taken or lies in the data set's folder, and a disk that is full
 
-    Accelerations are float32 in m/s^2 however they are stored: nothing is lost, and int16 scales are left out.
+    Accelerations are float32 in m/s^2 however they are stored: nothing is lost, and int16 scales
+    are left out.
     """
     folder, out = Path(folder), Path(out)
     _check_request(folder, to, out, samples=samples, one_channel=one_channel)
@@ -110,7 +115,10 @@ def _check_request(folder: Path, to: str, out: Path, *, samples: bool, one_chann
 
 
 def _check_ids(data: Dataset) -> None:
-    """Refuse rows that are not those of the plan: ids become file names, and only the plan's were checked."""
+    """Refuse rows that are not those of the plan.
+
+    Ids become file names, and only the plan's were checked.
+    """
     if not np.array_equal(data.column("record_id"), data.plan.columns["record_id"]):
         raise DatasetError(
             f"{data.folder}: shards and plan have different record ids; run `gensig verify {data.folder}`"

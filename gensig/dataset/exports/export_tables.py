@@ -1,4 +1,7 @@
-"""Data sets as npz and Parquet, and what all exporters share: which columns go out, and time signals by record."""
+"""Data sets as npz and Parquet, and what all exporters share.
+
+Which columns go out, and time signals by record.
+"""
 
 import json
 import zipfile
@@ -39,12 +42,18 @@ def signal_layout(data: Dataset, name: str) -> tuple[tuple[int, ...], np.dtype]:
 
 
 def signal_row(data: Dataset, index: int, name: str) -> np.ndarray:
-    """One record's time signal: accelerations (channel, sample) float32 in m/s^2, others (sample,) as stored."""
+    """One record's time signal.
+
+    Accelerations (channel, sample) float32 in m/s^2, others (sample,) as stored.
+    """
     return data.signals(index, name=name) if name in SCALES else data.trace(index, name)
 
 
 def write_npz(data: Dataset, path: Path) -> None:
-    """One array a column and signal, and the attributes as JSON text; no array needs pickle to be read."""
+    """One array a column and signal, and the attributes as JSON text.
+
+    No array needs pickle to be read.
+    """
     with zipfile.ZipFile(path, "w", allowZip64=True) as archive:
         arrays = {name: data.column(name) for name in column_names(data)}
         arrays["attributes_json"] = np.array(attributes_json(data.attributes))
@@ -72,7 +81,10 @@ def _write_npy(
 
 
 def write_parquet(data: Dataset, path: Path, *, samples: bool) -> None:
-    """One row a record; with `samples`, time signals as lists of fixed length. Units are notes of the columns."""
+    """One row a record.
+
+    With `samples`, time signals as lists of fixed length. Units are notes of the columns.
+    """
     try:
         import pyarrow
         from pyarrow import parquet

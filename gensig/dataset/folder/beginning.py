@@ -1,4 +1,7 @@
-"""The beginning of a data-set folder: its plan, its splits and, last, the manifest; or nothing that anyone mistakes."""
+"""The beginning of a data-set folder: its plan, its splits and, last, the manifest.
+
+Or nothing that anyone mistakes.
+"""
 
 import hashlib
 from collections.abc import Sequence
@@ -41,8 +44,8 @@ def create_folder(
 ) -> None:
     """Make a data-set folder with plan, splits and manifest, ready to take shards.
 
-    The manifest is written last. Until it is there, a note says that the folder is being begun: one whose process was
-    killed meanwhile is known by it, and is begun anew by the next call.
+    The manifest is written last. Until it is there, a note says that the folder is being begun:
+    one whose process was killed meanwhile is known by it, and is begun anew by the next call.
 
     Parameters
     ----------
@@ -115,7 +118,9 @@ def create_folder(
 
 
 def refuse_used(out: Path) -> None:
-    """Raise DatasetError where a folder exists and holds something, other than a beginning that was killed."""
+    """Raise DatasetError where a folder exists and holds something, other than a beginning that
+    was killed.
+    """
     if out.is_dir():
         if any(out.iterdir()) and not _is_killed_beginning(out):
             raise DatasetError(f"{out} {_what_it_holds(out)}")
@@ -144,7 +149,9 @@ def _make_folders(folders: Sequence[Path], made: list[Path]) -> None:
 
 
 def _is_killed_beginning(out: Path) -> bool:
-    """True for a folder that holds the note of `create_folder` and nothing but what that writes before the manifest."""
+    """True for a folder that holds the note of `create_folder` and nothing but what that writes
+    before the manifest.
+    """
     names = {path.name for path in out.iterdir() if not _is_temporary(path)}
     if not names:  # killed while it wrote the note
         return all(path.name.startswith(f".{BEGINNING}.") for path in out.iterdir())

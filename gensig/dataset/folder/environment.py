@@ -13,7 +13,9 @@ PACKAGES = ("numpy", "scipy", "numba", "h5py", "hdf5plugin")
 
 
 def environment() -> dict[str, Any]:
-    """Versions of Python and the packages, processor, platform, git commit ('' when none) and the time now (UTC)."""
+    """Versions of Python and the packages, processor, platform, git commit ('' when none) and the
+    time now (UTC).
+    """
     return {
         "python": platform.python_version(),
         **{name: _version(name) for name in PACKAGES},
@@ -49,7 +51,10 @@ def _cpu_model() -> str:
 
 
 def _git_commit() -> str:
-    """The commit of gensig's own checkout; an installed copy inside somebody else's repository has none."""
+    """The commit of gensig's own checkout.
+
+    An installed copy inside somebody else's repository has none.
+    """
     root = Path(__file__).resolve().parents[3]
     if not (root / ".git").exists():
         return ""

@@ -12,7 +12,8 @@ _NUMBER = re.compile(r"[-+]?\d+(\.\d+)?(e[-+]?\d+)?", re.IGNORECASE)
 
 
 def commonest(reasons: Iterable[str]) -> str:
-    """The reason that most share but for its numbers, in the words of the first; with their count where others differ.
+    """The reason that most share but for its numbers, in the words of the first; with their count
+    where others differ.
 
     >>> commonest(["torque 3 N m: no end", "torque 5 N m: no end", "not finite"])
     'torque 3 N m: no end (2 of 3)'
@@ -29,7 +30,10 @@ def without_numbers(reason: str) -> str:
 
 
 def failure_reasons(folder: Path) -> list[str]:
-    """`status_reason` of every failed record of the shards that are done; [] where a shard does not tell it."""
+    """`status_reason` of every failed record of the shards that are done.
+
+    [] where a shard does not tell it.
+    """
     found: list[str] = []
     for index, entry in enumerate(read_manifest(folder).shards):
         if entry.state == "done" and entry.n_failed:

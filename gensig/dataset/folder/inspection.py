@@ -162,6 +162,9 @@ def _dataset_notes(data: h5py.Dataset) -> str:
 
 
 def _show(value: object) -> str:
-    """One printable line of at most `WIDTH` characters: text from files cannot steer the terminal."""
+    """One printable line of at most `WIDTH` characters.
+
+    Text from files cannot steer the terminal.
+    """
     text = "".join(c if c.isprintable() else "?" for c in str(value))
     return text if len(text) <= WIDTH else text[: WIDTH - 3] + "..."

@@ -1,4 +1,7 @@
-"""Joining a data-set folder: only the version and configuration that began it may go on, for the bits' sake."""
+"""Joining a data-set folder.
+
+Only the version and configuration that began it may go on, for the bits' sake.
+"""
 
 from __future__ import annotations
 

@@ -44,14 +44,18 @@ def shard_path(folder: Path, index: int) -> Path:
     return folder / SHARDS / shard_name(index)
 
 
-# Content of config.yaml: nested mappings, lists, text, numbers, booleans and null. It is a stranger's
+# Content of config.yaml: nested mappings, lists, text, numbers, booleans and null. It is a
+# stranger's
 # data until `gensig.options.configuration.Configuration` takes it.
 ConfigContent = dict[str, Any]
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class ShardEntry:
-    """One shard in the manifest; `sha256`, `bytes` and `n_failed` mean something once `state` is 'done'."""
+    """One shard in the manifest.
+
+    `sha256`, `bytes` and `n_failed` mean something once `state` is 'done'.
+    """
 
     name: str
     rows: int
@@ -239,7 +243,10 @@ def shard_entry(index: int, content: Any) -> ShardEntry:
 
 
 def read_config(folder: Path) -> ConfigContent:
-    """`config.yaml` as plain data: no tags, no interpolation, no aliases; DatasetError when it is anything else."""
+    """`config.yaml` as plain data: no tags, no interpolation, no aliases.
+
+    DatasetError when it is anything else.
+    """
     path = Path(folder) / CONFIG
     text = read_text(path, limit=CONFIG_BYTES_LIMIT)
     try:

@@ -1,4 +1,7 @@
-"""The life of a data-set folder that has begun: filled shard by shard, closed. Only closing makes it look whole."""
+"""The life of a data-set folder that has begun.
+
+Filled shard by shard, closed. Only closing makes it look whole.
+"""
 
 import hashlib
 import json
@@ -44,14 +47,16 @@ __all__ = [
 
 # These change where and how a data set is made, not one bit of it.
 NOT_IDENTITY = ("out", "executor", "verbosity")
-# Keys that came after 0.9.0 and the value that they have where they are missing. At that value they are not stored and
+# Keys that came after 0.9.0 and the value that they have where they are missing. At that value
+# they are not stored and
 # no part of the identity: a folder that was begun without the key is the same data set.
 SINCE_0_9 = {"solver.backend": "runge_kutta"}
 RECEIPT_SUFFIX = ".done"
 
 
 def identity_hash(config: ConfigContent, generator_version: str) -> str:
-    """sha256 over what decides the bits: the configuration less `NOT_IDENTITY`, schema and generator version.
+    """sha256 over what decides the bits: the configuration less `NOT_IDENTITY`, schema and
+    generator version.
 
     Raises
     ------
@@ -72,7 +77,10 @@ def deciding(config: ConfigContent) -> dict[str, Any]:
 
 
 def stored_config(config: dict[str, Any]) -> dict[str, Any]:
-    """A configuration as a data set stores it: plain data, without the keys of ``SINCE_0_9`` that have their value."""
+    """A configuration as a data set stores it.
+
+    Plain data, without the keys of ``SINCE_0_9`` that have their value.
+    """
     stored = plain_data(config)
     for dotted, default in SINCE_0_9.items():
         section, _, key = dotted.partition(".")
@@ -106,7 +114,10 @@ def _leaves(content: Mapping[str, Any], prefix: str = "") -> dict[str, Any]:
 
 
 def record_shard(out: Path, shard_index: int, sha256: str, bytes: int, n_failed: int) -> None:
-    """Enter a finished shard, already under its final name, in the manifest; local processes may do so at once."""
+    """Enter a finished shard, already under its final name, in the manifest.
+
+    Local processes may do so at once.
+    """
     _record(out, {shard_index: {"sha256": sha256, "bytes": bytes, "n_failed": n_failed}})
 
 
@@ -131,7 +142,10 @@ def _record(out: Path, facts: Mapping[int, Mapping[str, Any]]) -> None:
 
 
 def record_failed_shard(out: Path, shard_index: int) -> None:
-    """Enter in the manifest that a shard could not be made; the data set cannot be closed until it is."""
+    """Enter in the manifest that a shard could not be made.
+
+    The data set cannot be closed until it is.
+    """
     _update(out, {shard_index: {"state": "failed", "sha256": "", "bytes": 0, "n_failed": 0}})
 
 
@@ -153,7 +167,8 @@ def _update(out: Path, changes: Mapping[int, Mapping[str, Any]]) -> None:
 
 
 def finalize(out: Path, *, figures: bool = True) -> None:
-    """Close a data set whose shards are all done: index, card, checksums, and the state 'complete' last of all.
+    """Close a data set whose shards are all done: index, card, checksums, and the state
+    'complete' last of all.
 
     Parameters
     ----------
@@ -195,7 +210,10 @@ def finalize(out: Path, *, figures: bool = True) -> None:
 
 
 def _remove_leftovers(out: Path) -> None:
-    """Remove temporary files and receipts of killed writers; every shard is done, so no writer is alive."""
+    """Remove temporary files and receipts of killed writers.
+
+    Every shard is done, so no writer is alive.
+    """
     for folder in (out, out / SHARDS, out / SPLITS, out / FIGURES):
         for suffix in (TEMPORARY_SUFFIX, RECEIPT_SUFFIX):
             for path in folder.glob(f".*{suffix}"):

@@ -54,7 +54,8 @@ class VerifyResult:
 
 
 def verify(folder: Path, *, quick: bool = False) -> VerifyResult:
-    """Check a data-set folder: state, sha256, sizes, rows, schema, plan against rows, splits, scales, finite values.
+    """Check a data-set folder: state, sha256, sizes, rows, schema, plan against rows, splits,
+    scales, finite values.
 
     Parameters
     ----------
@@ -95,7 +96,8 @@ def verify(folder: Path, *, quick: bool = False) -> VerifyResult:
                     reference = reference or _description(file, path)
                     problems += _description_differs(file, path, reference)
                 found = _rows_differ(file, entry, plan, int(starts[i]))
-                # A file whose bytes are wrong can have thousands of wrong rows; the first line tells.
+                # A file whose bytes are wrong can have thousands of wrong rows; the first line
+                # tells.
                 problems += found[:1] if damage else found
         except DatasetError as error:
             problems.append(str(error))
@@ -138,7 +140,10 @@ def _state(folder: Path, manifest: Manifest) -> list[str]:
 
 
 def _extra_files(folder: Path, manifest: Manifest) -> list[str]:
-    """Files in `shards` that the manifest does not know; an interrupted run may have unfinished ones."""
+    """Files in `shards` that the manifest does not know.
+
+    An interrupted run may have unfinished ones.
+    """
     if not (folder / SHARDS).is_dir():
         return [f"the folder {SHARDS} is missing"]
     known = {entry.name for entry in manifest.shards}

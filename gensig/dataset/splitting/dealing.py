@@ -38,9 +38,11 @@ class Deal:
 
 
 def deal_groups(plan: Plan, deal: Deal, rng: np.random.Generator) -> SplitTable | str:
-    """The table of one deal in which every subset has every class that it needs, or in one line why there is none.
+    """The table of one deal in which every subset has every class that it needs, or in one line
+    why there is none.
 
-    A record that its group's side may not use is in no subset. Of the groups at least one is dealt to each side.
+    A record that its group's side may not use is in no subset. Of the groups at least one is
+    dealt to each side.
     """
     if deal.column not in plan.columns:
         return f"the plan has no column {deal.column}"
@@ -84,7 +86,10 @@ def deal_groups(plan: Plan, deal: Deal, rng: np.random.Generator) -> SplitTable 
 def _best_tested(
     side: NDArray[np.integer], worth: NDArray[np.float64], rng: np.random.Generator
 ) -> NDArray[np.integer]:
-    """The same numbers of groups a side, those of the largest worth tested on; ties and the rest by chance."""
+    """The same numbers of groups a side, those of the largest worth tested on.
+
+    Ties and the rest by chance.
+    """
     order = np.lexsort((rng.random(len(side)), worth))
     dealt = np.empty_like(side)
     dealt[order] = np.concatenate([side[side != TEST], side[side == TEST]])

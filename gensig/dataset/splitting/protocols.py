@@ -1,8 +1,9 @@
-"""Protocols of splits: what a test score claims, from machines never seen to speeds, severities and faults never seen.
+"""Protocols of splits: what a test score claims, from machines never seen to speeds, severities
+and faults never seen.
 
-Every protocol but the leaky one keeps whole units together, and with them their conditions and noise seeds. One that
-also holds out a range of values trains and validates outside it and tests inside it; a record that would be on the
-wrong side of its unit is in no subset.
+Every protocol but the leaky one keeps whole units together, and with them their conditions and
+noise seeds. One that also holds out a range of values trains and validates outside it and tests
+inside it; a record that would be on the wrong side of its unit is in no subset.
 """
 
 import functools
@@ -46,7 +47,8 @@ class Protocol:
 
 
 def make_splits(plan: Plan, seed: int) -> dict[str, SplitTable]:
-    """The protocols this plan can have; one whose subsets could not all hold their classes is left out.
+    """The protocols this plan can have; one whose subsets could not all hold their classes is
+    left out.
 
     Parameters
     ----------
@@ -61,7 +63,8 @@ def make_splits(plan: Plan, seed: int) -> dict[str, SplitTable]:
 
 
 def why_left_out(plan: Plan, seed: int, names: Collection[str] | None = None) -> dict[str, str]:
-    """Protocol -> one line that says why this plan cannot have it, for those that `make_splits` leaves out.
+    """Protocol -> one line that says why this plan cannot have it, for those that `make_splits`
+    leaves out.
 
     ``names`` are the protocols to ask about, None all of them.
     """
@@ -88,9 +91,12 @@ def _outcomes(
 
 
 def _random_windows(plan: Plan, rng: np.random.Generator) -> SplitTable:
-    """Eight windows of every record scattered over the subsets, so that a record is on every side: leaks on purpose."""
+    """Eight windows of every record scattered over the subsets, so that a record is on every
+    side: leaks on purpose.
+    """
     n = plan.n_records
-    # 5 windows train; the other three 2 + 1 or 1 + 2, which gives shares of 62.5 / 18.75 / 18.75 % on average.
+    # 5 windows train; the other three 2 + 1 or 1 + 2, which gives shares of 62.5 / 18.75 / 18.75
+    # % on average.
     subset = np.tile([0, 0, 0, 0, 0, 1, 2, 0], (n, 1))
     subset[:, 7] = rng.integers(1, 3, size=n)
     subset = rng.permuted(subset, axis=1).ravel()
@@ -104,13 +110,18 @@ def _random_windows(plan: Plan, rng: np.random.Generator) -> SplitTable:
 
 
 def _by_group(column: str, min_groups: int, plan: Plan, rng: np.random.Generator) -> Outcome:
-    """Whole groups dealt 60 / 20 / 20; of 40 to 49, ten are tested on, see `gensig.dataset.splitting.dealing`."""
+    """Whole groups dealt 60 / 20 / 20.
+
+    Of 40 to 49, ten are tested on, see `gensig.dataset.splitting.dealing`.
+    """
     usable = np.ones((len(SUBSETS), plan.n_records), dtype=bool)
     return deal_groups(plan, Deal(column=column, usable=usable, min_groups=min_groups), rng)
 
 
 def _cross_range(column: str, hold: str, plan: Plan, rng: np.random.Generator) -> Outcome:
-    """The highest or lowest quarter of a condition's values tested on, in units that are not trained on."""
+    """The highest or lowest quarter of a condition's values tested on, in units that are not
+    trained on.
+    """
     if column not in plan.columns:
         return f"the plan has no column {column}"
     values = np.asarray(plan.columns[column], dtype=float)
@@ -167,7 +178,10 @@ def _healthy_only(plan: Plan, rng: np.random.Generator) -> Outcome:
 
 
 def _open_set(plan: Plan, rng: np.random.Generator) -> Outcome:
-    """One faulty class, drawn by the seed, tested on only; at least two classes remain to be told apart."""
+    """One faulty class, drawn by the seed, tested on only.
+
+    At least two classes remain to be told apart.
+    """
     if "faults_json" not in plan.columns:
         return "the plan has no column faults_json"
     label = plan.columns["label"]
@@ -181,7 +195,10 @@ def _open_set(plan: Plan, rng: np.random.Generator) -> Outcome:
 
 
 def _outer(values: NDArray[np.float64]) -> Mask:
-    """(record,) whether a value is above the cut that leaves nearest to a quarter above it; none if all are equal."""
+    """(record,) whether a value is above the cut that leaves nearest to a quarter above it.
+
+    None if all are equal.
+    """
     distinct, counts = np.unique(values, return_counts=True)
     if len(distinct) < 2:
         return np.zeros(len(values), dtype=bool)
@@ -191,7 +208,10 @@ def _outer(values: NDArray[np.float64]) -> Mask:
 
 
 def _inner(values: NDArray[np.float64]) -> Mask:
-    """(record,) whether a value is in the middle quarter by rank: at least one value, never the least or largest."""
+    """(record,) whether a value is in the middle quarter by rank.
+
+    At least one value, never the least or largest.
+    """
     distinct, place, counts = np.unique(values, return_inverse=True, return_counts=True)
     if len(distinct) < 3:
         return np.zeros(len(values), dtype=bool)

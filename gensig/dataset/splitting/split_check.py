@@ -10,11 +10,12 @@ from gensig.dataset.splitting.splits import SplitTable
 
 
 def split_problems(protocol: str, table: SplitTable, plan: Plan) -> list[str]:
-    """What is on two sides although the protocol says that it is not; one line each, empty if it keeps its word.
+    """What is on two sides although the protocol says that it is not; one line each, empty if it
+    keeps its word.
 
-    No part of a record is ever given twice. Clean protocols also keep apart whole records, and with them their noise
-    seeds, which follow from the record alone, and the groups of `Protocol.apart`. Of a protocol that this version does
-    not know, only the first is asked.
+    No part of a record is ever given twice. Clean protocols also keep apart whole records, and
+    with them their noise seeds, which follow from the record alone, and the groups of
+    `Protocol.apart`. Of a protocol that this version does not know, only the first is asked.
     """
     ids = plan.columns["record_id"]
     order = np.argsort(ids, kind="stable")

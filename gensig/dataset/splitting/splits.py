@@ -1,4 +1,7 @@
-"""The table that says which part of which record is for training, validation and test; `protocols` makes it."""
+"""The table that says which part of which record is for training, validation and test.
+
+`protocols` makes it.
+"""
 
 import csv
 import io

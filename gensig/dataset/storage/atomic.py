@@ -14,13 +14,19 @@ TEMPORARY_SUFFIX = ".tmp"
 
 
 def temporary_name(path: Path) -> Path:
-    """A name in the same folder that no other process uses: hidden, ending in `TEMPORARY_SUFFIX`."""
+    """A name in the same folder that no other process uses.
+
+    Hidden, ending in `TEMPORARY_SUFFIX`.
+    """
     return path.with_name(f".{path.name}.{os.getpid()}-{secrets.token_hex(4)}{TEMPORARY_SUFFIX}")
 
 
 @contextmanager
 def locked(folder: Path) -> Iterator[None]:
-    """Keep other local processes from changing the same data set; a lock ends with its process and leaves no file."""
+    """Keep other local processes from changing the same data set.
+
+    A lock ends with its process and leaves no file.
+    """
     try:
         descriptor = os.open(folder, os.O_RDONLY)
     except OSError as error:
@@ -68,7 +74,10 @@ def write_text(path: Path, text: str) -> None:
 
 
 def write_bytes(path: Path, content: bytes) -> None:
-    """Write or replace a file atomically; DatasetError when the disk refuses, after which no part of it is left."""
+    """Write or replace a file atomically.
+
+    DatasetError when the disk refuses, after which no part of it is left.
+    """
     temporary = temporary_name(path)
     try:
         temporary.write_bytes(content)
@@ -86,7 +95,10 @@ def cannot_write(path: Path, error: Exception) -> DatasetError:
 
 
 def read_text(path: Path, *, limit: int) -> str:
-    """A UTF-8 file of at most `limit` bytes; DatasetError when it is absent, no ordinary file, too long or not text."""
+    """A UTF-8 file of at most `limit` bytes.
+
+    DatasetError when it is absent, no ordinary file, too long or not text.
+    """
     try:
         if not path.is_file():
             raise DatasetError(

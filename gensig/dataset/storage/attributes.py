@@ -15,7 +15,10 @@ Attribute = str | int | float | Sequence[str] | Sequence[int] | Sequence[float]
 
 
 def set_attribute(target: h5py.HLObject, name: str, value: Attribute) -> None:
-    """Store text, a number or a list of one kind as an attribute of fixed size; DatasetError for anything else."""
+    """Store text, a number or a list of one kind as an attribute of fixed size.
+
+    DatasetError for anything else.
+    """
     if isinstance(value, str):
         data: np.ndarray = _text_array([value], name).reshape(())
     elif isinstance(value, Sequence) and value and all(isinstance(item, str) for item in value):
@@ -60,5 +63,8 @@ def read_attributes(target: h5py.HLObject) -> dict:
 
 
 def decoded(values: np.ndarray) -> np.ndarray:
-    """Bytes of fixed length as text; bytes that are no UTF-8 are shown as replacement characters."""
+    """Bytes of fixed length as text.
+
+    Bytes that are no UTF-8 are shown as replacement characters.
+    """
     return np.char.decode(np.asarray(values, dtype="S"), "utf-8", "replace")

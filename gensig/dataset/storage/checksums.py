@@ -1,7 +1,9 @@
-"""SHA256SUMS: the digest of every file of a closed data set, in the form that `sha256sum --check` reads.
+"""SHA256SUMS: the digest of every file of a closed data set, in the form that `sha256sum --check`
+reads.
 
-The manifest holds the digests of shards, plan and splits. This file repeats them, and adds those of the manifest itself
-and of the files that are for people, so that no byte of the folder can change unnoticed.
+The manifest holds the digests of shards, plan and splits. This file repeats them, and adds those
+of the manifest itself and of the files that are for people, so that no byte of the folder can
+change unnoticed.
 """
 
 import re
@@ -39,7 +41,10 @@ class Difference:
 
 
 def write_checksums(folder: Path, manifest: Manifest, manifest_digest: str) -> None:
-    """Write `SHA256SUMS` for a manifest that says 'complete'; it may be written before that manifest."""
+    """Write `SHA256SUMS` for a manifest that says 'complete'.
+
+    It may be written before that manifest.
+    """
     digests = {MANIFEST: manifest_digest, **_recorded(manifest)}
     digests |= {name: sha256_file(folder / name) for name in _beside(folder)}
     write_text(
@@ -89,7 +94,8 @@ def read_checksums(folder: Path) -> dict[str, str]:
 
 
 def differences(folder: Path, manifest: Manifest, *, quick: bool = False) -> list[Difference]:
-    """Every file whose digest is not the one in `SHA256SUMS`; those that the manifest lists are compared with it.
+    """Every file whose digest is not the one in `SHA256SUMS`; those that the manifest lists are
+    compared with it.
 
     Parameters
     ----------
@@ -132,7 +138,8 @@ def differences(folder: Path, manifest: Manifest, *, quick: bool = False) -> lis
 
 
 def accept_edits(folder: Path) -> list[str]:
-    """Take card and description of a closed data set as they are now; returns the names of those that had changed.
+    """Take card and description of a closed data set as they are now; returns the names of those
+    that had changed.
 
     Raises
     ------

@@ -1,4 +1,7 @@
-"""Compression of the time signals: what may be asked for, how HDF5 is told, and the filter that is no part of HDF5."""
+"""Compression of the time signals.
+
+What may be asked for, how HDF5 is told, and the filter that is no part of HDF5.
+"""
 
 import os
 from collections.abc import Iterator
@@ -13,7 +16,8 @@ from gensig.errors import DatasetError
 COMPRESSIONS = ("none", "gzip", "lzf", "blosc2")
 
 BLOSC2_FILTER = 32026
-# Blosc2 stores a constant chunk in some 260 bytes, so that the size of a chunk says nothing about what is stored.
+# Blosc2 stores a constant chunk in some 260 bytes, so that the size of a chunk says nothing about
+# what is stored.
 BLOSC2_CHUNK_LIMIT = 256 * 1024**2
 
 _NAMES = {h5py.h5z.FILTER_DEFLATE: "gzip", h5py.h5z.FILTER_LZF: "lzf", BLOSC2_FILTER: "blosc2"}
@@ -35,7 +39,10 @@ def creation_options(compression: str) -> dict[str, Any]:
 
 
 def load_blosc2(what: str) -> ModuleType:
-    """The package hdf5plugin, whose import makes HDF5 know Blosc2; DatasetError says that `what` needs it."""
+    """The package hdf5plugin, whose import makes HDF5 know Blosc2.
+
+    DatasetError says that `what` needs it.
+    """
     try:
         import hdf5plugin
     except ImportError as error:
@@ -47,7 +54,10 @@ def load_blosc2(what: str) -> ModuleType:
 
 @contextmanager
 def fixed_settings() -> Iterator[None]:
-    """Hide the environment variables BLOSC_*: Blosc2 obeys them before its arguments, and they change the bytes."""
+    """Hide the environment variables BLOSC_*.
+
+    Blosc2 obeys them before its arguments, and they change the bytes.
+    """
     hidden = {name: os.environ.pop(name) for name in list(os.environ) if name.startswith("BLOSC_")}
     try:
         yield

@@ -1,4 +1,7 @@
-"""Opening a shard that may come from a stranger: checked before anything is read, and never trusted afterwards."""
+"""Opening a shard that may come from a stranger.
+
+Checked before anything is read, and never trusted afterwards.
+"""
 
 import math
 from pathlib import Path
@@ -24,7 +27,8 @@ from gensig.dataset.storage.compression import (
 )
 from gensig.errors import DatasetError
 
-# gzip reaches at most 1032:1; what declares more than this over what it stores is a bomb or was never written.
+# gzip reaches at most 1032:1; what declares more than this over what it stores is a bomb or was
+# never written.
 EXPANSION_LIMIT = 1100
 ATTRIBUTES_LIMIT = 1000
 
@@ -46,7 +50,10 @@ def open_file(path: Path) -> h5py.File:
 
 
 def open_shard(path: Path, *, folder: Path | None = None) -> h5py.File:
-    """A shard, open for reading after `check_shard`; with `folder`, refused when the name leads out of that folder."""
+    """A shard, open for reading after `check_shard`.
+
+    With `folder`, refused when the name leads out of that folder.
+    """
     if folder is not None and not path.resolve().is_relative_to(folder.resolve()):
         raise DatasetError(
             f"{path} is a link that leads out of {folder}; put the file itself there"
@@ -61,7 +68,10 @@ def open_shard(path: Path, *, folder: Path | None = None) -> h5py.File:
 
 
 def same_file(path: Path) -> tuple[int, ...]:
-    """Numbers that change when a file or a link to it is replaced or written to; () where there is none."""
+    """Numbers that change when a file or a link to it is replaced or written to.
+
+    () where there is none.
+    """
     try:
         found, link = path.stat(), path.lstat()
     except OSError:
@@ -105,7 +115,10 @@ def check_shard(file: h5py.File, path: Path) -> None:
 
 
 def datasets(file: h5py.File, path: Path) -> dict[str, h5py.Dataset]:
-    """All data sets of the root and of its groups one level down, by name; DatasetError for links and other objects."""
+    """All data sets of the root and of its groups one level down, by name.
+
+    DatasetError for links and other objects.
+    """
     found: dict[str, h5py.Dataset] = {}
 
     def collect(group: h5py.Group, prefix: str, *, deeper: bool) -> None:
@@ -177,7 +190,9 @@ def _check_dataset(name: str, data: h5py.Dataset, n_records: int, path: Path) ->
 
 
 def holds_its_data(data: h5py.Dataset) -> bool:
-    """True for a data set whose values are all in its own file, in no more bytes than it declares."""
+    """True for a data set whose values are all in its own file, in no more bytes than it
+    declares.
+    """
     used = filters(data)
     return (
         not data.is_virtual

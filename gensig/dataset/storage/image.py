@@ -1,4 +1,7 @@
-"""HDF5 files built in memory and written in one go: HDF5 itself crashes the process when a disk is full."""
+"""HDF5 files built in memory and written in one go.
+
+HDF5 itself crashes the process when a disk is full.
+"""
 
 import hashlib
 import itertools

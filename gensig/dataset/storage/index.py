@@ -15,9 +15,9 @@ from gensig.errors import DatasetError
 def write_index(folder: Path, manifest: Manifest) -> str:
     """Write `index.h5` over all shards of the manifest and return its sha256.
 
-    Rows stand in plan order. Where a shard is missing a reader finds NaN in floating-point data sets (scales among
-    them), -1 in integer ones and '' in text. The bytes depend on the shards' names and shapes only, not on time or
-    place.
+    Rows stand in plan order. Where a shard is missing a reader finds NaN in floating-point data
+    sets (scales among them), -1 in integer ones and '' in text. The bytes depend on the shards'
+    names and shapes only, not on time or place.
     """
     path = folder / INDEX
     with open_shard(shard_path(folder, 0), folder=folder) as first, memory_file() as index:
@@ -29,7 +29,10 @@ def write_index(folder: Path, manifest: Manifest) -> str:
 
 
 def _map(index: h5py.File, name: str, data: h5py.Dataset, manifest: Manifest) -> None:
-    """One virtual data set; made at the low level, because h5py's own way stores the time of day."""
+    """One virtual data set.
+
+    Made at the low level, because h5py's own way stores the time of day.
+    """
     row_shape = data.shape[1:]
     space = h5py.h5s.create_simple((manifest.n_records, *row_shape))
     properties = h5py.h5p.create(h5py.h5p.DATASET_CREATE)
@@ -60,7 +63,8 @@ def _map(index: h5py.File, name: str, data: h5py.Dataset, manifest: Manifest) ->
 
 
 def open_index(folder: Path) -> h5py.File:
-    """`index.h5`, open for reading once it is known to show the folder's own shards and nothing else.
+    """`index.h5`, open for reading once it is known to show the folder's own shards and nothing
+    else.
 
     Raises
     ------

@@ -1,4 +1,7 @@
-"""Time signals as int16 counts with one scale a record and channel: half the bytes, an error far below the noise."""
+"""Time signals as int16 counts with one scale a record and channel.
+
+Half the bytes, an error far below the noise.
+"""
 
 import h5py
 import numpy as np
@@ -9,7 +12,8 @@ COUNTS = 32767  # of the largest value of a channel, so that both signs have the
 
 
 def quantized(signal: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
-    """Counts and the value of one count, so that `counts * scale` is the signal but for half a count.
+    """Counts and the value of one count, so that `counts * scale` is the signal but for half a
+    count.
 
     Parameters
     ----------

@@ -1,7 +1,9 @@
-"""A note beside each finished shard until the manifest has taken it in, so that writers never share a file.
+"""A note beside each finished shard until the manifest has taken it in, so that writers never
+share a file.
 
-Processes that may not see each other, such as the tasks of an array job, each write shards and receipts of their own;
-one process enters them in the manifest. A shard whose writer was killed before its receipt is made again.
+Processes that may not see each other, such as the tasks of an array job, each write shards and
+receipts of their own; one process enters them in the manifest. A shard whose writer was killed
+before its receipt is made again.
 """
 
 import json
@@ -45,7 +47,10 @@ def write_receipt(
 
 
 def read_receipt(folder: Path, shard_index: int) -> ShardEntry | None:
-    """What the receipt of a shard says; None without one, or where the shard has another size than it says."""
+    """What the receipt of a shard says.
+
+    None without one, or where the shard has another size than it says.
+    """
     path, shard = receipt_path(folder, shard_index), shard_path(folder, shard_index)
     if not path.is_file():
         return None

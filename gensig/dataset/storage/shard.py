@@ -1,4 +1,7 @@
-"""Writing one shard: an HDF5 file that appears whole or not at all, with the same bytes for the same input."""
+"""Writing one shard.
+
+An HDF5 file that appears whole or not at all, with the same bytes for the same input.
+"""
 
 import difflib
 import math
@@ -61,8 +64,9 @@ class ShardWriter:
     ------
     DatasetError    for unknown names, wrong shapes or types, a row written twice or never, a disk that is full
 
-    The bytes depend neither on time, folder nor process; with `compression='none'` not on the order of `write` either.
-    The shard is built in memory, about twice its size at the end, and then written in one go.
+    The bytes depend neither on time, folder nor process; with `compression='none'` not on the
+    order of `write` either. The shard is built in memory, about twice its size at the end, and
+    then written in one go.
     """
 
     def __init__(
@@ -212,7 +216,8 @@ class ShardWriter:
         scale = self.scales.get(name)
         properties = h5py.h5p.create(h5py.h5p.DATASET_CREATE)
         if self.compression == "none":
-            # Space is laid out now, in row order, and not filled first: every row is written anyway.
+            # Space is laid out now, in row order, and not filled first: every row is written
+            # anyway.
             properties.set_alloc_time(h5py.h5d.ALLOC_TIME_EARLY)
             properties.set_fill_time(h5py.h5d.FILL_TIME_NEVER)
         data = self._file.create_dataset(

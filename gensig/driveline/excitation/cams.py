@@ -1,7 +1,8 @@
 """Torque that cams take: valve cams with flat followers, injection-pump cams with rollers.
 
-Lift over the cam's angle is the 3-4-5-6 polynomial, h = H 64 u^3 (1 - u)^3, whose velocity and acceleration are
-continuous (R. L. Norton, Cam Design and Manufacturing Handbook, 2nd ed. (2009), ch. 4).
+Lift over the cam's angle is the 3-4-5-6 polynomial, h = H 64 u^3 (1 - u)^3, whose velocity and
+acceleration are continuous (R. L. Norton, Cam Design and Manufacturing Handbook, 2nd ed. (2009),
+ch. 4).
 """
 
 from __future__ import annotations
@@ -22,10 +23,12 @@ FOLLOWERS = ("flat", "roller")
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Cam:
-    """A cam and what it moves, as felt at the cam; ``span`` is the cam's own angle over which it lifts.
+    """A cam and what it moves, as felt at the cam; ``span`` is the cam's own angle over which it
+    lifts.
 
-    The spring pushes with its preload and rate times lift. ``friction_coefficient`` is that of follower on cam, with
-    the contact's distance from the axis as arm; rollers have none of it worth counting.
+    The spring pushes with its preload and rate times lift. ``friction_coefficient`` is that of
+    follower on cam, with the contact's distance from the axis as arm; rollers have none of it
+    worth counting.
     """
 
     follower: str
@@ -71,7 +74,9 @@ class Cam:
             )
 
     def motion(self, angle: Array) -> tuple[Array, Array, Array]:
-        """Lift m, slope m/rad and curvature m/rad2 at the cam's angle in rad from where it begins to lift."""
+        """Lift m, slope m/rad and curvature m/rad2 at the cam's angle in rad from where it begins
+        to lift.
+        """
         share = np.mod(angle, 2.0 * math.pi) / self.span
         on = share < 1.0
         both = np.where(on, share * (1.0 - share), 0.0)
@@ -83,7 +88,8 @@ class Cam:
 
 
 def follower_force(cam: Cam, angle: Array, speed: float, load: Array | float = 0.0) -> Array:
-    """Force of the follower on the cam while it lifts, along the follower's way, (point,) N; 0 on the base circle.
+    """Force of the follower on the cam while it lifts, along the follower's way, (point,) N; 0 on
+    the base circle.
 
     Parameters
     ----------
@@ -108,7 +114,8 @@ def follower_force(cam: Cam, angle: Array, speed: float, load: Array | float = 0
 
 
 def cam_torque(cam: Cam, angle: Array, speed: float, load: Array | float = 0.0) -> Array:
-    """Torque on the camshaft, (point,) N m, negative where the cam takes it: T = -(F dh/da + F_s r).
+    """Torque on the camshaft, (point,) N m, negative where the cam takes it: T = -(F dh/da + F_s
+    r).
 
     Parameters
     ----------

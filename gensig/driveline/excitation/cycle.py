@@ -1,8 +1,9 @@
-"""One cylinder of a four-stroke engine: crank drive, gas torque and torque of the reciprocating mass.
+"""One cylinder of a four-stroke engine: crank drive, gas torque and torque of the reciprocating
+mass.
 
-The crank angle is 0 at firing top dead center and runs over 4 pi; torques are positive in the sense of rotation.
-C. F. Taylor, The Internal-Combustion Engine in Theory and Practice, vol. 2, ch. 8; E. J. Nestorides, A Handbook on
-Torsional Vibration (1958).
+The crank angle is 0 at firing top dead center and runs over 4 pi; torques are positive in the
+sense of rotation. C. F. Taylor, The Internal-Combustion Engine in Theory and Practice, vol. 2,
+ch. 8; E. J. Nestorides, A Handbook on Torsional Vibration (1958).
 """
 
 from __future__ import annotations
@@ -23,7 +24,10 @@ CYCLE = 4.0 * math.pi  # rad, two turns
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Cylinder:
-    """Crank drive of one cylinder; ``crank_to_rod_ratio`` is the crank's radius over the length of the rod."""
+    """Crank drive of one cylinder.
+
+    ``crank_to_rod_ratio`` is the crank's radius over the length of the rod.
+    """
 
     bore: float = unit("mm")
     stroke: float = unit("mm")
@@ -70,7 +74,10 @@ class Cylinder:
         return np.asarray(clearance + self.piston_area * self.piston_travel(angle))
 
     def piston_travel(self, angle: Array) -> Array:
-        """Way of the piston from top dead center, m: x = R (1 - cos a + (1 - sqrt(1 - (l sin a)^2)) / l)."""
+        """Way of the piston from top dead center, m.
+
+        X = R (1 - cos a + (1 - sqrt(1 - (l sin a)^2)) / l).
+        """
         ratio = self.crank_to_rod_ratio
         rod = np.sqrt(1.0 - np.square(ratio * np.sin(angle)))
         return np.asarray(self.crank_radius * (1.0 - np.cos(angle) + (1.0 - rod) / ratio))
@@ -113,7 +120,8 @@ def gas_torque(
 
 
 def inertia_torque(cylinder: Cylinder, angle: Array, speed: float) -> Array:
-    """Torque of the reciprocating mass on the crank at a constant speed, (point,) N m: T = -m w^2 x' x''.
+    """Torque of the reciprocating mass on the crank at a constant speed, (point,) N m: T = -m w^2
+    x' x''.
 
     Parameters
     ----------
@@ -137,6 +145,8 @@ def cycle_angles(n_points: int) -> Array:
 
 
 def delayed(torque: Array, delay: float) -> Array:
-    """A torque over the cycle, (point,), of a cylinder or cam that is ``delay`` rad of crank angle later, (point,)."""
+    """A torque over the cycle, (point,), of a cylinder or cam that is ``delay`` rad of crank
+    angle later, (point,).
+    """
     angle = cycle_angles(len(torque))
     return np.asarray(np.interp(angle - delay, angle, torque, period=CYCLE))

@@ -112,7 +112,10 @@ def _read_train(name: str, values: Any) -> ValveTrain:
 
 
 def _read_pump(values: Any) -> tuple[Plunger | None, dict[str, int]]:
-    """The plunger and its node for each cylinder; null is an engine without this pump, with a common rail."""
+    """The plunger and its node for each cylinder.
+
+    Null is an engine without this pump, with a common rail.
+    """
     if values is None:
         return None, {}
     place = f"{PLACE}.injection_pump"

@@ -1,4 +1,6 @@
-"""Torques of an engine on the nodes of its shaft line, over one cycle of the crank, at a speed and a load."""
+"""Torques of an engine on the nodes of its shaft line, over one cycle of the crank, at a speed
+and a load.
+"""
 
 from __future__ import annotations
 
@@ -59,7 +61,10 @@ class Dynamometer:
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class ValveTrain:
-    """Cams that open at a crank angle after their cylinder's firing top dead center; ``cam.span`` says how long."""
+    """Cams that open at a crank angle after their cylinder's firing top dead center.
+
+    ``cam.span`` says how long.
+    """
 
     opening: float = unit("deg")
     cam: Cam
@@ -69,8 +74,9 @@ class ValveTrain:
 class Engine:
     """A four-stroke engine: what its configuration says.
 
-    ``throw_nodes`` (throw,) are the nodes of the throws; ``valve_nodes`` gives for each bank the nodes of its cams by
-    throw, ``plunger_nodes`` for each cylinder that of its plunger. Either may be empty.
+    ``throw_nodes`` (throw,) are the nodes of the throws; ``valve_nodes`` gives for each bank the
+    nodes of its cams by throw, ``plunger_nodes`` for each cylinder that of its plunger. Either
+    may be empty.
     """
 
     cylinder: Cylinder
@@ -122,7 +128,10 @@ class Engine:
 
     @property
     def driving_nodes(self) -> tuple[int, ...]:
-        """Numbers of the nodes that what speeds the line up comes from; speeds are those of the first."""
+        """Numbers of the nodes that what speeds the line up comes from.
+
+        Speeds are those of the first.
+        """
         return self.throw_nodes
 
     @property
@@ -132,11 +141,17 @@ class Engine:
 
     @property
     def load_exponent(self) -> int:
-        """Power of the speed by which the set torque changes along a course: a dynamometer holds it."""
+        """Power of the speed by which the set torque changes along a course.
+
+        A dynamometer holds it.
+        """
         return LAWS["constant"]
 
     def dampers(self, ratios: Mapping[int, float]) -> dict[int, float]:
-        """Slopes of torque over speed by node, N m s/rad, beyond the tables over the cycle: none."""
+        """Slopes of torque over speed by node, N m s/rad, beyond the tables over the cycle.
+
+        None.
+        """
         return {}
 
     @property
@@ -150,10 +165,10 @@ class Engine:
 class EngineTorques(LineTorques):
     """Torques of an engine at one operating point.
 
-    ``angle`` (point,) rad are the crank angles of one cycle. ``pressure`` (point,) Pa is that of a cylinder from its
-    own firing top dead center on, ``fuel_volume`` m3 what it burns in a cycle. ``brake_torque`` and
-    ``indicated_torque`` are those of the whole engine at the crank, N m. The disturbance is a torque of its own
-    frequency, not one over the cycle.
+    ``angle`` (point,) rad are the crank angles of one cycle. ``pressure`` (point,) Pa is that of
+    a cylinder from its own firing top dead center on, ``fuel_volume`` m3 what it burns in a
+    cycle. ``brake_torque`` and ``indicated_torque`` are those of the whole engine at the crank, N
+    m. The disturbance is a torque of its own frequency, not one over the cycle.
     """
 
     indicated_torque: float

@@ -16,9 +16,9 @@ TOGETHER = math.radians(0.01)
 class Layout:
     """Cylinders named by bank and throw: ``A1`` is that of bank A on throw 1.
 
-    ``throw_angles`` (throw,) are the crank angles at which each throw's piston of the first bank is at top dead center
-    (modulo a turn), ``bank_angles`` (bank,) those by which each bank comes after the first. A four-stroke engine:
-    every cylinder fires once in two turns.
+    ``throw_angles`` (throw,) are the crank angles at which each throw's piston of the first bank
+    is at top dead center (modulo a turn), ``bank_angles`` (bank,) those by which each bank comes
+    after the first. A four-stroke engine: every cylinder fires once in two turns.
     """
 
     banks: tuple[str, ...]
@@ -77,7 +77,8 @@ class Layout:
     def firing_angles(self) -> dict[str, float]:
         """Crank angle at which each cylinder fires, rad from 0 to 4 pi, in the firing order.
 
-        Each fires at its first top dead center after the cylinder before it; the first fires in the first turn.
+        Each fires at its first top dead center after the cylinder before it; the first fires in
+        the first turn.
         """
         angle, angles = self.dead_center(self.firing_order[0]), {}
         for name, gap in zip(self.firing_order, self._gaps(), strict=True):
@@ -86,7 +87,10 @@ class Layout:
         return angles
 
     def _gaps(self) -> list[float]:
-        """Crank angle from each firing to the next, rad; a turn where the next is on the same top dead center."""
+        """Crank angle from each firing to the next, rad.
+
+        A turn where the next is on the same top dead center.
+        """
         if len(self.firing_order) == 1:
             return [2.0 * TURN]
         centers = [self.dead_center(name) for name in self.firing_order]
@@ -97,7 +101,9 @@ class Layout:
         return [TURN if min(gap, TURN - gap) < TOGETHER else gap for gap in gaps]
 
     def _check_turns(self) -> None:
-        """Refuse cylinders that fire together, and orders that these throws cannot fire in two turns."""
+        """Refuse cylinders that fire together, and orders that these throws cannot fire in two
+        turns.
+        """
         gaps = self._gaps()
         total, same = sum(gaps), [place for place, gap in enumerate(gaps) if gap == TURN]
         if abs(total - 2.0 * TURN) <= TOGETHER:

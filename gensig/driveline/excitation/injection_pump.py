@@ -19,11 +19,13 @@ FINE = 20_001  # points of the lift, to find where the delivery ends
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Plunger:
-    """One plunger with its cam; delivery begins at a crank angle before its cylinder fires, at a lift of the cam.
+    """One plunger with its cam; delivery begins at a crank angle before its cylinder fires, at a
+    lift of the cam.
 
-    ``delivery_pressure`` is reached at the reference speed and grows with its square (a nozzle's orifice), but is never
-    below ``opening_pressure``. It rises and falls over ``ramp_share`` of the delivered volume each. The fuel follows
-    from the work of the gas and ``indicated_efficiency``.
+    ``delivery_pressure`` is reached at the reference speed and grows with its square (a nozzle's
+    orifice), but is never below ``opening_pressure``. It rises and falls over ``ramp_share`` of
+    the delivered volume each. The fuel follows from the work of the gas and
+    ``indicated_efficiency``.
     """
 
     cam: Cam

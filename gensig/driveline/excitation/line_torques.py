@@ -1,4 +1,7 @@
-"""What engines and motors have in common: torques on the nodes of a line at an operating point, and driven machines."""
+"""What engines and motors have in common.
+
+Torques on the nodes of a line at an operating point, and driven machines.
+"""
 
 from __future__ import annotations
 
@@ -19,7 +22,10 @@ LAWS = {"constant": 0, "linear": 1, "quadratic": 2}  # exponent of the speed
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Reference:
-    """The point at which loads and drives are stated; ``torque`` is taken from the crank or the motor."""
+    """The point at which loads and drives are stated.
+
+    ``torque`` is taken from the crank or the motor.
+    """
 
     speed: float = unit("rpm")
     torque: float = unit("nm")
@@ -48,8 +54,8 @@ class Load:
 class LineTorques:
     """Torques at one operating point; positive turns a node in its own sense of rotation.
 
-    ``nodes`` (excited,) are node numbers, ``torque`` (excited, point) N m over two turns of the shaft that ``speed``
-    rad/s is of. ``brake_torque`` N m is what the load takes, at that shaft.
+    ``nodes`` (excited,) are node numbers, ``torque`` (excited, point) N m over two turns of the
+    shaft that ``speed`` rad/s is of. ``brake_torque`` N m is what the load takes, at that shaft.
     """
 
     speed: float

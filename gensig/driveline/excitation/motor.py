@@ -1,4 +1,7 @@
-"""The group ``excitation`` of a configuration whose line a motor turns: ``kind: motor_and_load``."""
+"""The group ``excitation`` of a configuration whose line a motor turns.
+
+``kind: motor_and_load``.
+"""
 
 from __future__ import annotations
 

@@ -39,8 +39,8 @@ class TorqueRipple:
 class MotorDrive:
     """A motor at one node and a load at another one, with further driven machines between them.
 
-    ``slip`` is the motor's at the reference: (synchronous speed - speed) / synchronous speed. ``load_law`` names how
-    the load's torque changes with its speed.
+    ``slip`` is the motor's at the reference: (synchronous speed - speed) / synchronous speed.
+    ``load_law`` names how the load's torque changes with its speed.
     """
 
     reference: Reference
@@ -63,7 +63,10 @@ class MotorDrive:
 
     @property
     def driving_nodes(self) -> tuple[int, ...]:
-        """Numbers of the nodes that what speeds the line up comes from; speeds are those of the first."""
+        """Numbers of the nodes that what speeds the line up comes from.
+
+        Speeds are those of the first.
+        """
         return (self.motor_node,)
 
     @property
@@ -77,12 +80,13 @@ class MotorDrive:
         return False
 
     def dampers(self, ratios: Mapping[int, float]) -> dict[int, float]:
-        """Slopes of torque over speed by node, N m s/rad: the motor gives less when faster, loads take more.
+        """Slopes of torque over speed by node, N m s/rad: the motor gives less when faster, loads
+        take more.
 
-        Near its synchronous speed the torque of an induction motor is in proportion to the slip (Fitzgerald, Kingsley &
-        Umans, Electric Machinery, 6th ed., section 6.5; from memory), which makes T (1 - s) / (s omega) at the
-        reference; under V/f control that slope is the same at every speed. Of the loads it is n T / omega of their laws
-        there.
+        Near its synchronous speed the torque of an induction motor is in proportion to the slip
+        (Fitzgerald, Kingsley & Umans, Electric Machinery, 6th ed., section 6.5; from memory),
+        which makes T (1 - s) / (s omega) at the reference; under V/f control that slope is the
+        same at every speed. Of the loads it is n T / omega of their laws there.
         """
         speed, torque = self.reference.speed, self.reference.torque
         found = {self.motor_node: torque * (1.0 - self.slip) / (self.slip * speed)}

@@ -1,6 +1,8 @@
-"""Pressure in a cylinder over the cycle: a Wiebe cycle that burns as much as the load needs, or a measured one.
+"""Pressure in a cylinder over the cycle: a Wiebe cycle that burns as much as the load needs, or a
+measured one.
 
-I. I. Wiebe (1956); J. B. Heywood, Internal Combustion Engine Fundamentals (1988), sections 9.2 and 10.4.
+I. I. Wiebe (1956); J. B. Heywood, Internal Combustion Engine Fundamentals (1988), sections 9.2
+and 10.4.
 """
 
 from __future__ import annotations
@@ -27,11 +29,13 @@ FILE_KEY = "excitation.pressure.file"
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class WiebeCycle:
-    """Polytropic compression and expansion with one exponent, heat released by Wiebe's law between two angles.
+    """Polytropic compression and expansion with one exponent, heat released by Wiebe's law
+    between two angles.
 
-    Boost above ambient is that at the reference point times the share of brake power; the exhaust's is a share of it.
-    Angles are degrees of the crank after firing top dead center. ``blowdown_angle`` is that over which the pressure
-    above the exhaust's falls to 1/e after the exhaust opens.
+    Boost above ambient is that at the reference point times the share of brake power; the
+    exhaust's is a share of it. Angles are degrees of the crank after firing top dead center.
+    ``blowdown_angle`` is that over which the pressure above the exhaust's falls to 1/e after the
+    exhaust opens.
     """
 
     boost_pressure: float = unit("mpa")
@@ -81,7 +85,9 @@ class WiebeCycle:
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class PressureFile:
-    """A CSV file with columns ``crank_angle_deg`` (0 at firing top dead center) and ``pressure_mpa`` (absolute)."""
+    """A CSV file with columns ``crank_angle_deg`` (0 at firing top dead center) and
+    ``pressure_mpa`` (absolute).
+    """
 
     file: str
 
@@ -89,7 +95,8 @@ class PressureFile:
 def wiebe_parts(
     cycle: WiebeCycle, cylinder: Cylinder, n_points: int, power_share: float
 ) -> tuple[Array, Array]:
-    """Pressure without combustion, Pa, and the pressure that each joule of heat adds, Pa/J, both (point,).
+    """Pressure without combustion, Pa, and the pressure that each joule of heat adds, Pa/J, both
+    (point,).
 
     Notes
     -----

@@ -1,9 +1,11 @@
-"""What torsional dampers do to the force of one element of a linear line, and the dampers that make it least.
+"""What torsional dampers do to the force of one element of a linear line, and the dampers that
+make it least.
 
-Dampers change the dynamic stiffness at their nodes only, so that a line is solved once for all of them: with R the
-receptance between the nodes and D the dampers' dynamic stiffness, their torques on the nodes are -(1 + D R)^-1 D q.
-Source: J. P. Den Hartog, Mechanical Vibrations (1956), 3.3; H. N. Oezgueven, Structural modifications using frequency
-response functions, Mechanical Systems and Signal Processing 4 (1990) 53-63.
+Dampers change the dynamic stiffness at their nodes only, so that a line is solved once for all of
+them: with R the receptance between the nodes and D the dampers' dynamic stiffness, their torques
+on the nodes are -(1 + D R)^-1 D q. Source: J. P. Den Hartog, Mechanical Vibrations (1956), 3.3;
+H. N. Oezgueven, Structural modifications using frequency response functions, Mechanical Systems
+and Signal Processing 4 (1990) 53-63.
 """
 
 from __future__ import annotations
@@ -41,7 +43,8 @@ SETTLED = 1e-3  # of the population's spread; the simplex goes on from there
 
 @dataclass(frozen=True, slots=True, kw_only=True, eq=False)
 class SeenFromNodes:
-    """Force of one element, and the motion of the nodes where dampers may sit, over speeds and orders.
+    """Force of one element, and the motion of the nodes where dampers may sit, over speeds and
+    orders.
 
     Parameters
     ----------
@@ -63,7 +66,9 @@ class SeenFromNodes:
     transfer: ComplexArray
 
     def force_with(self, dampers: Sequence[TorsionalDamper]) -> ComplexArray:
-        """Complex amplitudes of the element's force with dampers on some of the nodes, (speed, order)."""
+        """Complex amplitudes of the element's force with dampers on some of the nodes, (speed,
+        order).
+        """
         stiffness = np.zeros((*self.frequency.shape, len(self.nodes)), dtype=complex)
         for damper in dampers:
             stiffness[..., self.nodes.index(damper.node)] += damper.dynamic_stiffness(

@@ -1,6 +1,7 @@
 """Torsional vibration dampers: a ring on a node of a shaft line, held by a fluid, a spring or both.
 
-``docs/theory/dampers.md``. Source: J. P. Den Hartog, Mechanical Vibrations (1956), 3.2 and 3.3, 5.4.
+``docs/theory/dampers.md``. Source: J. P. Den Hartog, Mechanical Vibrations (1956), 3.2 and 3.3,
+5.4.
 """
 
 from __future__ import annotations
@@ -21,10 +22,11 @@ ComplexArray = NDArray[np.complex128]
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class TorsionalDamper:
-    """A ring of its own inertia (kg m2) held on ``node`` by ``damping`` (N m s/rad) and ``stiffness`` (N m/rad).
+    """A ring of its own inertia (kg m2) held on ``node`` by ``damping`` (N m s/rad) and
+    ``stiffness`` (N m/rad).
 
-    ``node`` is the number that the line's table gives it. Without stiffness it is a viscous damper (Houdaille), whose
-    ring only the fluid takes along.
+    ``node`` is the number that the line's table gives it. Without stiffness it is a viscous
+    damper (Houdaille), whose ring only the fluid takes along.
     """
 
     node: int
@@ -47,7 +49,8 @@ class TorsionalDamper:
             )
 
     def dynamic_stiffness(self, frequency: NDArray[np.float64]) -> ComplexArray:
-        """What it adds to the dynamic stiffness of its node at angular frequencies in rad/s, N m/rad.
+        """What it adds to the dynamic stiffness of its node at angular frequencies in rad/s, N
+        m/rad.
 
         The ring's equation solved for the ring: -w^2 J (k + i w c) / (k + i w c - w^2 J).
         """
@@ -60,7 +63,8 @@ class TorsionalDamper:
 def with_dampers(
     line: ShaftLine, numbers: Sequence[int], dampers: Sequence[TorsionalDamper]
 ) -> tuple[ShaftLine, tuple[int, ...]]:
-    """A line with its dampers' rings as further nodes, and the numbers of all nodes; rings count on from the highest.
+    """A line with its dampers' rings as further nodes, and the numbers of all nodes; rings count
+    on from the highest.
 
     Raises
     ------

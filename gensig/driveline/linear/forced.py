@@ -1,8 +1,9 @@
-"""Steady vibration of a linear shaft line under torques that repeat with the cycle of an engine, by orders.
+"""Steady vibration of a linear shaft line under torques that repeat with the cycle of an engine,
+by orders.
 
-Orders are multiples of the crank's speed; a four-stroke cycle has the half orders 0.5, 1, 1.5, ... Damping is a loss
-factor in the stiffness, viscous, or both. E. J. Nestorides, A Handbook on Torsional Vibration (1958); D. J. Ewins,
-Modal Testing (2000), section 2.4 (complex stiffness).
+Orders are multiples of the crank's speed; a four-stroke cycle has the half orders 0.5, 1, 1.5,
+... Damping is a loss factor in the stiffness, viscous, or both. E. J. Nestorides, A Handbook on
+Torsional Vibration (1958); D. J. Ewins, Modal Testing (2000), section 2.4 (complex stiffness).
 """
 
 from __future__ import annotations
@@ -30,9 +31,11 @@ ASYMMETRIC = 1e-9
 
 @dataclass(frozen=True, slots=True, kw_only=True, eq=False)
 class LinearLine:
-    """M q'' + C q' + (K + i H) q = f: four matrices (dof, dof), in kg m2, N m s/rad and N m/rad for rotations.
+    """M q'' + C q' + (K + i H) q = f: four matrices (dof, dof), in kg m2, N m s/rad and N m/rad
+    for rotations.
 
-    ``loss`` H is the sum of loss factor times stiffness of the elements; it is meant for harmonic motion only.
+    ``loss`` H is the sum of loss factor times stiffness of the elements; it is meant for harmonic
+    motion only.
     """
 
     mass: Array
@@ -52,14 +55,17 @@ class LinearLine:
                 raise ValueError(f"{name} must be symmetric")
 
     def dynamic_stiffness(self, frequency: Array) -> ComplexArray:
-        """K + i H + i w C - w^2 M, (frequency, dof, dof), at angular frequencies (frequency,) rad/s."""
+        """K + i H + i w C - w^2 M, (frequency, dof, dof), at angular frequencies (frequency,)
+        rad/s.
+        """
         w = np.asarray(frequency, dtype=float)[:, None, None]
         return np.asarray(
             self.stiffness + 1j * (self.loss + w * self.damping) - np.square(w) * self.mass
         )
 
     def response(self, force: ComplexArray, frequency: Array) -> ComplexArray:
-        """Complex amplitudes, (frequency, dof), of forces (frequency, dof) at frequencies in rad/s, none of them 0.
+        """Complex amplitudes, (frequency, dof), of forces (frequency, dof) at frequencies in
+        rad/s, none of them 0.
 
         Raises
         ------
@@ -78,8 +84,9 @@ class LinearLine:
 class Elements:
     """Springs between degrees of freedom: shafts, couplings and meshes.
 
-    ``directions`` (element, dof) give an element's deflection, ``stiffness`` and ``loss`` (element,) its stiffness and
-    the imaginary part of it. A torsional element has rad and N m/rad; a mesh along its line of action m and N/m.
+    ``directions`` (element, dof) give an element's deflection, ``stiffness`` and ``loss``
+    (element,) its stiffness and the imaginary part of it. A torsional element has rad and N
+    m/rad; a mesh along its line of action m and N/m.
     """
 
     directions: Array
@@ -152,9 +159,10 @@ def closed_line(matrices: Matrices) -> tuple[LinearLine, Elements]:
 class SteadyResponse:
     """Steady vibration at one speed (rad/s) of the crank.
 
-    ``orders`` (order,) are 0.5, 1, ...; ``angle`` (dof, order) rad complex amplitudes, so that the deviation from even
-    rotation is Re sum angle exp(i order a) over the crank angle a. ``twist`` (dof,) rad is what the mean torques add, 0
-    in the mean weighted with mass over the motions that nothing holds.
+    ``orders`` (order,) are 0.5, 1, ...; ``angle`` (dof, order) rad complex amplitudes, so that
+    the deviation from even rotation is Re sum angle exp(i order a) over the crank angle a.
+    ``twist`` (dof,) rad is what the mean torques add, 0 in the mean weighted with mass over the
+    motions that nothing holds.
     """
 
     speed: float
@@ -172,11 +180,16 @@ class SteadyResponse:
         return over_cycle(self.speed_deviation, n_points)
 
     def fluctuation(self) -> Array:
-        """Half the peak to peak of the speed over the cycle, (dof,) rad/s: what is printed as plus or minus."""
+        """Half the peak to peak of the speed over the cycle, (dof,) rad/s.
+
+        What is printed as plus or minus.
+        """
         return np.asarray(0.5 * np.ptp(self.speed_over_cycle(32 * len(self.orders)), axis=1))
 
     def element_forces(self, elements: Elements) -> tuple[Array, ComplexArray]:
-        """Mean (element,) and complex amplitudes (element, order) of what the elements carry, N m or N."""
+        """Mean (element,) and complex amplitudes (element, order) of what the elements carry, N m
+        or N.
+        """
         complex_stiffness = elements.stiffness + 1j * elements.loss
         return (
             np.asarray(elements.stiffness * (elements.directions @ self.twist)),
@@ -185,7 +198,8 @@ class SteadyResponse:
 
 
 def over_cycle(amplitudes: ComplexArray, n_points: int) -> Array:
-    """Values over the cycle, (..., point), of complex amplitudes at orders 0.5, 1, ..., (..., order).
+    """Values over the cycle, (..., point), of complex amplitudes at orders 0.5, 1, ..., (...,
+    order).
 
     Raises
     ------
@@ -202,7 +216,8 @@ def over_cycle(amplitudes: ComplexArray, n_points: int) -> Array:
 
 
 def cycle_orders(torque: Array, n_orders: int) -> tuple[Array, ComplexArray]:
-    """Mean (...,) and complex amplitudes (..., order) at orders 0.5, 1, ... of a torque over the cycle, (..., point).
+    """Mean (...,) and complex amplitudes (..., order) at orders 0.5, 1, ... of a torque over the
+    cycle, (..., point).
 
     Raises
     ------
@@ -243,7 +258,9 @@ def steady_response(
 def disturbance_response(
     line: LinearLine, dof: int, torque: float, frequency: float
 ) -> ComplexArray:
-    """Complex amplitudes, (dof,) rad, of a torque (N m) of a frequency (rad/s) of its own on one degree of freedom."""
+    """Complex amplitudes, (dof,) rad, of a torque (N m) of a frequency (rad/s) of its own on one
+    degree of freedom.
+    """
     force = np.zeros((1, len(line.mass)), dtype=complex)
     force[0, dof] = torque
     return np.asarray(line.response(force, np.array([frequency]))[0])
@@ -253,7 +270,8 @@ def disturbance_response(
 class Waterfall:
     """Amplitudes of one degree of freedom over a run of speeds.
 
-    ``speeds`` (speed,) rad/s; ``orders`` (order,); ``angle`` (speed, order) rad; ``fluctuation`` (speed,) rad/s.
+    ``speeds`` (speed,) rad/s; ``orders`` (order,); ``angle`` (speed, order) rad; ``fluctuation``
+    (speed,) rad/s.
     """
 
     speeds: Array
@@ -262,7 +280,10 @@ class Waterfall:
     fluctuation: Array
 
     def spectra(self, frequencies: Array) -> Array:
-        """Angular-displacement spectra, (speed, frequency) rad, on even frequencies in Hz: each line in its bin."""
+        """Angular-displacement spectra, (speed, frequency) rad, on even frequencies in Hz.
+
+        Each line in its bin.
+        """
         step = frequencies[1] - frequencies[0]
         out = np.zeros((len(self.speeds), len(frequencies)))
         for row, speed, amplitudes in zip(out, self.speeds, self.angle, strict=True):

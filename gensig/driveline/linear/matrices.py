@@ -1,4 +1,6 @@
-"""The matrices of a shaft line, torsion alone or with the lateral motion of its gears, the gear meshes apart."""
+"""The matrices of a shaft line, torsion alone or with the lateral motion of its gears, the gear
+meshes apart.
+"""
 
 from __future__ import annotations
 
@@ -16,7 +18,8 @@ Array = NDArray[np.float64]
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class LineMatrices:
-    """M q'' + C q' + K q + sum over meshes of direction x mesh force = f: plain arrays, the meshes apart.
+    """M q'' + C q' + K q + sum over meshes of direction x mesh force = f: plain arrays, the
+    meshes apart.
 
     Parameters
     ----------
@@ -56,14 +59,17 @@ class LineMatrices:
 
     @property
     def mesh_mass(self) -> Array:
-        """What each mesh has to accelerate along its line of action if all else is let go, (mesh,) kg."""
+        """What each mesh has to accelerate along its line of action if all else is let go,
+        (mesh,) kg.
+        """
         return np.asarray(1.0 / np.sum(self.directions**2 / np.diag(self.mass), axis=1))
 
 
 def line_matrices(
     line: ShaftLine, *, merge_rigid: bool = True, lateral: bool = False
 ) -> LineMatrices:
-    """Matrices of a line, with its rigid compounds as one disc each or as the stiff springs that they are given as.
+    """Matrices of a line, with its rigid compounds as one disc each or as the stiff springs that
+    they are given as.
 
     Raises
     ------
@@ -154,15 +160,20 @@ def _join(matrix: Array, one: int, other: int, value: float) -> None:
 
 
 def _line_of_action(line: ShaftLine, mesh: GearMesh) -> float:
-    """Angle of the direction in which the driving tooth pushes: off the common tangent by the pressure angle, rad."""
+    """Angle of the direction in which the driving tooth pushes.
+
+    Off the common tangent by the pressure angle, rad.
+    """
     sense = math.copysign(1.0, line.speed_ratio[line.gears[mesh.driving].node])
     return mesh.center_line + sense * (0.5 * math.pi - mesh.pressure_angle)
 
 
 def _frames(line: ShaftLine) -> list[float]:
-    """Direction of each gear's own frame: that in which the driving tooth of its first mesh pushes, rad.
+    """Direction of each gear's own frame: that in which the driving tooth of its first mesh
+    pushes, rad.
 
-    Its y points against it and its x is across, y turned back by a right angle, as in the equations of the single pair.
+    Its y points against it and its x is across, y turned back by a right angle, as in the
+    equations of the single pair.
     """
     frames: list[float | None] = [None] * len(line.gears)
     for mesh in line.meshes:

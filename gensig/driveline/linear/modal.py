@@ -1,4 +1,7 @@
-"""Natural modes of a shaft line: frequencies, damping ratios from loss factors, shapes, energy shares."""
+"""Natural modes of a shaft line.
+
+Frequencies, damping ratios from loss factors, shapes, energy shares.
+"""
 
 from __future__ import annotations
 
@@ -45,14 +48,16 @@ class Modes:
 def natural_modes(matrices: LineMatrices) -> Modes:
     """Modes with every mesh held at its stiffness.
 
-    Damping ratio of mode i: sum of loss factor times strain energy of each spring over twice the whole strain energy,
-    plus that of the viscous dampers, phi' C phi / (2 omega), which neither couple modes nor shift frequencies here.
+    Damping ratio of mode i: sum of loss factor times strain energy of each spring over twice the
+    whole strain energy, plus that of the viscous dampers, phi' C phi / (2 omega), which neither
+    couple modes nor shift frequencies here.
 
     Raises
     ------
     SimulationError    for motion without restoring force beyond the rigid rotation of each part
 
-    Source: Ungar & Kerwin (1962), loss factors in terms of energy; Johnson & Kienholz (1982), modal strain energy.
+    Source: Ungar & Kerwin (1962), loss factors in terms of energy; Johnson & Kienholz (1982),
+    modal strain energy.
     """
     from scipy.linalg import eigh
 
@@ -98,9 +103,10 @@ def natural_modes(matrices: LineMatrices) -> Modes:
 def with_viscous_losses(matrices: LineMatrices) -> LineMatrices:
     """The same with loss factors as viscous dampers, for integration in time: loss factors 0.
 
-    Shafts: C gets M Phi diag(2 zeta omega) Phi' M, so that every mode has its own ratio whatever its frequency, and
-    rigid motion none. Meshes: c = eta sqrt(k m) with the mass that the mesh accelerates, the ratio eta / 2 of the pair
-    on its own, since a mesh loses contact and its damper with it.
+    Shafts: C gets M Phi diag(2 zeta omega) Phi' M, so that every mode has its own ratio whatever
+    its frequency, and rigid motion none. Meshes: c = eta sqrt(k m) with the mass that the mesh
+    accelerates, the ratio eta / 2 of the pair on its own, since a mesh loses contact and its
+    damper with it.
     """
     modes = natural_modes(
         replace(matrices, mesh_loss_factor=np.zeros_like(matrices.mesh_stiffness))

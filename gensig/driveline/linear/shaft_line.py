@@ -1,8 +1,9 @@
 """A branched geared shaft line: inertias, shafts, rigid compounds, couplings and gear meshes.
 
-Every rotation counts positive in the sense in which its own node turns, so that speed ratios are positive numbers; the
-sense itself is the sign of ``ShaftLine.speed_ratio``. All inertias and stiffnesses are those of their own shaft, none
-is referred to another one. ``docs/theory/shaft_line.md``.
+Every rotation counts positive in the sense in which its own node turns, so that speed ratios are
+positive numbers; the sense itself is the sign of ``ShaftLine.speed_ratio``. All inertias and
+stiffnesses are those of their own shaft, none is referred to another one.
+``docs/theory/shaft_line.md``.
 """
 
 from __future__ import annotations
@@ -38,10 +39,11 @@ class Node:
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Shaft:
-    """A torsional spring between two nodes: stiffness in N m/rad, viscous damping in N m s/rad, loss factor.
+    """A torsional spring between two nodes: stiffness in N m/rad, viscous damping in N m s/rad,
+    loss factor.
 
-    A ``rigid`` one is a compound that may be merged; one whose stiffness is None always is. One of stiffness 0 is a
-    damper alone.
+    A ``rigid`` one is a compound that may be merged; one whose stiffness is None always is. One
+    of stiffness 0 is a damper alone.
     """
 
     first: int
@@ -67,7 +69,10 @@ class Shaft:
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class LineGear:
-    """A gear on a node; ``mass`` in kg and ``support`` serve its lateral motion, which it has where both are known."""
+    """A gear on a node.
+
+    ``mass`` in kg and ``support`` serve its lateral motion, which it has where both are known.
+    """
 
     name: str
     node: int
@@ -87,11 +92,12 @@ class LineGear:
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class GearMesh:
-    """Two external gears in mesh, places in ``ShaftLine.gears``; ``stiffness`` N/m along the transverse line of action.
+    """Two external gears in mesh, places in ``ShaftLine.gears``; ``stiffness`` N/m along the
+    transverse line of action.
 
-    ``backlash`` m is the play along it that is left to the coast flank. ``center_line`` rad is the direction from the
-    driving to the driven gear's centre in the common plane and ``pressure_angle`` rad the transverse working one:
-    lateral motion needs both.
+    ``backlash`` m is the play along it that is left to the coast flank. ``center_line`` rad is
+    the direction from the driving to the driven gear's centre in the common plane and
+    ``pressure_angle`` rad the transverse working one: lateral motion needs both.
     """
 
     driving: int
@@ -168,7 +174,9 @@ class ShaftLine:
 
     @cached_property
     def _turning(self) -> tuple[tuple[Fraction, ...], tuple[int, ...]]:
-        """Signed speed of every node over that of the first of its part, exactly, and the number of its part."""
+        """Signed speed of every node over that of the first of its part, exactly, and the number
+        of its part.
+        """
         joints: list[list[tuple[int, Fraction, str]]] = [[] for _ in self.nodes]
         for shaft in self.shafts:
             joints[shaft.first].append((shaft.second, Fraction(1), shaft.place))
@@ -202,12 +210,17 @@ class ShaftLine:
 
     @property
     def speed_ratio(self) -> Array:
-        """Speed of every node over that of the first of its part, negative where it turns the other way, (node,)."""
+        """Speed of every node over that of the first of its part, negative where it turns the
+        other way, (node,).
+        """
         return np.array([float(value) for value in self._turning[0]])
 
     @property
     def parts(self) -> tuple[tuple[int, ...], ...]:
-        """Nodes of each part of the line that nothing joins to the others; a free line has a rigid mode for each."""
+        """Nodes of each part of the line that nothing joins to the others.
+
+        A free line has a rigid mode for each.
+        """
         part = self._turning[1]
         return tuple(
             tuple(n for n, own in enumerate(part) if own == one) for one in range(max(part) + 1)
@@ -215,7 +228,8 @@ class ShaftLine:
 
     @property
     def elastic_parts(self) -> tuple[tuple[int, ...], ...]:
-        """Nodes that springs, compounds and meshes hold to each other: the parts, less rings that only a fluid holds.
+        """Nodes that springs, compounds and meshes hold to each other: the parts, less rings that
+        only a fluid holds.
 
         Each turns as one without deforming anything, first that of the first node.
         """

@@ -16,11 +16,13 @@ from gensig.dynamics._vector import inlined
     ROLL_DOF, N_PAIRS, FIRST, NODES, AT_TABLE, AT_ROWS, AT_COAST_ROWS, TEETH_A, TEETH_B, AT_KIND_A, AT_KIND_B,
     AT_ERROR_A, AT_ERROR_B, START_A, START_B, N_KINDS_B, N_SPRINGS, AT_DEPTH, N_PLACES,
 ) = range(19)  # fmt: skip
-# what is gathered of a pair: gap and stiffness of each of its springs, each with how fast it grows as the mesh rolls on
+# what is gathered of a pair: gap and stiffness of each of its springs, each with how fast it
+# grows as the mesh rolls on
 GAP, GAP_SLOPE, STIFFNESS = range(3)
 PER_SPRING = 2
 DRIVE, COAST, N_FLANKS = range(3)
-# what a mesh does at an instant; LOST is a power, ALONG the force on the roll coordinate, J per pitch
+# what a mesh does at an instant; LOST is a power, ALONG the force on the roll coordinate, J per
+# pitch
 FORCE, TANGENT, RATE_TANGENT, STORED, LOST, ALONG, N_LAW = range(7)
 # what a mesh has done: contact lost and back flanks loaded in steps, extreme forces
 APART, BEHIND, LARGEST, LEAST, N_TALLY = range(5)
@@ -30,18 +32,27 @@ INPUT, PASSING, DISSIPATED, THROUGHPUT, ROUNDS, N_SUMS = range(6)
 
 @inlined
 def spring_column(spring):
-    """Column of the stiffness of a spring in what is gathered of a pair; its slope stands behind it."""
+    """Column of the stiffness of a spring in what is gathered of a pair.
+
+    Its slope stands behind it.
+    """
     return STIFFNESS + PER_SPRING * spring
 
 
 @inlined
 def node_place(place, row, n_cells, cell):
-    """Place in ``Meshes.table`` of the node before a cell of a row; ``place`` are the whole numbers of the mesh."""
+    """Place in ``Meshes.table`` of the node before a cell of a row.
+
+    ``place`` are the whole numbers of the mesh.
+    """
     return place[AT_TABLE] + (row * (n_cells + 1) + cell) * spring_column(place[N_SPRINGS])
 
 
 class Rows(NamedTuple):
-    """A sparse matrix row by row: row i holds ``column`` and ``value`` from ``first[i]`` to ``first[i + 1]``."""
+    """A sparse matrix row by row.
+
+    Row i holds ``column`` and ``value`` from ``first[i]`` to ``first[i + 1]``.
+    """
 
     first: Any
     column: Any
@@ -49,19 +60,21 @@ class Rows(NamedTuple):
 
 
 class Padded(NamedTuple):
-    """A symmetric matrix: where sparse, its rows filled up to ``width`` numbers, ``column`` and ``value`` (width, dof),
-    else ``value`` (dof, dof) alone and no ``column``."""
+    """A symmetric matrix: where sparse, its rows filled up to ``width`` numbers, ``column`` and
+    ``value`` (width, dof), else ``value`` (dof, dof) alone and no ``column``."""
 
     column: Any
     value: Any
 
 
 class Factor(NamedTuple):
-    """A = L D L^T under the envelope of A: row i of L ends before its diagonal and has ``reach[i]`` numbers.
+    """A = L D L^T under the envelope of A: row i of L ends before its diagonal and has
+    ``reach[i]`` numbers.
 
-    ``lower`` holds the rows one after the other from ``first`` (dof,) on, ``inverse_pivot`` (dof,) is 1 / D. ``turn``
-    (dof,) is an order in which rows can be solved where neighbours do not wait for each other. ``inverse`` (dof, dof)
-    is that of A where A is so full that it costs less, else empty; ``spare`` (dof,) is its scratch.
+    ``lower`` holds the rows one after the other from ``first`` (dof,) on, ``inverse_pivot``
+    (dof,) is 1 / D. ``turn`` (dof,) is an order in which rows can be solved where neighbours do
+    not wait for each other. ``inverse`` (dof, dof) is that of A where A is so full that it costs
+    less, else empty; ``spare`` (dof,) is its scratch.
     """
 
     first: Any
@@ -74,11 +87,13 @@ class Factor(NamedTuple):
 
 
 class Meshes(NamedTuple):
-    """All meshes: ``number`` (mesh, N_NUMBERS), ``place`` (mesh, N_PLACES), and flat arrays for all of them.
+    """All meshes: ``number`` (mesh, N_NUMBERS), ``place`` (mesh, N_PLACES), and flat arrays for
+    all of them.
 
-    ``table`` holds, node after node of row after row, the gap in m and the stiffness of every spring in N/m, each with
-    its slope per cell; ``depth`` where its springs begin beyond the gap, m; ``rows`` the row of every pair of kinds, -1
-    for a pair that never touches; ``kind`` and ``error`` one number a tooth.
+    ``table`` holds, node after node of row after row, the gap in m and the stiffness of every
+    spring in N/m, each with its slope per cell; ``depth`` where its springs begin beyond the gap,
+    m; ``rows`` the row of every pair of kinds, -1 for a pair that never touches; ``kind`` and
+    ``error`` one number a tooth.
     """
 
     number: Any
@@ -91,10 +106,12 @@ class Meshes(NamedTuple):
 
 
 class Torques(NamedTuple):
-    """Torques on single degrees of freedom: ``dof`` (torque,), ``first`` (torque + 1,) nodes of each in ``table``.
+    """Torques on single degrees of freedom: ``dof`` (torque,), ``first`` (torque + 1,) nodes of
+    each in ``table``.
 
-    Torque i is its table over the angle of its own degree of freedom, ``per_rad[i]`` nodes a radian from ``shift[i]``
-    nodes on, times ``factor`` (torque, knot). One node alone is a torque that only the factor changes.
+    Torque i is its table over the angle of its own degree of freedom, ``per_rad[i]`` nodes a
+    radian from ``shift[i]`` nodes on, times ``factor`` (torque, knot). One node alone is a torque
+    that only the factor changes.
     """
 
     dof: Any
@@ -106,7 +123,10 @@ class Torques(NamedTuple):
 
 
 class Course(NamedTuple):
-    """Nominal rotation: ``time`` (knot,) s, ``speed`` rad/s, straight between, ``angle`` rad and ``gain`` rad/s2."""
+    """Nominal rotation.
+
+    ``time`` (knot,) s, ``speed`` rad/s, straight between, ``angle`` rad and ``gain`` rad/s2.
+    """
 
     time: Any
     speed: Any
@@ -117,9 +137,10 @@ class Course(NamedTuple):
 class Line(NamedTuple):
     """A line at one step: matrices, the factor of 4 M / h^2 + 2 C / h + K and what meshes do to it.
 
-    ``direction`` are the gradients of the approaches as rows; ``answer`` (mesh, dof) what one newton of a mesh moves,
-    ``compliance`` (mesh, mesh) what it takes from the approaches. ``rotation`` (dof,) is the nominal rotation of each
-    per that of the reference, ``carried`` M times it.
+    ``direction`` are the gradients of the approaches as rows; ``answer`` (mesh, dof) what one
+    newton of a mesh moves, ``compliance`` (mesh, mesh) what it takes from the approaches.
+    ``rotation`` (dof,) is the nominal rotation of each per that of the reference, ``carried`` M
+    times it.
     """
 
     mass: Padded

@@ -1,7 +1,8 @@
-"""Compiled core of a shaft line's gear meshes: the law of one, and the forces of all that agree with each other.
+"""Compiled core of a shaft line's gear meshes: the law of one, and the forces of all that agree
+with each other.
 
-The symbols are those of ``docs/theory/shaft_line_integration.md``. Scalar code without reassociation, own loops instead
-of library calls: bits depend on nothing but the numbers given.
+The symbols are those of ``docs/theory/shaft_line_integration.md``. Scalar code without
+reassociation, own loops instead of library calls: bits depend on nothing but the numbers given.
 """
 
 from __future__ import annotations
@@ -25,7 +26,8 @@ ROUNDED = 1e-14  # of what forces take off an approach
 
 @compiled
 def between(table, low, high, share, per_cell, out):
-    """Value and slope, ``share`` of the way between two nodes whose values and slopes stand at ``low`` and ``high``.
+    """Value and slope, ``share`` of the way between two nodes whose values and slopes stand at
+    ``low`` and ``high``.
 
     Of the cubic through both. ``per_cell`` is the slope asked for over that per cell.
     """
@@ -37,11 +39,13 @@ def between(table, low, high, share, per_cell, out):
 
 @compiled
 def gather(meshes, mesh, flank, turned, within, pairs):
-    """Gap and stiffnesses of the pairs of a flank and their slopes, where the mesh has rolled ``turned`` pitches.
+    """Gap and stiffnesses of the pairs of a flank and their slopes, where the mesh has rolled
+    ``turned`` pitches.
 
-    ``pairs`` (mesh, flank, pair, what is gathered) takes them; pairs that do not exist stand infinitely far back. The
-    back flanks meet along the mirrored roll, so their teeth count backwards. Of several springs those are left out that
-    begin beyond ``within`` m and a depth more.
+    ``pairs`` (mesh, flank, pair, what is gathered) takes them; pairs that do not exist stand
+    infinitely far back. The back flanks meet along the mirrored roll, so their teeth count
+    backwards. Of several springs those are left out that begin beyond ``within`` m and a depth
+    more.
 
     Returns
     -------
@@ -92,8 +96,8 @@ def gather(meshes, mesh, flank, turned, within, pairs):
 
 @compiled
 def flank_law(pairs, depth, damping, shared, within, rate, roll_rate):
-    """Law of the gathered pairs of a flank, ``within`` m beyond where sound teeth touch; their springs begin at
-    ``depth`` (spring,) m beyond the gap.
+    """Law of the gathered pairs of a flank, ``within`` m beyond where sound teeth touch; their
+    springs begin at ``depth`` (spring,) m beyond the gap.
 
     Returns
     -------
@@ -147,8 +151,8 @@ def flank_law(pairs, depth, damping, shared, within, rate, roll_rate):
 def mesh_law(meshes, mesh, turned, roll_rate, approach, rate, law, work):
     """Law of one mesh on whichever flank it touches, into ``law`` (mesh, N_LAW).
 
-    ``work.reach`` (mesh, flank) says up to where ``work.pairs`` holds all that touches for this roll, -inf where it
-    holds nothing yet; what is missing is gathered when it may touch.
+    ``work.reach`` (mesh, flank) says up to where ``work.pairs`` holds all that touches for this
+    roll, -inf where it holds nothing yet; what is missing is gathered when it may touch.
     """
     number, place, total = meshes.number[mesh], meshes.place[mesh], law[mesh]
     n_pairs, at_depth = place[layout.N_PAIRS], place[layout.AT_DEPTH]
@@ -185,7 +189,10 @@ def mesh_law(meshes, mesh, turned, roll_rate, approach, rate, law, work):
 
 @compiled
 def eliminate(matrix, right):
-    """Solve ``matrix`` x = ``right`` in place without pivoting: I + W J needs none, see ``solve_contact``."""
+    """Solve ``matrix`` x = ``right`` in place without pivoting.
+
+    I + W J needs none, see ``solve_contact``.
+    """
     n = len(right)
     for i in range(n):
         for j in range(i + 1, n):
@@ -215,7 +222,8 @@ def solve_contact(
     law,
     work,
 ):
-    """Approaches and forces of all meshes with delta = free - W (F(delta) - carried), by a semi-smooth Newton method.
+    """Approaches and forces of all meshes with delta = free - W (F(delta) - carried), by a
+    semi-smooth Newton method.
 
     Parameters
     ----------
@@ -227,8 +235,9 @@ def solve_contact(
     law : (mesh, N_LAW)             what the meshes do there, at the guess and then at the solution
     work : ``Work``
 
-    Forces grow with the approaches, J >= 0 their slopes, so the equation has one solution, and I + W J is similar to a
-    symmetric positive matrix once J is shared out; its elimination needs no pivots.
+    Forces grow with the approaches, J >= 0 their slopes, so the equation has one solution, and I
+    + W J is similar to a symmetric positive matrix once J is shared out; its elimination needs no
+    pivots.
 
     Returns
     -------

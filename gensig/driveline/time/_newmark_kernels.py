@@ -1,7 +1,8 @@
-"""Compiled core: Newmark's average acceleration for a geared shaft line, and where the line is at rest.
+"""Compiled core: Newmark's average acceleration for a geared shaft line, and where the line is at
+rest.
 
-The symbols are those of ``docs/theory/shaft_line_integration.md``. Scalar code without reassociation, own loops instead
-of library calls: bits depend on nothing but the numbers given.
+The symbols are those of ``docs/theory/shaft_line_integration.md``. Scalar code without
+reassociation, own loops instead of library calls: bits depend on nothing but the numbers given.
 """
 
 from __future__ import annotations
@@ -23,7 +24,10 @@ AT_REST, NEARLY = (
 
 @compiled
 def factorize(matrix, first, reach, lower, inverse_pivot):
-    """L and 1 / D of A = L D L^T (dof, dof) into a ``Factor``'s arrays; the first pivot that is not positive, or -1."""
+    """L and 1 / D of A = L D L^T (dof, dof) into a ``Factor``'s arrays.
+
+    The first pivot that is not positive, or -1.
+    """
     for i in range(len(reach)):
         start = i - reach[i]
         pivot = matrix[i, i]
@@ -132,8 +136,8 @@ def energy(line, q, v, law, work):
 
 @compiled
 def nominal(course, time, knot):
-    """Nominal angle, speed and acceleration, the knot before ``time``, from ``knot`` on, and the share of the way to
-    the next; constant speed outside the knots."""
+    """Nominal angle, speed and acceleration, the knot before ``time``, from ``knot`` on, and the
+    share of the way to the next; constant speed outside the knots."""
     while knot + 1 < len(course.time) and course.time[knot + 1] <= time:
         knot += 1
     since = time - course.time[knot]
@@ -154,7 +158,9 @@ def nominal(course, time, knot):
 
 @compiled
 def push(line, torques, angle, gain, knot, share, q, force):
-    """Torques at an instant, and the inertia force of the nominal acceleration, into ``force`` (dof,)."""
+    """Torques at an instant, and the inertia force of the nominal acceleration, into ``force``
+    (dof,).
+    """
     for i in range(len(force)):
         force[i] = -gain * line.carried[i]
     for j in range(len(torques.dof)):
@@ -185,7 +191,9 @@ def roll(meshes, angle, speed, q, v, turned, roll_rate):
 
 @compiled
 def look(line, meshes, torques, course, time, state, work):
-    """Torques, approaches and what the meshes do in a given state, so that ``advance`` can go on from there."""
+    """Torques, approaches and what the meshes do in a given state, so that ``advance`` can go on
+    from there.
+    """
     q, v, _, force, approach, rate, law = state
     turned, roll_rate = work.turned, work.roll_rate
     angle, speed, gain, knot, share = nominal(course, time, 0)
@@ -339,9 +347,10 @@ def advance(
 def rest(line, meshes, force, angle, q, law, work):
     """Where the line stands still under ``force`` (dof,) at a nominal angle: q in place.
 
-    ``line`` holds the factor of sigma M + K. Each round solves (sigma M + K) q = f + sigma M q_before - D^T F(q), a
-    step towards the least of a convex energy that leaves sigma / (sigma + omega^2) of what is left in every mode;
-    what moves is solved for the change of the forces, so that nothing large cancels in the end.
+    ``line`` holds the factor of sigma M + K. Each round solves (sigma M + K) q = f + sigma M
+    q_before - D^T F(q), a step towards the least of a convex energy that leaves sigma / (sigma +
+    omega^2) of what is left in every mode; what moves is solved for the change of the forces, so
+    that nothing large cancels in the end.
 
     Returns
     -------

@@ -1,4 +1,7 @@
-"""A mesh of a shaft line from the chords of sliced teeth: each pair as springs side by side that bear one by one."""
+"""A mesh of a shaft line from the chords of sliced teeth.
+
+Each pair as springs side by side that bear one by one.
+"""
 
 from __future__ import annotations
 
@@ -22,14 +25,17 @@ def sliced_pair_mesh(
     start_teeth: tuple[int, int] = (0, 0),
     start_phase: float = 0.0,
 ) -> LineMesh:
-    """A helical mesh, or a spur one in slices; gear a is the pinion, ``direction`` that of the transverse force.
+    """A helical mesh, or a spur one in slices; gear a is the pinion, ``direction`` that of the
+    transverse force.
 
-    ``start_phase`` is that of the slice that enters first. What the teeth of a pair have in common is that of
-    ``pair_mesh``; the back flanks are those of sound teeth, whose slices enter from the other end.
+    ``start_phase`` is that of the slice that enters first. What the teeth of a pair have in
+    common is that of ``pair_mesh``; the back flanks are those of sound teeth, whose slices enter
+    from the other end.
 
-    The force of a pair is made of chords between fixed depths of bite D_l and is convex, so that springs side by side
-    that begin to bear at D_l, each as stiff as its chord is above the one before, are the same force. Force, energy and
-    the torque of the passing teeth then come from one potential, whatever the depth.
+    The force of a pair is made of chords between fixed depths of bite D_l and is convex, so that
+    springs side by side that begin to bear at D_l, each as stiff as its chord is above the one
+    before, are the same force. Force, energy and the torque of the passing teeth then come from
+    one potential, whatever the depth.
     """
     pair, pitch = table.pair, table.pair.base_pitch
     n_nodes = len(table.position)

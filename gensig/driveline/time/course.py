@@ -1,4 +1,7 @@
-"""What drives a shaft line over time: its nominal rotation, and torques over the angle of their shafts."""
+"""What drives a shaft line over time.
+
+Its nominal rotation, and torques over the angle of their shafts.
+"""
 
 from __future__ import annotations
 
@@ -17,9 +20,11 @@ Array = NDArray[np.float64]
 
 @dataclass(frozen=True, kw_only=True, eq=False)
 class LineCourse:
-    """Nominal speed of the reference, straight between knots and constant outside; time 0 is the first sample.
+    """Nominal speed of the reference, straight between knots and constant outside; time 0 is the
+    first sample.
 
-    ``time`` (knot,) s, increasing, ``speed`` (knot,) rad/s. No slots: the angles are kept once they are made.
+    ``time`` (knot,) s, increasing, ``speed`` (knot,) rad/s. No slots: the angles are kept once
+    they are made.
     """
 
     time: Array
@@ -59,12 +64,14 @@ def constant_speed(speed: float) -> LineCourse:
 
 @dataclass(frozen=True, slots=True, kw_only=True, eq=False)
 class ShaftTorque:
-    """A torque on one degree of freedom over the angle that it has itself turned; both count as it nominally rotates.
+    """A torque on one degree of freedom over the angle that it has itself turned; both count as
+    it nominally rotates.
 
-    ``table`` (node,) N m stands at equal distances over ``period`` rad of that angle and is periodic, straight between
-    nodes; one number alone is constant. At time 0 the line stands ``phase`` rad into it. ``factor`` (knot,) multiplies
-    it over the knots of the course; None is 1. A torque over time alone is a constant 1 with a factor in N m. On a
-    translation it is a force along it, with one number only.
+    ``table`` (node,) N m stands at equal distances over ``period`` rad of that angle and is
+    periodic, straight between nodes; one number alone is constant. At time 0 the line stands
+    ``phase`` rad into it. ``factor`` (knot,) multiplies it over the knots of the course; None is
+    1. A torque over time alone is a constant 1 with a factor in N m. On a translation it is a
+    force along it, with one number only.
     """
 
     dof: int

@@ -26,11 +26,12 @@ FULL = 0.5  # of a matrix that is filled, or of a triangle of its factor: from t
 
 @dataclass(frozen=True, slots=True, kw_only=True, eq=False)
 class GearedLine:
-    """M q'' + C q' + K q + sum over meshes of direction x force = torques; q is the deviation from nominal rotation.
+    """M q'' + C q' + K q + sum over meshes of direction x force = torques; q is the deviation
+    from nominal rotation.
 
-    ``mass``, ``damping``, ``stiffness`` (dof, dof) without the meshes, SI; springs and dampers act on the deviation.
-    ``rotation`` (dof,) is how far each turns with the reference, signed as its angle counts, 0 for a translation.
-    ``names`` name the degrees of freedom.
+    ``mass``, ``damping``, ``stiffness`` (dof, dof) without the meshes, SI; springs and dampers
+    act on the deviation. ``rotation`` (dof,) is how far each turns with the reference, signed as
+    its angle counts, 0 for a translation. ``names`` name the degrees of freedom.
     """
 
     names: tuple[str, ...]
@@ -95,7 +96,9 @@ class GearedLine:
 def pack_line(
     line: GearedLine, order: Index, mass_share: float, damping_share: float, step: str
 ) -> Line:
-    """The line with its degrees of freedom in ``order``, and the factor of mass_share M + damping_share C + K."""
+    """The line with its degrees of freedom in ``order``, and the factor of mass_share M +
+    damping_share C + K.
+    """
     mass, damping, stiffness = (
         np.ascontiguousarray(part[np.ix_(order, order)])
         for part in (line.mass, line.damping, line.stiffness)
@@ -126,7 +129,10 @@ def pack_line(
 
 
 def elimination_order(line: GearedLine) -> Index:
-    """Order of the degrees of freedom that keeps the factor's rows short, (dof,): reverse Cuthill-McKee."""
+    """Order of the degrees of freedom that keeps the factor's rows short, (dof,).
+
+    Reverse Cuthill-McKee.
+    """
     from scipy.sparse import csr_array
     from scipy.sparse.csgraph import reverse_cuthill_mckee
 
@@ -186,11 +192,13 @@ def _columns(mesh: LineMesh) -> Array:
 
 
 def _slopes(values: Array, limit: float) -> Array:
-    """Slopes per cell at the nodes, (row, node): central differences, with which cubics between the nodes are smooth.
+    """Slopes per cell at the nodes, (row, node): central differences, with which cubics between
+    the nodes are smooth.
 
-    Where the second difference exceeds ``limit``, or what is 0 begins to grow, the harmonic mean of both chords (0 at a
-    turn) stands instead: its cubics never leave the values at their ends, so that an edge stays one. At the ends the
-    chord itself. Source: Fritsch & Butland, SIAM J. Sci. Stat. Comput. 5 (1984).
+    Where the second difference exceeds ``limit``, or what is 0 begins to grow, the harmonic mean
+    of both chords (0 at a turn) stands instead: its cubics never leave the values at their ends,
+    so that an edge stays one. At the ends the chord itself. Source: Fritsch & Butland, SIAM J.
+    Sci. Stat. Comput. 5 (1984).
     """
     chord = np.diff(values, axis=1)
     before, after = chord[:, :-1], chord[:, 1:]

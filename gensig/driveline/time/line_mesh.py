@@ -1,4 +1,7 @@
-"""A gear mesh of a shaft line as plain arrays: pairs of teeth over the roll, on both flanks, tooth by tooth."""
+"""A gear mesh of a shaft line as plain arrays.
+
+Pairs of teeth over the roll, on both flanks, tooth by tooth.
+"""
 
 from __future__ import annotations
 
@@ -19,10 +22,11 @@ Index = NDArray[np.int64]
 class LineMesh:
     """One mesh of gear a with gear b, one-sided on both flanks.
 
-    The mesh has rolled u pitches: ``start_phase`` where all angles are 0, and one more for each tooth of gear a that
-    its degree of freedom ``roll_dof`` turns on. Pair i stands at u - i pitches, in tables that begin at ``first_pitch``
-    and reach over ``n_pairs`` pitches, so that as many pairs are looked at; its teeth are ``start_teeth`` + i, counted
-    as they enter. The back flanks meet along the mirrored roll ``mirror`` - u.
+    The mesh has rolled u pitches: ``start_phase`` where all angles are 0, and one more for each
+    tooth of gear a that its degree of freedom ``roll_dof`` turns on. Pair i stands at u - i
+    pitches, in tables that begin at ``first_pitch`` and reach over ``n_pairs`` pitches, so that
+    as many pairs are looked at; its teeth are ``start_teeth`` + i, counted as they enter. The
+    back flanks meet along the mirrored roll ``mirror`` - u.
 
     direction : (dof,)                 gradient of the approach along the transverse line of action, m/rad or 1
     gap : (row, node)                  of one pair in m; a smooth cubic between nodes
@@ -147,7 +151,8 @@ def phase_mesh(
     )
     kinds = np.arange(n_teeth[0]) % n_rows, np.zeros(n_teeth[1], dtype=np.int64)
     rows = np.arange(n_rows)[:, None]
-    # the mirrored roll reads every row backwards, one tooth further on, for it begins there where the row ends
+    # the mirrored roll reads every row backwards, one tooth further on, for it begins there where
+    # the row ends
     backwards = (rows - 1) % n_rows + n_rows
     return LineMesh(
         name=name,
@@ -172,8 +177,9 @@ def phase_mesh(
 def loaded_gap(approach: Array, stiffness: Array, force: float) -> Array:
     """Gap e(u) of a ``phase_mesh`` that statics at one load describe, (phase,) m.
 
-    ``approach`` and tangent ``stiffness`` (phase,) in m and N/m under a ``force`` in N, as ``mesh.slices`` gives them
-    for a helical pair: e = approach - F / k, so that the mesh is where statics put it under that force.
+    ``approach`` and tangent ``stiffness`` (phase,) in m and N/m under a ``force`` in N, as
+    ``mesh.slices`` gives them for a helical pair: e = approach - F / k, so that the mesh is where
+    statics put it under that force.
     """
     return np.asarray(approach - force / stiffness)
 
@@ -189,10 +195,11 @@ def pair_mesh(
     start_teeth: tuple[int, int] = (0, 0),
     start_phase: float = 0.0,
 ) -> LineMesh:
-    """A spur mesh of our own tables; gear a is the pinion. The law is that of the pair dynamics, without friction.
+    """A spur mesh of our own tables; gear a is the pinion. The law is that of the pair dynamics,
+    without friction.
 
-    The back flanks are sound teeth without errors, mirrored as the pair dynamics mirrors them; a missing tooth is
-    missing there too.
+    The back flanks are sound teeth without errors, mirrored as the pair dynamics mirrors them; a
+    missing tooth is missing there too.
     """
     pair, kinds = table.pair, (table.pinion.kind, table.wheel.kind)
     n_kinds = len(table.pinion.compliance), len(table.wheel.compliance)
@@ -230,7 +237,8 @@ def mesh_start(
     tooth_angle: float = 0.0,
     pitch_point: float = 0.0,
 ) -> tuple[int, float]:
-    """Start tooth and start phase of a gear's mesh with a mate at an angle, so that its meshes agree with each other.
+    """Start tooth and start phase of a gear's mesh with a mate at an angle, so that its meshes
+    agree with each other.
 
     Parameters
     ----------
@@ -243,10 +251,11 @@ def mesh_start(
     -------
     the tooth of pair 0, and the phase in pitches
 
-    Tooth 0's middle passes the mate at mate_angle, its flank a quarter pitch before (leading) or behind (trailing); the
-    tooth that enters next stands one pitch back. Standard teeth: tooth and space are equal on the pitch circle.
-    Source: the phases of Parker & Lin, Mesh Phasing Relationships in Planetary and Epicyclic Gears (ASME
-    DETC2003/PTG-48067), written for one gear.
+    Tooth 0's middle passes the mate at mate_angle, its flank a quarter pitch before (leading) or
+    behind (trailing); the tooth that enters next stands one pitch back. Standard teeth: tooth and
+    space are equal on the pitch circle. Source: the phases of Parker & Lin, Mesh Phasing
+    Relationships in Planetary and Epicyclic Gears (ASME DETC2003/PTG-48067), written for one
+    gear.
     """
     if n_teeth < 1:
         raise GeometryError(f"a gear of {n_teeth} teeth has no phase")
@@ -264,9 +273,11 @@ def tooth_angle(
     start: tuple[int, float],
     pitch_point: float = 0.0,
 ) -> float:
-    """Where the middle of a gear's tooth 0 stands if one of its meshes begins as ``start`` says, rad.
+    """Where the middle of a gear's tooth 0 stands if one of its meshes begins as ``start`` says,
+    rad.
 
-    What ``mesh_start`` undoes: from a mesh whose phase is known through the mate to the other meshes of the gear.
+    What ``mesh_start`` undoes: from a mesh whose phase is known through the mate to the other
+    meshes of the gear.
     """
     tooth, phase = start
     return mate_angle + (tooth + phase - _quarter(drives) - pitch_point) * 2.0 * math.pi / n_teeth

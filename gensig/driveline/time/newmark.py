@@ -1,4 +1,5 @@
-"""Integrate a geared shaft line in time: Newmark's average acceleration, contact converged in every step.
+"""Integrate a geared shaft line in time: Newmark's average acceleration, contact converged in
+every step.
 
 Formulas and what is measured of them: ``docs/theory/shaft_line_integration.md``.
 """
@@ -106,15 +107,16 @@ def integrate_line(
     lead_in: float = 0.0,
     start: tuple[Array, Array] | None = None,
 ) -> LineMotion:
-    """Integrate from ``lead_in`` s before time 0 or earlier, and give out ``duration`` s from time 0 on.
+    """Integrate from ``lead_in`` s before time 0 or earlier, and give out ``duration`` s from
+    time 0 on.
 
     Parameters
     ----------
     channels : ("angle" | "speed" | "acceleration", degree of freedom) or ("mesh_force", mesh)
     start : deviations and their rates, (dof,) each, where the integration begins; None is ``static_start``
 
-    The low-pass looks ahead and back: integration begins at least ``decimation.Decimator.margin`` samples and one
-    before time 0, and ends as many after the last.
+    The low-pass looks ahead and back: integration begins at least ``decimation.Decimator.margin``
+    samples and one before time 0, and ends as many after the last.
 
     Raises
     ------
@@ -165,10 +167,11 @@ def _told_above(value: float, limit: float) -> str:
 def static_start(
     line: GearedLine, course: LineCourse, torques: Sequence[ShaftTorque], *, time: float = 0.0
 ) -> Array:
-    """Deviations at which the line turns without vibrating under its mean torques at a time, (dof,).
+    """Deviations at which the line turns without vibrating under its mean torques at a time,
+    (dof,).
 
-    Torques over an angle act with the mean of their tables. What they do not balance accelerates a free line as one
-    rigid body, and the line is at rest in that motion.
+    Torques over an angle act with the mean of their tables. What they do not balance accelerates
+    a free line as one rigid body, and the line is at rest in that motion.
 
     Raises
     ------
@@ -278,7 +281,9 @@ class _Run:
             n_steps -= n_block
 
     def record(self, n_samples: int) -> Array:
-        """Integrate on from a step before the low-pass's reach, and decimate block by block, (channel, sample)."""
+        """Integrate on from a step before the low-pass's reach, and decimate block by block,
+        (channel, sample).
+        """
         factor, low_pass = self.solver.oversampling, decimator(self.solver.oversampling)
         n_kept = 2 * low_pass.margin * factor + 1
         means = np.zeros((n_kept + BLOCK * factor, len(self.channels)))

@@ -16,7 +16,9 @@ Array = NDArray[np.float64]
 
 
 class GroupRun:
-    """State (2, dof, lane) of machines, their lost steps (lane,), and scratch of the compiled core."""
+    """State (2, dof, lane) of machines, their lost steps (lane,), and scratch of the compiled
+    core.
+    """
 
     def __init__(
         self, lanes: Sequence[PairDynamics], channels: NDArray[np.int64], precision: str

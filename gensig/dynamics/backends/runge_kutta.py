@@ -1,4 +1,6 @@
-"""The classical Runge-Kutta method with a fixed step, several records side by side in vector lanes."""
+"""The classical Runge-Kutta method with a fixed step, several records side by side in vector
+lanes.
+"""
 
 from __future__ import annotations
 
@@ -45,7 +47,10 @@ class RungeKutta(Backend):
         oversampling: int,
         max_error: float | None,
     ) -> None:
-        """Raise SimulationError for an unstable step; warn of a coarse one without ``max_error``."""
+        """Raise SimulationError for an unstable step.
+
+        Warn of a coarse one without ``max_error``.
+        """
         check_step(machine, sampling_rate, oversampling, max_error)
 
     def records_together(self, precision: str) -> int:
@@ -143,7 +148,10 @@ def settled(
     steps: GroupSteps,
     oversampling: int,
 ) -> GroupRun:
-    """Returns the machines at the end of the last stage; what bounced has settled in finer steps."""
+    """Returns the machines at the end of the last stage.
+
+    What bounced has settled in finer steps.
+    """
     run, bounced = run_stages(run, lanes, begins, stages, steps)
     careful = [(min(oversampling, max(CAREFUL, n)), until) for n, until in stages]
     if bounced.any() and careful != stages:

@@ -1,4 +1,6 @@
-"""Steps that the classical Runge-Kutta scheme can take, and the stages in which a machine settles."""
+"""Steps that the classical Runge-Kutta scheme can take, and the stages in which a machine
+settles.
+"""
 
 from __future__ import annotations
 

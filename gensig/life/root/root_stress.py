@@ -1,4 +1,5 @@
-"""Bending stress at the tooth's root: ISO 6336-3 at its own load point, and through the mesh under given loads.
+"""Bending stress at the tooth's root: ISO 6336-3 at its own load point, and through the mesh
+under given loads.
 
 Theory, limits and choices: ``docs/theory/root_stress.md``.
 """
@@ -31,11 +32,13 @@ OVERHANG_MODULES = 1.0  # of a wider gear at either end that helps its root
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class RootFactors:
-    """Every factor of the nominal root stress of one gear, sigma_F0 = F_t / (b m_n) times their product.
+    """Every factor of the nominal root stress of one gear, sigma_F0 = F_t / (b m_n) times their
+    product.
 
-    ``width`` b in m, at most one normal module wider than the mate at either end; ``form_factor`` Y_F (without f_eps),
-    ``stress_correction_factor`` Y_S, ``load_distribution_factor`` f_eps, ``contact_ratio_factor`` Y_eps (load at the
-    tip only), ``helix_factor`` Y_beta, ``rim_thickness_factor`` Y_B, ``deep_tooth_factor`` Y_DT.
+    ``width`` b in m, at most one normal module wider than the mate at either end; ``form_factor``
+    Y_F (without f_eps), ``stress_correction_factor`` Y_S, ``load_distribution_factor`` f_eps,
+    ``contact_ratio_factor`` Y_eps (load at the tip only), ``helix_factor`` Y_beta,
+    ``rim_thickness_factor`` Y_B, ``deep_tooth_factor`` Y_DT.
     """
 
     width: float
@@ -70,7 +73,10 @@ def normal_contact_ratio(pair: GearPair) -> float:
 
 
 def root_width(pair: GearPair, gear: Gear) -> float:
-    """Width that bears at the root, m: the gear's own, of a wider one no more than a module beyond either end."""
+    """Width that bears at the root, m.
+
+    The gear's own, of a wider one no more than a module beyond either end.
+    """
     mate = pair.wheel if gear is pair.pinion else pair.pinion
     return min(gear.face_width, mate.face_width + 2.0 * OVERHANG_MODULES * gear.normal_module)
 
@@ -95,8 +101,9 @@ def root_factors(
     ------
     ConfigError, GeometryError, ExtrapolationError    for unknown choices, too thin a rim, a notch out of range
 
-    Source: ISO 6336-3, 6 to 10, external gears; the tip with Y_eps = 0.25 + 0.75 / eps_alpha_n is its former Method C
-    (also DIN 3990-3). Y_DT is taken with the edition 2006 only: f_eps of 2019 already shares the load.
+    Source: ISO 6336-3, 6 to 10, external gears; the tip with Y_eps = 0.25 + 0.75 / eps_alpha_n is
+    its former Method C (also DIN 3990-3). Y_DT is taken with the edition 2006 only: f_eps of 2019
+    already shares the load.
     """
     if load_point not in LOAD_POINTS:
         raise ConfigError(
@@ -137,7 +144,8 @@ def root_factors(
 def load_distribution_factor(pair: GearPair) -> float:
     """f_eps: how the pairs in contact share the load, as the overlap grows from 0 to 1.
 
-    Source: ISO 6336-3:2019, 6.2: 1 (0.7 from eps_alpha_n = 2 on) without overlap, eps_alpha_n^-0.5 from 1 on.
+    Source: ISO 6336-3:2019, 6.2: 1 (0.7 from eps_alpha_n = 2 on) without overlap,
+    eps_alpha_n^-0.5 from 1 on.
     """
     ratio, overlap = normal_contact_ratio(pair), min(pair.overlap_ratio, 1.0)
     if overlap == 0.0 and ratio >= 2.0:
@@ -147,7 +155,8 @@ def load_distribution_factor(pair: GearPair) -> float:
 
 
 def helix_factor(pair: GearPair, *, edition: int) -> float:
-    """Y_beta = 1 - eps_beta beta / 120 degrees, over cos^3(beta) from 2019 on; overlap up to 1, helix up to 30 degrees.
+    """Y_beta = 1 - eps_beta beta / 120 degrees, over cos^3(beta) from 2019 on; overlap up to 1,
+    helix up to 30 degrees.
 
     Source: ISO 6336-3, 8.
     """
@@ -157,7 +166,8 @@ def helix_factor(pair: GearPair, *, edition: int) -> float:
 
 
 def rim_thickness_factor(gear: Gear) -> float:
-    """Y_B of the ring between bore and root: 1 from 1.2 tooth heights on, 1.6 ln(2.242 h_t / s_R) below.
+    """Y_B of the ring between bore and root: 1 from 1.2 tooth heights on, 1.6 ln(2.242 h_t / s_R)
+    below.
 
     Source: ISO 6336-3, 9, external gears; no thinner rims than half a tooth height.
     """
@@ -171,7 +181,8 @@ def rim_thickness_factor(gear: Gear) -> float:
 
 
 def deep_tooth_factor(ratio: float, grade: float | None) -> float:
-    """Y_DT of teeth of ISO 1328 grade 4 or finer (None: perfect) with a contact ratio eps_alpha_n above 2.05.
+    """Y_DT of teeth of ISO 1328 grade 4 or finer (None: perfect) with a contact ratio eps_alpha_n
+    above 2.05.
 
     Source: ISO 6336-3:2006, 10: -0.666 eps_alpha_n + 2.366 up to 2.5, 0.7 beyond.
     """
@@ -204,7 +215,8 @@ def stress_factor_on_path(
 def pair_root_stress(
     pair: GearPair, gear: Gear, position: Array, load: Array, *, allow_extrapolation: bool = False
 ) -> Array:
-    """Root stress of a spur tooth under the load of its pair, static or dynamic, of the shape of ``position``, Pa.
+    """Root stress of a spur tooth under the load of its pair, static or dynamic, of the shape of
+    ``position``, Pa.
 
     Parameters
     ----------
@@ -225,8 +237,9 @@ def spread_along_face(own: Array, structure: Array, coupling: float) -> Array:
     structure : (..., slice) m2/N   compliance of teeth and bodies per width
     coupling : squared length over which slices couple, over the squared width of a slice; 0 leaves ``own`` as it is
 
-    The reaction k w of the foundation with shear that the mesh has for its slices, k w - (k coupling w')' = own,
-    k = 1 / structure, w' = 0 at both ends: the sum over the face stays. Thomas's algorithm, whose pivots are positive.
+    The reaction k w of the foundation with shear that the mesh has for its slices, k w - (k
+    coupling w')' = own, k = 1 / structure, w' = 0 at both ends: the sum over the face stays.
+    Thomas's algorithm, whose pivots are positive.
     """
     if coupling == 0.0 or own.shape[-1] == 1:
         return own

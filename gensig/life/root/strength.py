@@ -1,4 +1,7 @@
-"""Strength of the tooth's root against fatigue: material values, every factor by name, safety and reliability."""
+"""Strength of the tooth's root against fatigue.
+
+Material values, every factor by name, safety and reliability.
+"""
 
 from __future__ import annotations
 
@@ -12,7 +15,8 @@ from gensig.errors import ConfigError
 from gensig.life.root.root_stress import EDITIONS, LOAD_POINTS
 from gensig.units import from_si, unit
 
-# ISO 6336-3, case-hardened steel: life factor over load cycles, straight lines between these on logarithmic axes
+# ISO 6336-3, case-hardened steel: life factor over load cycles, straight lines between these on
+# logarithmic axes
 LIFE_CYCLES, LIFE_FACTORS = (1e3, 3e6, 1e10), (2.5, 1.0, 0.85)
 SLIP_LAYER = 3e-6  # m, rho' of case-hardened steel
 NOTCH_OF_TEST_GEAR = 2.5  # q_sT
@@ -47,7 +51,8 @@ BELOW_ALL = "below low"
 def reliability(safety: float) -> str:
     """Class of a safety factor.
 
-    Source: engine paper, table 3 (high, higher, general and low reliability from 2.00, 1.60, 1.25 and 1.00 on).
+    Source: engine paper, table 3 (high, higher, general and low reliability from 2.00, 1.60, 1.25
+    and 1.00 on).
     """
     return next((found.name for found in RELIABILITY if safety >= found.least_safety), BELOW_ALL)
 
@@ -116,7 +121,8 @@ class Strength:
 class Safety:
     """Safety of one gear's root; both conventions with their factors.
 
-    ``paper`` = sigma_Flim K_FN / sigma_F, ``iso`` = sigma_Flim Y_ST Y_NT Y_delta_rel_T Y_R_rel_T Y_X Y_M / sigma_F.
+    ``paper`` = sigma_Flim K_FN / sigma_F, ``iso`` = sigma_Flim Y_ST Y_NT Y_delta_rel_T Y_R_rel_T
+    Y_X Y_M / sigma_F.
     """
 
     paper: float
@@ -131,8 +137,8 @@ def safety(
 ) -> Safety:
     """Safety factors under a root stress sigma_F in Pa, load factors included.
 
-    Source: engine paper eq. (32); ISO 6336-3, 5. The paper's lacks Y_ST although its stress has Y_S, so it is about
-    half of the other.
+    Source: engine paper eq. (32); ISO 6336-3, 5. The paper's lacks Y_ST although its stress has
+    Y_S, so it is about half of the other.
     """
     if not stress > 0.0:
         raise ConfigError(f"the root stress is {stress * 1e-6:g} MPa and must be positive")
@@ -168,7 +174,8 @@ def life_factor(n_load_cycles: float) -> float:
 def relative_notch_sensitivity(notch_parameter: float) -> float:
     """Y_delta_rel_T of case-hardened steel, 1 at the notch of the test gear.
 
-    Source: ISO 6336-3, 13: (1 + sqrt(rho' X)) / (1 + sqrt(rho' X_T)), X = (1 + 2 q_s) / 5 per mm, rho' = 0.003 mm.
+    Source: ISO 6336-3, 13: (1 + sqrt(rho' X)) / (1 + sqrt(rho' X_T)), X = (1 + 2 q_s) / 5 per mm,
+    rho' = 0.003 mm.
     """
 
     def sensitivity(notch: float) -> float:
@@ -178,7 +185,8 @@ def relative_notch_sensitivity(notch_parameter: float) -> float:
 
 
 def size_factor(normal_module: float) -> float:
-    """Y_X of case-hardened steel for a module in m: 1 up to 5 mm, 1.05 - 0.01 m_n (in mm), 0.8 from 25 mm on.
+    """Y_X of case-hardened steel for a module in m: 1 up to 5 mm, 1.05 - 0.01 m_n (in mm), 0.8
+    from 25 mm on.
 
     Source: ISO 6336-3, 15.
     """

@@ -1,6 +1,8 @@
-"""The tooth's root as ISO 6336-3 sees it: critical section at the 30 degree tangent, form and stress correction.
+"""The tooth's root as ISO 6336-3 sees it: critical section at the 30 degree tangent, form and
+stress correction.
 
-Everything is of the normal section, on the virtual spur gear of a helical one. Theory: ``docs/theory/root_stress.md``.
+Everything is of the normal section, on the virtual spur gear of a helical one. Theory:
+``docs/theory/root_stress.md``.
 """
 
 from __future__ import annotations
@@ -27,12 +29,13 @@ NOTCH = (1.0, 8.0)  # range of q_s on which the stress correction factor was fit
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class VirtualGear:
-    """The spur gear with the tooth form of the normal section; for a spur gear it is the gear itself.
+    """The spur gear with the tooth form of the normal section; for a spur gear it is the gear
+    itself.
 
     ``n_teeth`` z_n need not be whole; ``tip_radius`` and ``base_radius`` m.
 
-    Source: ISO 6336-3, 6.2: z_n = z / (cos^2(beta_b) cos(beta)), d_n = m_n z_n, d_bn = d_n cos(alpha_n),
-    d_an = d_n + d_a - d.
+    Source: ISO 6336-3, 6.2: z_n = z / (cos^2(beta_b) cos(beta)), d_n = m_n z_n, d_bn = d_n
+    cos(alpha_n), d_an = d_n + d_a - d.
     """
 
     n_teeth: float
@@ -47,10 +50,11 @@ class VirtualGear:
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class RootSection:
-    """Critical section of a tooth: where the tangents at 30 degrees to its centreline touch the root fillets.
+    """Critical section of a tooth: where the tangents at 30 degrees to its centreline touch the
+    root fillets.
 
-    ``thickness`` s_Fn and ``fillet_radius`` rho_F in m, ``height`` of the section above the virtual gear's centre in m,
-    ``theta`` rad.
+    ``thickness`` s_Fn and ``fillet_radius`` rho_F in m, ``height`` of the section above the
+    virtual gear's centre in m, ``theta`` rad.
     """
 
     thickness: float
@@ -68,8 +72,9 @@ class RootSection:
 class RootLoading:
     """What a force at some points of the flank does to the critical section, (point,) each.
 
-    ``load_angle`` alpha_Fen in rad and ``lever_arm`` h_Fe in m; ``form_factor`` Y_F, ``stress_correction_factor`` Y_S
-    and their product ``stress_factor``, which stays finite where the lever arm does not count.
+    ``load_angle`` alpha_Fen in rad and ``lever_arm`` h_Fe in m; ``form_factor`` Y_F,
+    ``stress_correction_factor`` Y_S and their product ``stress_factor``, which stays finite where
+    the lever arm does not count.
     """
 
     load_angle: Array
@@ -97,7 +102,8 @@ def root_section(gear: Gear) -> RootSection:
     ------
     GeometryError    where the tangent finds no place on the fillet
 
-    Source: ISO 6336-3, 6.2.2, without protuberance (s_pr = 0): E, G, H, theta = 2 G tan(theta) / z_n - H, s_Fn, rho_F.
+    Source: ISO 6336-3, 6.2.2, without protuberance (s_pr = 0): E, G, H, theta = 2 G tan(theta) /
+    z_n - H, s_Fn, rho_F.
     """
     z, alpha = virtual_gear(gear).n_teeth, gear.pressure_angle
     rounding = gear.cutter_tip_radius_coefficient
@@ -152,9 +158,10 @@ def root_loading(
     ------
     ExtrapolationError    for a notch parameter outside 1 <= q_s < 8, unless allowed
 
-    Source: ISO 6336-3, 6.2 and 7.2: alpha_en, gamma_e, alpha_Fen = alpha_en - gamma_e, h_Fe,
-    Y_F = (6 h_Fe / m_n) cos(alpha_Fen) / ((s_Fn / m_n)^2 cos(alpha_n)), and with L = s_Fn / h_Fe
-    Y_S = (1.2 + 0.13 L) q_s^(1 / (1.21 + 2.3 / L)). The product is taken as (1.2 h_Fe + 0.13 s_Fn) ..., at least 0.
+    Source: ISO 6336-3, 6.2 and 7.2: alpha_en, gamma_e, alpha_Fen = alpha_en - gamma_e, h_Fe, Y_F
+    = (6 h_Fe / m_n) cos(alpha_Fen) / ((s_Fn / m_n)^2 cos(alpha_n)), and with L = s_Fn / h_Fe Y_S
+    = (1.2 + 0.13 L) q_s^(1 / (1.21 + 2.3 / L)). The product is taken as (1.2 h_Fe + 0.13 s_Fn)
+    ..., at least 0.
     """
     section, virtual = root_section(gear), virtual_gear(gear)
     notch = section.notch_parameter

@@ -1,7 +1,8 @@
-"""Archard wear where two flanks slide: sliding, contact pressure, and the depth that one mesh takes off either flank.
+"""Archard wear where two flanks slide: sliding, contact pressure, and the depth that one mesh
+takes off either flank.
 
-Depths are normal to the flank, places are positions s along the path of contact as in ``geometry.contact``. Theory,
-sources and limits: ``docs/theory/wear.md``.
+Depths are normal to the flank, places are positions s along the path of contact as in
+``geometry.contact``. Theory, sources and limits: ``docs/theory/wear.md``.
 """
 
 from __future__ import annotations
@@ -19,7 +20,8 @@ from gensig.material import Material
 
 Array = NDArray[np.float64]
 
-# conforming flanks, where the sum of worn and new curvature falls towards 0, press at least as flat cylinders of this
+# conforming flanks, where the sum of worn and new curvature falls towards 0, press at least as
+# flat cylinders of this
 # share of the new curvature: Hertz's theory ends there
 LEAST_CURVATURE_SHARE = 0.1
 
@@ -30,8 +32,8 @@ LEAST_CURVATURE_SHARE = 0.1
 class FlankPath:
     """Places along the path of contact where wear is followed, ``position`` (node,) m from A to E.
 
-    The pitch point is one of them where it lies on the path. A place of either flank meets the same place of its mate's
-    in every mesh, so that one row of nodes serves both.
+    The pitch point is one of them where it lies on the path. A place of either flank meets the
+    same place of its mate's in every mesh, so that one row of nodes serves both.
     """
 
     pair: GearPair
@@ -66,13 +68,17 @@ class FlankPath:
 
     @cached_property
     def sliding(self) -> Array:
-        """Wheel's less pinion's, so positive at the pinion's root, (node,) m for a pinion of 1 rad/s."""
+        """Wheel's less pinion's, so positive at the pinion's root, (node,) m for a pinion of 1
+        rad/s.
+        """
         pinion, wheel = self.rolling
         return wheel - pinion
 
     @cached_property
     def slide_roll(self) -> Array:
-        """Sliding over the speed of either flank itself (specific sliding without its sign), (2, node)."""
+        """Sliding over the speed of either flank itself (specific sliding without its sign), (2,
+        node).
+        """
         return np.abs(self.sliding) / self.rolling
 
 
@@ -98,8 +104,9 @@ def hertz_pressure(
     line_load : (slice, node) N/m    along the transverse line of action per face width
     depth : (2, slice, node) m       worn off both flanks; None or 0 is new ones
 
-    p = sqrt(w E' kappa / (2 pi)) with E' = E / (1 - nu^2), the load w per length of the contact line and the relative
-    curvature kappa normal to it, to which wear adds its second derivative along both flanks (``worn_curvature``).
+    p = sqrt(w E' kappa / (2 pi)) with E' = E / (1 - nu^2), the load w per length of the contact
+    line and the relative curvature kappa normal to it, to which wear adds its second derivative
+    along both flanks (``worn_curvature``).
     """
     new, scaled = path.relative_curvature, _reduced_modulus(material) / (2.0 * math.pi)
     if depth is None or not depth.any():
@@ -143,16 +150,18 @@ def flank_radii(
 
 
 def worn_curvature(path: FlankPath, depth: Array, half_width: Array) -> Array:
-    """What wear adds to the curvature of either flank, (2, node) 1/m, positive where the flank has become rounder.
+    """What wear adds to the curvature of either flank, (2, node) 1/m, positive where the flank
+    has become rounder.
 
     Parameters
     ----------
     depth : (2, node) m
     half_width : (node,) m    of the contact band
 
-    The second derivative of the depth along the flank as the band feels it: the mean of its second differences over the
-    half width and over half of that, on either side, but never over less than a node's distance. One difference alone
-    would be blind to waves as long as itself, which then grow. Beyond A and E the profile is taken to go on straight.
+    The second derivative of the depth along the flank as the band feels it: the mean of its
+    second differences over the half width and over half of that, on either side, but never over
+    less than a node's distance. One difference alone would be blind to waves as long as itself,
+    which then grow. Beyond A and E the profile is taken to go on straight.
     """
     found = np.empty_like(depth)
     for side, (arc, worn) in enumerate(zip(path.arc, depth, strict=True)):
@@ -184,14 +193,15 @@ def depth_per_mesh(
     line_load : (slice, node) N/m
     pressure : (slice, node) Pa    largest; ``fixed_intervals`` takes it, ``band`` knows it from the load
 
-    ``band``: the integral of Archard's dh = (k / H) p ds over the passage of the contact, whose band 2a takes 2a / v_i
-    to pass a point of flank i, while the flanks slide |v_1 - v_2| 2a / v_i on each other; the mean pressure times 2a
-    is the load w, so that h_i = (k / H)_i w |v_1 - v_2| / v_i, whatever the band's width.
-    Source: Flodin & Andersson, "Simulation of mild wear in spur gears", Wear 207 (1997).
+    ``band``: the integral of Archard's dh = (k / H) p ds over the passage of the contact, whose
+    band 2a takes 2a / v_i to pass a point of flank i, while the flanks slide |v_1 - v_2| 2a / v_i
+    on each other; the mean pressure times 2a is the load w, so that h_i = (k / H)_i w |v_1 - v_2|
+    / v_i, whatever the band's width. Source: Flodin & Andersson, "Simulation of mild wear in spur
+    gears", Wear 207 (1997).
 
-    ``fixed_intervals``: (k / H)_i p |v_1 - v_2| dt / 2 with the largest pressure and dt the 1 / n_intervals part of the
-    time on the path of contact; half of it off either flank. Source: wear-life paper, eqs. (18) to (21). It falls to
-    nothing as n_intervals grows.
+    ``fixed_intervals``: (k / H)_i p |v_1 - v_2| dt / 2 with the largest pressure and dt the 1 /
+    n_intervals part of the time on the path of contact; half of it off either flank. Source:
+    wear-life paper, eqs. (18) to (21). It falls to nothing as n_intervals grows.
     """
     factor = np.array([options.wear_factor(side) for side in SIDES])
     if options.rule == "band":

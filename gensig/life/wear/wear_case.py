@@ -1,4 +1,7 @@
-"""One gear pair that wears: which load each place of its flanks carries, new or worn, and how fast it is worn off."""
+"""One gear pair that wears.
+
+Which load each place of its flanks carries, new or worn, and how fast it is worn off.
+"""
 
 from __future__ import annotations
 
@@ -32,8 +35,9 @@ ERROR_PHASES = 32
 class WearCase:
     """A pair under one torque with its wear law; make it by ``wear_case``.
 
-    ``mesh`` has new flanks, modified or not, and sound teeth, which go on bending as such. ``loads`` and ``period``
-    (over one mesh period) are its prepared contact, None where one pair carries everything.
+    ``mesh`` has new flanks, modified or not, and sound teeth, which go on bending as such.
+    ``loads`` and ``period`` (over one mesh period) are its prepared contact, None where one pair
+    carries everything.
     """
 
     mesh: SlicedMesh
@@ -84,7 +88,8 @@ class WearCase:
         return replace(self, torque=torque)
 
     def line_load(self, depth: Array) -> Array:
-        """Load per width that each place of the flanks carries as it meshes, (slice, node) N/m, transverse.
+        """Load per width that each place of the flanks carries as it meshes, (slice, node) N/m,
+        transverse.
 
         Raises
         ------
@@ -102,17 +107,25 @@ class WearCase:
         return hertz_pressure(self.path, line_load, self.material, worn)
 
     def wear_per_mesh(self, depth: Array) -> Array:
-        """Depth that the next mesh takes off either flank, (2, slice, node) m, when ``depth`` is off already."""
+        """Depth that the next mesh takes off either flank, (2, slice, node) m, when ``depth`` is
+        off already.
+        """
         load = self.line_load(depth)
         pressure = load if self.options.rule == "band" else self.pressure(load, depth)
         return depth_per_mesh(self.path, load, pressure, self.options)
 
     def rate(self, depth: Array) -> Array:
-        """Depth per turn of the pinion, (2, slice, node) m: a wheel's tooth meshes z1 / z2 times in it."""
+        """Depth per turn of the pinion, (2, slice, node) m.
+
+        A wheel's tooth meshes z1 / z2 times in it.
+        """
         return self.wear_per_mesh(depth) * meshes_per_turn(self.pair)[:, None, None]
 
     def error_range(self, depth: Array) -> float:
-        """Static transmission error under load, from peak to peak over a mesh period, m; NaN where one pair carries."""
+        """Static transmission error under load, from peak to peak over a mesh period, m.
+
+        NaN where one pair carries.
+        """
         return (
             np.nan
             if self.period is None
@@ -120,7 +133,10 @@ class WearCase:
         )
 
     def judged(self, depth: Array) -> float:
-        """What is compared with the threshold, m: the deepest place of either flank, or of both together."""
+        """What is compared with the threshold, m.
+
+        The deepest place of either flank, or of both together.
+        """
         return float(depth.sum(axis=0).max() if self.options.criterion == "sum" else depth.max())
 
 
@@ -132,8 +148,8 @@ def wear_case(
     *,
     n_nodes: int | None = None,
 ) -> WearCase:
-    """A pair that wears under the pinion's torque in N m; ``n_nodes`` along the path of contact, None as many
-    as the rule needs.
+    """A pair that wears under the pinion's torque in N m; ``n_nodes`` along the path of contact,
+    None as many as the rule needs.
 
     Raises
     ------

@@ -23,8 +23,8 @@ N_TORQUES = 3  # life goes nearly as a power of the torque
 class WearTable:
     """Lives under steady torques (torque,) N m, ascending; made by ``wear_table``.
 
-    ``turns`` (torque, node) of the pinion to each of the depths ``sizes`` (node,) m by the case's criterion;
-    ``reached`` (time,) m are those at which each life tells its flanks.
+    ``turns`` (torque, node) of the pinion to each of the depths ``sizes`` (node,) m by the case's
+    criterion; ``reached`` (time,) m are those at which each life tells its flanks.
     """
 
     torque: Array
@@ -34,7 +34,9 @@ class WearTable:
     turns: Array
 
     def worn(self, size: float, torque: float) -> Array:
-        """Depth off both flanks, (2, slice, node) m, of a steady torque's life where its depth is ``size``."""
+        """Depth off both flanks, (2, slice, node) m, of a steady torque's life where its depth is
+        ``size``.
+        """
         found = []
         for life, reached in zip(self.lives, self.reached, strict=True):
             place = float(np.interp(size, reached, np.arange(len(reached))))
@@ -65,9 +67,9 @@ def wear_table(case: WearCase, least: float, greatest: float) -> WearTable:
 class WearGrowth(GrowthLaw):
     """The law of one unit's flanks; its size is the depth that the wear criterion looks at, m.
 
-    ``torque`` in N m is the unit's mean one, whose steady life gives the worn profile: the order of the loads changes
-    how fast a flank wears, and its shape not (assumed; all loads take off most where flanks slide most).
-    ``as_fault`` makes a fault of the depth off both flanks.
+    ``torque`` in N m is the unit's mean one, whose steady life gives the worn profile: the order
+    of the loads changes how fast a flank wears, and its shape not (assumed; all loads take off
+    most where flanks slide most). ``as_fault`` makes a fault of the depth off both flanks.
     """
 
     table: WearTable

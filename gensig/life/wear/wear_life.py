@@ -1,4 +1,7 @@
-"""Flanks over their life: wear step by step, sharing and pressure renewed as they wear, up to a threshold."""
+"""Flanks over their life.
+
+Wear step by step, sharing and pressure renewed as they wear, up to a threshold.
+"""
 
 from __future__ import annotations
 
@@ -15,8 +18,10 @@ from gensig.life.wear.wear_case import WearCase
 
 Array = NDArray[np.float64]
 
-# What the solver may be off in one step, as a share of the depth and in m. Pressures hang on the curvature of what is
-# worn off, which takes a tenth, and makes the equations stiff: they are solved backwards, with the nodes next to each.
+# What the solver may be off in one step, as a share of the depth and in m. Pressures hang on the
+# curvature of what is
+# worn off, which takes a tenth, and makes the equations stiff: they are solved backwards, with
+# the nodes next to each.
 ACCURACY = {"band": (1e-3, 2e-9), "fixed_intervals": (1e-3, 1e-9)}
 BANDWIDTH = 13
 LARGEST_SHARE = 0.1  # of the threshold, worn in one step
@@ -167,7 +172,9 @@ def _solve(
     ends: list[Callable[[Array], float]] | None = None,
     **more: Any,
 ) -> Any:
-    """The depths as an initial value problem over the turns of the pinion from 0 to ``end``, or to the first end."""
+    """The depths as an initial value problem over the turns of the pinion from 0 to ``end``, or
+    to the first end.
+    """
     from scipy.integrate import solve_ivp
 
     def rate(_turns: float, flat: Array) -> Array:

@@ -1,6 +1,8 @@
-"""The loaded mesh with worn flanks: what is worn off opens the gaps, and the load of each place of the flanks follows.
+"""The loaded mesh with worn flanks: what is worn off opens the gaps, and the load of each place
+of the flanks follows.
 
-Rolls, positions and interpolations are prepared once: a life asks for the same phases some hundred times.
+Rolls, positions and interpolations are prepared once: a life asks for the same phases some
+hundred times.
 """
 
 from __future__ import annotations
@@ -31,7 +33,8 @@ PHASES_PER_PITCH = (
 
 @dataclass(frozen=True, slots=True, kw_only=True, eq=False)
 class WornContact:
-    """Phases of a mesh with new flanks, and where each of its slices lies among the nodes of the path.
+    """Phases of a mesh with new flanks, and where each of its slices lies among the nodes of the
+    path.
 
     Parameters
     ----------
@@ -45,8 +48,8 @@ class WornContact:
     def settled(self, depth: Array, force: float) -> LoadedContact:
         """Loaded contact when (2, slice, node) m is worn off, under a force in N.
 
-        Along the transverse line of action the gap is the depth normal to the flank over cos(beta_b). Beyond A and E,
-        where a tip's corner bears, the nearest end counts.
+        Along the transverse line of action the gap is the depth normal to the flank over
+        cos(beta_b). Beyond A and E, where a tip's corner bears, the nearest end counts.
 
         Raises
         ------
@@ -79,7 +82,8 @@ def worn_contact(mesh: SlicedMesh, path: FlankPath, roll: Array) -> WornContact:
 
 @dataclass(frozen=True, slots=True, kw_only=True, eq=False)
 class PathLoads:
-    """Loads of the phases, read at the nodes of the path: at ``before`` and ``after`` of all of them, in order.
+    """Loads of the phases, read at the nodes of the path: at ``before`` and ``after`` of all of
+    them, in order.
 
     Parameters
     ----------
@@ -93,13 +97,18 @@ class PathLoads:
     share: Array
 
     def line_load(self, depth: Array, force: float) -> Array:
-        """Load of each place of the flanks as it meshes, (slice, node) N/m, when (2, slice, node) m is worn off."""
+        """Load of each place of the flanks as it meshes, (slice, node) N/m, when (2, slice, node)
+        m is worn off.
+        """
         load = self.contact.settled(depth, force).line_load.ravel()
         return (1.0 - self.share) * load[self.before] + self.share * load[self.after]
 
 
 def path_loads(mesh: SlicedMesh, path: FlankPath) -> PathLoads:
-    """Prepare the loads along the path: phases at the nodes themselves for one slice, else equally spaced."""
+    """Prepare the loads along the path.
+
+    Phases at the nodes themselves for one slice, else equally spaced.
+    """
     n_slices, pitch = len(mesh.slice_place), mesh.pair.base_pitch
     one = n_slices == 1
     roll = path.position if one else pitch * (np.arange(PHASES_PER_PITCH) + 0.5) / PHASES_PER_PITCH

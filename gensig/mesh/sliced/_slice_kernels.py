@@ -28,9 +28,10 @@ def solve_slices(
 ):  # fmt: skip
     """Loads of all slices of all pairs at one force, phase by phase.
 
-    Slice j of pair i stands back by gap[i, j] and is as soft as structure[i, j] + contact. The structure's deflection w
-    along the face obeys k w - (k length^2 w')' = p for the load per width p, k = 1 / structure, with free ends; without
-    length every slice bends by itself. Source of the differential form: Pasternak (1954), a foundation with shear.
+    Slice j of pair i stands back by gap[i, j] and is as soft as structure[i, j] + contact. The
+    structure's deflection w along the face obeys k w - (k length^2 w')' = p for the load per
+    width p, k = 1 / structure, with free ends; without length every slice bends by itself. Source
+    of the differential form: Pasternak (1954), a foundation with shear.
 
     Parameters
     ----------
@@ -207,7 +208,9 @@ def bite_forces(
 
 @_compiled
 def _stiffen(structure, breadth, length_squared, own, between):
-    """Stiffness of every slice's structure, and of what ties it to the next one, (slice,) N/m each, written."""
+    """Stiffness of every slice's structure, and of what ties it to the next one, (slice,) N/m
+    each, written.
+    """
     n_slices = structure.shape[0]
     for j in range(n_slices):
         own[j] = breadth[j] / structure[j]
@@ -222,10 +225,12 @@ def _stiffen(structure, breadth, length_squared, own, between):
 
 @_compiled
 def _deflections(own, between, breadth, contact, gap, first, bearing, per_pivot, lift, rest):
-    """Deflection of one pair's structure, lift x (approach above the first gap) - rest, (slice,) each, written.
+    """Deflection of one pair's structure, lift x (approach above the first gap) - rest, (slice,)
+    each, written.
 
-    Where a slice bears, its load per width is (approach - gap - w) / contact: one tridiagonal system, solved for the
-    part that goes with the approach and the one that does not (Thomas, whose pivots are positive here).
+    Where a slice bears, its load per width is (approach - gap - w) / contact: one tridiagonal
+    system, solved for the part that goes with the approach and the one that does not (Thomas,
+    whose pivots are positive here).
     """
     n_slices = own.shape[0]
     before = 0.0

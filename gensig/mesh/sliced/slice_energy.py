@@ -20,8 +20,8 @@ def structure_energy(
     width : (slice,) m
     length_squared : m2                of the length over which slices couple
 
-    The deflection w obeys k w - (k l^2 w')' = p with k = 1 / structure and free ends, in the finite volumes of
-    ``solve_slices``; Thomas' method, all phases at once.
+    The deflection w obeys k w - (k l^2 w')' = p with k = 1 / structure and free ends, in the
+    finite volumes of ``solve_slices``; Thomas' method, all phases at once.
     """
     n_slices = len(width)
     between = np.zeros_like(structure)

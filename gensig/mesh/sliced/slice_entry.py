@@ -1,4 +1,7 @@
-"""Slices that enter over their width: what makes the sum over a few slices the integral over the face."""
+"""Slices that enter over their width.
+
+What makes the sum over a few slices the integral over the face.
+"""
 
 from __future__ import annotations
 
@@ -11,11 +14,13 @@ Array = NDArray[np.float64]
 def over_slice(
     first: Array, force: Array, depth: Array, n_looks: int, farthest: float
 ) -> tuple[Array, Array]:
-    """First gap and force of a pair over the way that a slice takes to enter, which is its own width.
+    """First gap and force of a pair over the way that a slice takes to enter, which is its own
+    width.
 
-    A slice that stands for its middle enters whole, with a jolt, and the jolts of all slices sound like a mesh of
-    ``n_slices`` over the overlap ratio times the teeth. Over its width the sum over slices is the integral over the
-    face. Means at one approach; the first touch is that of the edge that enters first.
+    A slice that stands for its middle enters whole, with a jolt, and the jolts of all slices
+    sound like a mesh of ``n_slices`` over the overlap ratio times the teeth. Over its width the
+    sum over slices is the integral over the face. Means at one approach; the first touch is that
+    of the edge that enters first.
 
     Parameters
     ----------

@@ -1,4 +1,7 @@
-"""What single teeth change in the slices of their pair: softer structure, flanks that stand back or are gone."""
+"""What single teeth change in the slices of their pair.
+
+Softer structure, flanks that stand back or are gone.
+"""
 
 from __future__ import annotations
 
@@ -76,7 +79,8 @@ def check_independent(teeth: Iterable[Tooth], slices: SliceOptions) -> None:
 
 
 def merged_edges(pair: GearPair, n_slices: int, teeth: Collection[Tooth]) -> Array:
-    """Edges of slices of equal width over the common face, and where slices of the teeth begin and end, (edge,) m.
+    """Edges of slices of equal width over the common face, and where slices of the teeth begin
+    and end, (edge,) m.
 
     Faces lie with their middles on each other.
     """
@@ -234,11 +238,13 @@ def _strips(
 
 
 def _shared_out(local: Array, whole: Array, rest: Array, width: Array) -> Array:
-    """The crack's compliance in every slice, so that slices pressed evenly give way together as the whole tooth does.
+    """The crack's compliance in every slice, so that slices pressed evenly give way together as
+    the whole tooth does.
 
-    A crack over part of the width holds on to the tooth beside it: its own strips give way less than if it went
-    through. All are scaled by one factor, at which slices side by side, each as soft as ``rest`` and its part of the
-    crack, are as soft as ``rest`` and the calibrated compliance of the whole crack.
+    A crack over part of the width holds on to the tooth beside it: its own strips give way less
+    than if it went through. All are scaled by one factor, at which slices side by side, each as
+    soft as ``rest`` and its part of the crack, are as soft as ``rest`` and the calibrated
+    compliance of the whole crack.
 
     Parameters
     ----------

@@ -18,8 +18,9 @@ ROUNDS = 100  # of Newton's method at most; on forces made of straight pieces it
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class ChordStates:
-    """The chords of the pairs followed at each phase: compliance less the shared part, and gap, (phase, pair, chord);
-    pairs in order of entry. An absent pair has infinite gaps. ``position`` (phase, pair) m."""
+    """The chords of the pairs followed at each phase: compliance less the shared part, and gap,
+    (phase, pair, chord); pairs in order of entry. An absent pair has infinite gaps. ``position``
+    (phase, pair) m."""
 
     compliance: Array
     gap: Array
@@ -37,9 +38,11 @@ def chord_states(
     pinion_tilt: Array | None = None,
     wheel_tilt: Array | None = None,
 ) -> ChordStates:
-    """Pairs at the pinion's roll, (phase,) m along the line of action; at 0 the start teeth enter at A.
+    """Pairs at the pinion's roll, (phase,) m along the line of action; at 0 the start teeth enter
+    at A.
 
-    Errors and tilts of the teeth as in ``load_distribution.pair_states``, for the middle of the face.
+    Errors and tilts of the teeth as in ``load_distribution.pair_states``, for the middle of the
+    face.
     """
     pair, pitch = table.pair, table.pair.base_pitch
     index = np.floor(roll / pitch).astype(np.int64)[:, None] - table.first_pitch
@@ -78,8 +81,9 @@ def chord_states(
 def chord_equilibrium(table: SlicedTable, states: ChordStates, force: float) -> StaticMesh:
     """Load sharing, approach and tangent stiffness dF/d(approach) under a total mesh force in N.
 
-    Every pair is on the chord of its own depth of bite into what the others deflect. Forces of pairs are convex in
-    that depth, so Newton's method comes down on it from above. ``mesh.law=paper`` as in ``static_mesh``.
+    Every pair is on the chord of its own depth of bite into what the others deflect. Forces of
+    pairs are convex in that depth, so Newton's method comes down on it from above.
+    ``mesh.law=paper`` as in ``static_mesh``.
     """
     gap = states.gap
     if table.options.law == "paper":
@@ -92,7 +96,9 @@ def chord_equilibrium(table: SlicedTable, states: ChordStates, force: float) -> 
     touch = np.where(lost[:, None], 0.0, touch)
 
     def carried(local: Array) -> tuple[Array, Array]:
-        """Loads and stiffnesses of the pairs, (phase, pair), at the approach less the shared deflection."""
+        """Loads and stiffnesses of the pairs, (phase, pair), at the approach less the shared
+        deflection.
+        """
         depth = local[:, None] - touch
         chord = np.maximum(np.searchsorted(table.depth, depth.ravel()).reshape(depth.shape) - 1, 0)
         own, start = (
@@ -123,11 +129,13 @@ def chord_equilibrium(table: SlicedTable, states: ChordStates, force: float) -> 
 
 
 def left_out_energy(table: SlicedTable) -> tuple[Array, Array]:
-    """Energy that every chord's spring leaves out and its slope, (pinion kind, wheel kind, chord, node) J and N.
+    """Energy that every chord's spring leaves out and its slope, (pinion kind, wheel kind, chord,
+    node) J and N.
 
-    A pair that bites to the depth D_l where chord l begins holds the work of its force on the way there. The springs
-    of both chords that meet there hold 0.5 F (D - gap) of it each by their own gaps, F their force there, so that the
-    difference to the chord before is 0.5 F (gap_l - gap_(l - 1)).
+    A pair that bites to the depth D_l where chord l begins holds the work of its force on the way
+    there. The springs of both chords that meet there hold 0.5 F (D - gap) of it each by their own
+    gaps, F their force there, so that the difference to the chord before is 0.5 F (gap_l - gap_(l
+    - 1)).
     """
     compliance, gap = table.compliance - table.shared_compliance, table.gap
     value, slope = np.zeros_like(gap), np.zeros_like(gap)

@@ -1,8 +1,9 @@
-"""Force over (phase, approach) of one pair of helical teeth, for every distinct pair of teeth, as the dynamics asks it.
+"""Force over (phase, approach) of one pair of helical teeth, for every distinct pair of teeth, as
+the dynamics asks it.
 
-The force of a pair in slices is convex in the approach: the deeper it bites, the more slices bear. It is kept as chords
-between fixed depths of bite, so that each is a compliance and a gap like that of a spur pair, and the law of the mesh
-is one for both.
+The force of a pair in slices is convex in the approach: the deeper it bites, the more slices
+bear. It is kept as chords between fixed depths of bite, so that each is a compliance and a gap
+like that of a spur pair, and the law of the mesh is one for both.
 """
 
 from __future__ import annotations
@@ -51,11 +52,12 @@ OFF_PATH = 1e3  # times the least compliance, where mesh.law=paper has no contac
 class SlicedTable:
     """Chords of the force of single pairs at positions s of the slice that enters first.
 
-    Chord l of a pair that is alone is force = (approach - gap[l]) / compliance[l]. Beside others, as for spur pairs,
-    force = (within - gap[l]) / (compliance[l] - shared_compliance), ``within`` being the approach less
-    shared_compliance x total force. It holds where within - gap[0] lies between depth[l] and depth[l + 1], the last one
-    beyond; gap[0] is where the pair touches first. Neighbours meet at their common depth, and as the force is convex
-    it is that of the chord that has the largest.
+    Chord l of a pair that is alone is force = (approach - gap[l]) / compliance[l]. Beside others,
+    as for spur pairs, force = (within - gap[l]) / (compliance[l] - shared_compliance), ``within``
+    being the approach less shared_compliance x total force. It holds where within - gap[0] lies
+    between depth[l] and depth[l + 1], the last one beyond; gap[0] is where the pair touches
+    first. Neighbours meet at their common depth, and as the force is convex it is that of the
+    chord that has the largest.
 
     Parameters
     ----------
@@ -100,7 +102,10 @@ class _Known:
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class _Setting:
-    """What all pairs of one table have in common; ``pinion`` and ``wheel`` are the teeth that meet most."""
+    """What all pairs of one table have in common.
+
+    ``pinion`` and ``wheel`` are the teeth that meet most.
+    """
 
     pair: GearPair
     material: Material
@@ -114,7 +119,10 @@ class _Setting:
 
 @dataclass(frozen=True, slots=True, kw_only=True, eq=False)
 class _Frame:
-    """Depths of bite (knot,) m, 0 left out; positions (node,) m; how far gaps are followed, m; see `SlicedTable`."""
+    """Depths of bite (knot,) m, 0 left out.
+
+    Positions (node,) m; how far gaps are followed, m; see `SlicedTable`.
+    """
 
     depth: Array
     position: Array
@@ -174,7 +182,8 @@ def sliced_table(
     first = np.empty((len(pinion), len(wheel), len(frame.position)))
     loads = np.empty((*first.shape, len(frame.depth)))
     met = set(pinion_kind.tolist()), set(wheel_kind.tolist())
-    # where all teeth have a common form the sound one is met by nobody, but the back flanks are sound
+    # where all teeth have a common form the sound one is met by nobody, but the back flanks are
+    # sound
     healthy = _curves(setting, *_healthy(pair), 0 in met[0] and 0 in met[1])
     for a, one in enumerate(pinion):
         for b, other in enumerate(wheel):
@@ -208,7 +217,8 @@ def sliced_table(
 
 
 def _chords(first: Array, loads: Array, depth: Array) -> tuple[Array, Array]:
-    """Compliance less what pairs share and gap of the chords, (pinion kind, wheel kind, chord, node) each.
+    """Compliance less what pairs share and gap of the chords, (pinion kind, wheel kind, chord,
+    node) each.
 
     Parameters
     ----------
@@ -312,7 +322,8 @@ def _frame(setting: _Setting) -> _Frame:
 
 
 def _knots(setting: _Setting, mesh: SlicedMesh, position: Array, tried: Array) -> Array:
-    """The ``N_CHORDS`` of the depths ``tried``, the last among them, whose chords err least, by dynamic programming.
+    """The ``N_CHORDS`` of the depths ``tried``, the last among them, whose chords err least, by
+    dynamic programming.
 
     The largest error over the positions counts. ``tried`` (knot,) m.
     """
@@ -337,8 +348,8 @@ def _knots(setting: _Setting, mesh: SlicedMesh, position: Array, tried: Array) -
 
 
 def _at(mesh: SlicedMesh, position: Array) -> tuple[Array, Array, Array, Array]:
-    """Structure, gap, constant of the contact and width of every slice of two teeth of ``_mesh`` where the first slice
-    is at ``position``, (node, slice) each."""
+    """Structure, gap, constant of the contact and width of every slice of two teeth of ``_mesh``
+    where the first slice is at ``position``, (node, slice) each."""
     places = position[:, None] - mesh.lag
     share = np.ones_like(places)
     if mesh.options.law == "paper":
@@ -359,7 +370,9 @@ def _at(mesh: SlicedMesh, position: Array) -> tuple[Array, Array, Array, Array]:
 def _bitten(
     setting: _Setting, mesh: SlicedMesh, position: Array, depth: Array, reach: float
 ) -> tuple[Array, Array]:
-    """First gap (node,) m, and force (node, knot) N at depths beyond it, 0 where it is beyond ``reach``."""
+    """First gap (node,) m, and force (node, knot) N at depths beyond it, 0 where it is beyond
+    ``reach``.
+    """
     structure, gap, constant, width = _at(mesh, position)
     first, force = np.empty(len(position)), np.empty((len(position), len(depth)))
     n_unsettled = bite_forces(
@@ -376,7 +389,9 @@ def _bitten(
 
 @lru_cache(maxsize=128)
 def _curves(setting: _Setting, pinion: _Known, wheel: _Known, are_met: bool) -> tuple[Array, Array]:
-    """First gap (node,) m and force (node, knot) N of one pair of teeth at the depths of the frame."""
+    """First gap (node,) m and force (node, knot) N of one pair of teeth at the depths of the
+    frame.
+    """
     frame, mesh = _frame(setting), _mesh(setting, pinion, wheel)
     looked, n_looks = _looked(setting, frame.position, mesh, are_met)
     first, force = _bitten(setting, mesh, looked, frame.depth, frame.reach)
@@ -402,8 +417,8 @@ def _curves(setting: _Setting, pinion: _Known, wheel: _Known, are_met: bool) -> 
 def _looked(
     setting: _Setting, position: Array, mesh: SlicedMesh, are_met: bool
 ) -> tuple[Array, int]:
-    """Positions at which two teeth are looked at, m, and, where slices enter one by one, how many of their distances
-    make the way from one slice to the next, an even number; else 0."""
+    """Positions at which two teeth are looked at, m, and, where slices enter one by one, how many
+    of their distances make the way from one slice to the next, an even number; else 0."""
     node = position[1] - position[0]
     if (
         not mesh.lag[-1] > 0.0 or setting.options.law == "paper"

@@ -1,4 +1,5 @@
-"""Loaded tooth contact of a spur or helical pair: slices of the face, each a spur pair at its own place of the mesh.
+"""Loaded tooth contact of a spur or helical pair: slices of the face, each a spur pair at its own
+place of the mesh.
 
 Theory, limits and choices: ``docs/theory/helical_mesh.md``.
 """
@@ -124,7 +125,8 @@ def sliced_mesh(
     deviation: Array | None = None,
     teeth: Mapping[tuple[str, int], Tooth] | None = None,
 ) -> SlicedMesh:
-    """Cut a pair into slices: `n_slices` of equal width, and where the faults of a tooth begin and end.
+    """Cut a pair into slices: `n_slices` of equal width, and where the faults of a tooth begin
+    and end.
 
     Parameters
     ----------
@@ -173,7 +175,9 @@ def sliced_mesh(
 
 
 def _across(known: Array, values: Array, place: Array) -> Array:
-    """Values (slice, node) at places across the face from those at known ones, straight on beyond the outer two."""
+    """Values (slice, node) at places across the face from those at known ones, straight on beyond
+    the outer two.
+    """
     if len(place) == len(known):
         return values
     if len(known) == 1:
@@ -191,7 +195,9 @@ def slice_places(pair: GearPair, slices: SliceOptions) -> Array:
 
 @lru_cache(maxsize=16)
 def _structure(pair: GearPair, material: Material, options: MeshOptions) -> tuple[Array, float]:
-    """Compliance of both sound teeth and bodies per width (node,) m2/N, and what pairs share, m/N."""
+    """Compliance of both sound teeth and bodies per width (node,) m2/N, and what pairs share,
+    m/N.
+    """
     on_path, place = np.unique(
         np.clip(node_positions(pair, options), 0.0, pair.path_of_contact), return_inverse=True
     )
@@ -237,8 +243,8 @@ class Meeting:
 
 
 def pair_positions(mesh: SlicedMesh, roll: Array) -> tuple[Array, NDArray[np.int64]]:
-    """Positions s of every pair's slices, (phase, pair, slice) m, and numbers of the pairs, (phase, pair), that of
-    roll 0 being 0; in order of entry, newest first."""
+    """Positions s of every pair's slices, (phase, pair, slice) m, and numbers of the pairs,
+    (phase, pair), that of roll 0 being 0; in order of entry, newest first."""
     pitch = mesh.pair.base_pitch
     newest = np.floor(roll / pitch).astype(np.int64) - FIRST_PITCH
     n_pairs = math.ceil(LAST_PITCH - FIRST_PITCH + float(mesh.lag[-1]) / pitch)
@@ -248,7 +254,8 @@ def pair_positions(mesh: SlicedMesh, roll: Array) -> tuple[Array, NDArray[np.int
 
 @dataclass(frozen=True, slots=True, kw_only=True, eq=False)
 class ContactPhases:
-    """What every slice of every pair is at given rolls, whatever the force; new gaps are all that wear changes.
+    """What every slice of every pair is at given rolls, whatever the force; new gaps are all that
+    wear changes.
 
     Parameters
     ----------
@@ -269,7 +276,10 @@ class ContactPhases:
 
 
 def contact_phases(mesh: SlicedMesh, roll: Array, meeting: Meeting | None = None) -> ContactPhases:
-    """Prepare the loaded contact at rolls, (phase,) m; at 0 the first slice of a pair enters at A."""
+    """Prepare the loaded contact at rolls, (phase,) m.
+
+    At 0 the first slice of a pair enters at A.
+    """
     position, index = pair_positions(mesh, roll)
     share = np.ones_like(position)
     if mesh.options.law == "paper":  # elsewhere the corners' gaps tell where contact ends
@@ -374,7 +384,9 @@ def _add_teeth(
 
 
 def _of_kind(mesh: SlicedMesh, side: GearSlices, kind: int, position: Array) -> tuple[Array, Array]:
-    """How much softer, m2/N, and how far back, m, the slices of one kind of tooth are at positions (phase, slice)."""
+    """How much softer, m2/N, and how far back, m, the slices of one kind of tooth are at
+    positions (phase, slice).
+    """
     softer, gap = np.empty_like(position), np.empty_like(position)
     for j in range(position.shape[1]):
         softer[:, j] = np.interp(position[:, j], mesh.position, side.softening[kind, j])
@@ -383,8 +395,8 @@ def _of_kind(mesh: SlicedMesh, side: GearSlices, kind: int, position: Array) -> 
 
 
 def cut_by_field(mesh: SlicedMesh, position: Array) -> tuple[Array, Array]:
-    """Slices that the edge of the field of action cuts: the middle of what lies on the path and its share of the slice,
-    of the shape of ``position`` both."""
+    """Slices that the edge of the field of action cuts: the middle of what lies on the path and
+    its share of the slice, of the shape of ``position`` both."""
     half = (
         0.5
         * mesh.slice_width
@@ -406,7 +418,8 @@ def single_pair_stiffness(
     kinds: tuple[int, int] = (0, 0),
     closed: float = 0.1 * NO_FLANK,
 ) -> Array:
-    """Stiffness of the slices of one pair that lie on the path, flanks taken as touching, (phase,) N/m.
+    """Stiffness of the slices of one pair that lie on the path, flanks taken as touching,
+    (phase,) N/m.
 
     Parameters
     ----------

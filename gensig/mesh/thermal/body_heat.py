@@ -1,4 +1,7 @@
-"""Steady temperature of a gear: a hollow disc that teeth heat, faces and teeth cool, and the bore may hold."""
+"""Steady temperature of a gear.
+
+A hollow disc that teeth heat, faces and teeth cool, and the bore may hold.
+"""
 
 from __future__ import annotations
 
@@ -51,8 +54,8 @@ class BodyHeat:
 def tooth_surface(gear: Gear) -> float:
     """Surface of all teeth: flanks, lands, spaces between, and the ends; m2.
 
-    Flanks are the involute down to its base circle and go straight to the root circle from there; the surface is as
-    long as the helix.
+    Flanks are the involute down to its base circle and go straight to the root circle from there;
+    the surface is as long as the helix.
     """
     start = max(gear.base_radius, gear.root_radius)
     roll = [math.sqrt(radius**2 - gear.base_radius**2) for radius in (start, gear.tip_radius)]
@@ -88,9 +91,10 @@ def solved_body(
 ) -> BodyHeat:
     """Temperature of a gear that takes ``input_heat`` (W) at its teeth.
 
-    Source: (1/r) d/dr(r dT/dr) = 2 h (T - T_oil) / (g b), the annular fin of heat transfer text books (Incropera &
-    DeWitt, section 3.6), in modified Bessel functions. Without convection at the faces it is eq. (4) of the thermal
-    paper, which takes the temperatures of bore and rim as known.
+    Source: (1/r) d/dr(r dT/dr) = 2 h (T - T_oil) / (g b), the annular fin of heat transfer text
+    books (Incropera & DeWitt, section 3.6), in modified Bessel functions. Without convection at
+    the faces it is eq. (4) of the thermal paper, which takes the temperatures of bore and rim as
+    known.
 
     Raises
     ------
@@ -124,7 +128,8 @@ def solved_body(
 
 
 def _solutions(radius: Array, fin: float) -> tuple[Array, Array]:
-    """Two solutions of the disc's equation and their slopes, (2, point) each; ``fin`` 1/m, 0 without convection.
+    """Two solutions of the disc's equation and their slopes, (2, point) each; ``fin`` 1/m, 0
+    without convection.
 
     Scaled to about 1 at either end, so that they neither overflow nor run together.
     """

@@ -1,6 +1,7 @@
 """What makes gears hot: the inputs of the group ``heat``, friction heat, flash temperature.
 
-Theory, ranges and choices: ``docs/theory/heat.md``. Temperatures are in degrees Celsius, rises in K.
+Theory, ranges and choices: ``docs/theory/heat.md``. Temperatures are in degrees Celsius, rises in
+K.
 """
 
 from __future__ import annotations
@@ -120,7 +121,9 @@ class Heat:
         )
 
     def require_known(self, temperature: float, what: str) -> None:
-        """Raise ExtrapolationError, which begins with ``what``, for a temperature beyond the material's data."""
+        """Raise ExtrapolationError, which begins with ``what``, for a temperature beyond the
+        material's data.
+        """
         low, high = self.modulus_temperature[0], self.modulus_temperature[-1]
         if not low <= temperature <= high:
             raise ExtrapolationError(
@@ -160,7 +163,8 @@ def friction_heat(
     friction: float,
     speed: float,
 ) -> float:
-    """Friction loss of the flanks, W, mean over the phases: friction x normal load x sliding speed of every slice.
+    """Friction loss of the flanks, W, mean over the phases: friction x normal load x sliding
+    speed of every slice.
 
     Parameters
     ----------
@@ -187,15 +191,16 @@ def flash_temperature(
     friction: float,
     speed: float,
 ) -> Array:
-    """Rise of the flanks' surface while they touch, above the teeth's own temperature, K, of the shape of ``position``.
+    """Rise of the flanks' surface while they touch, above the teeth's own temperature, K, of the
+    shape of ``position``.
 
     Parameters
     ----------
     line_load : N/m    along the transverse line of action per width, which is the normal load per length of line
 
-    Source: Blok (1937) for a Hertzian distribution of the heat, 0.785 f w |v1 - v2| / ((sqrt(g rho c v1) + sqrt(g rho c
-    v2)) sqrt(B)) with the semi-width B of the contact. 1.11 belongs to its full width; the thermal paper's eq. (13)
-    leaves the constant open.
+    Source: Blok (1937) for a Hertzian distribution of the heat, 0.785 f w |v1 - v2| / ((sqrt(g
+    rho c v1) + sqrt(g rho c v2)) sqrt(B)) with the semi-width B of the contact. 1.11 belongs to
+    its full width; the thermal paper's eq. (13) leaves the constant open.
     """
     pinion, wheel = rolling_speeds(pair, position, speed)
     half_width = contact_half_width(pair, position, line_load, material)
@@ -212,7 +217,10 @@ def flash_temperature(
 def contact_half_width(
     pair: GearPair, position: Array, line_load: Array | float, material: Material
 ) -> Array:
-    """Half width of the Hertzian contact, m, of the shape of ``position``; loads and radii as for the pressure."""
+    """Half width of the Hertzian contact, m, of the shape of ``position``.
+
+    Loads and radii as for the pressure.
+    """
     on_path = np.clip(position, 0.0, pair.path_of_contact)
     radius = relative_radius(pair, on_path) / math.cos(pair.base_helix_angle)
     reduced = material.youngs_modulus / (1.0 - material.poisson_ratio**2)

@@ -16,26 +16,29 @@ Array = NDArray[np.float64]
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class GearGrowth:
-    """Strains of one gear: ``tooth`` of its teeth, ``body`` of its body at the root circle and at the bore.
+    """Strains of one gear: ``tooth`` of its teeth, ``body`` of its body at the root circle and at
+    the bore.
 
-    A free hollow disc with any temperature over the radius has the same growth over radius at its rim and at its bore:
-    expansion times the temperature's mean over the area (Timoshenko & Goodier, section 150; eq. (5) of the thermal
-    paper at both ends).
+    A free hollow disc with any temperature over the radius has the same growth over radius at its
+    rim and at its bore: expansion times the temperature's mean over the area (Timoshenko &
+    Goodier, section 150; eq. (5) of the thermal paper at both ends).
     """
 
     tooth: float
     body: float
 
     def along_action(self, gear: Gear, curvature_radius: Array) -> Array:
-        """How far the flank moves out of the tooth along the line of action, (point,) m, the tooth's axis at rest.
+        """How far the flank moves out of the tooth along the line of action, (point,) m, the
+        tooth's axis at rest.
 
         Parameters
         ----------
         curvature_radius : (point,) m
 
-        The root circle moves out by ``body``, and the tooth grows on it by ``tooth`` in height and thickness. Both
-        alike, the gear stays similar: the flank moves by strain x curvature radius, which is the involute of the grown
-        base circle. Otherwise the tooth is shifted along its axis besides.
+        The root circle moves out by ``body``, and the tooth grows on it by ``tooth`` in height
+        and thickness. Both alike, the gear stays similar: the flank moves by strain x curvature
+        radius, which is the involute of the grown base circle. Otherwise the tooth is shifted
+        along its axis besides.
         """
         shifted = (
             gear.root_radius * (self.body - self.tooth) * np.sin(load_angle(gear, curvature_radius))
@@ -55,7 +58,10 @@ class PairGrowth:
     wheel: GearGrowth
 
     def strain(self, pair: GearPair) -> float:
-        """The pair's common strain: that of both base pitches, weighted as the sum of the base radii is."""
+        """The pair's common strain.
+
+        That of both base pitches, weighted as the sum of the base radii is.
+        """
         radii = np.array([pair.pinion.base_radius, pair.wheel.base_radius])
         return float(np.array(self.pitch_strains(pair)) @ radii / radii.sum())
 
@@ -67,8 +73,8 @@ class PairGrowth:
         return float(pinion[1] - pinion[0]) / path, float(wheel[0] - wheel[1]) / path
 
     def deviation(self, pair: GearPair, position: Array) -> Array:
-        """How far both flanks stand back of those of the pair grown by its common strain, (node,) m; 0 at the pitch
-        point, and less where they stand proud.
+        """How far both flanks stand back of those of the pair grown by its common strain, (node,)
+        m; 0 at the pitch point, and less where they stand proud.
 
         Parameters
         ----------
@@ -82,12 +88,17 @@ class PairGrowth:
         return proud[-1] - proud[:-1]
 
     def closing(self, pair: GearPair, housing_strain: float) -> float:
-        """Backlash that growth takes at the pitch point, along the line of action, m; negative where it gives some."""
+        """Backlash that growth takes at the pitch point, along the line of action, m.
+
+        Negative where it gives some.
+        """
         proud = float(np.sum(self._movements(pair, np.array([pair.pitch_point]))))
         return 2.0 * (proud - housing_strain * pair.tangent_length)
 
     def teeth_alone(self, pair: GearPair) -> float:
-        """How far the teeth's own growth moves the gears apart at the pitch point, along the line of action, m."""
+        """How far the teeth's own growth moves the gears apart at the pitch point, along the line
+        of action, m.
+        """
         at = np.array([pair.pitch_point])
         return float(
             self.pinion.of_tooth_alone(pair.pinion, np.asarray(pair.pinion_curvature(at)))[0]

@@ -38,7 +38,10 @@ def _straight_tooth(gear: Gear) -> Tooth:
 
 
 def terms(case: Case, side: str, curvature: Array, *, root: str = "true") -> dict[str, Array]:
-    """Bending, shear, axial and body compliance of a sound tooth, (phase,) m/N each; ``root`` may be ``straight``."""
+    """Bending, shear, axial and body compliance of a sound tooth, (phase,) m/N each.
+
+    ``root`` may be ``straight``.
+    """
     tooth = (_straight_tooth if root == "straight" else healthy_tooth)(case.gear(side))
     return structural_terms(tooth, curvature, case.structure_material, case.system.mesh)
 
@@ -71,7 +74,10 @@ def _body_coefficient(side: str, case: Case, at: str) -> float:
 
 
 def _sainsot(gear: Gear, case: Case, side: str, point: str) -> float:
-    """Sainsot's body under the loaded tooth, also where the fit was not checked: rows show what becomes of it."""
+    """Sainsot's body under the loaded tooth, also where the fit was not checked.
+
+    Rows show what becomes of it.
+    """
     angle = load_angle(gear, case.curvature(side, point))
     with warnings.catch_warnings():
         warnings.simplefilter("ignore", ExtrapolationWarning)
@@ -82,13 +88,19 @@ def _sainsot(gear: Gear, case: Case, side: str, point: str) -> float:
 
 
 def _sainsot_over_fe_body(side: str, case: Case, at: str) -> float:
-    """Sainsot's body over that of finite elements; ``at`` is ``point row``, the row that prints the latter."""
+    """Sainsot's body over that of finite elements.
+
+    ``at`` is ``point row``, the row that prints the latter.
+    """
     point, row = at.split()
     return _sainsot(case.gear(side), case, side, point) / printed_value("spur_reference", row)
 
 
 def _double_zone(case: Case, at: str) -> tuple[Array, Array]:
-    """Positions of the entering and the leaving pair; ``at`` is the former in mm, ``mid`` of the zone, or ``mean``."""
+    """Positions of the entering and the leaving pair.
+
+    ``at`` is the former in mm, ``mid`` of the zone, or ``mean``.
+    """
     pair = case.pair
     zone = pair.path_of_contact - pair.base_pitch
     share = (np.arange(N_MEAN) + 0.5) / N_MEAN if at == "mean" else np.array([0.5])
@@ -121,7 +133,9 @@ def _cross(side: str, case: Case, at: str) -> float:
 
 
 def _cross_over_body(side: str, case: Case, at: str) -> float:
-    """Shared body compliance over the mean of the two pairs' own, in the middle of the double zone."""
+    """Shared body compliance over the mean of the two pairs' own, in the middle of the double
+    zone.
+    """
     bodies = [
         terms(case, side, _curvature(case, side, place))["foundation"][0]
         for place in _double_zone(case, "mid")
@@ -130,8 +144,8 @@ def _cross_over_body(side: str, case: Case, at: str) -> float:
 
 
 def _stiffness_body_once(case: Case, at: str) -> float:
-    """Mean stiffness of the double zone where each body is counted once: teeth and contacts side by side, in series
-    with the mean of the bodies under either pair."""
+    """Mean stiffness of the double zone where each body is counted once: teeth and contacts side
+    by side, in series with the mean of the bodies under either pair."""
     own, body = [], []
     for position in _double_zone(case, "mean"):
         parts = [terms(case, side, _curvature(case, side, position)) for side in SIDES]
@@ -174,7 +188,10 @@ def _straight_root_change(case: Case, at: str) -> float:
 
 
 def _straight_over_true_error(case: Case, at: str) -> float:
-    """Error of the straight root over that of the true curve against finite elements; ``at`` is ``what point``."""
+    """Error of the straight root over that of the true curve against finite elements.
+
+    ``at`` is ``what point``.
+    """
     what, point = at.split()
     if what == "pair":
         exact = printed_value("spur_reference", f"fe_pair_stress.{point}")

@@ -1,8 +1,9 @@
 """What short simulated records show, by the names that the rows use.
 
-A record is the acceleration of the pinion's bearing along the line of action over 15 whole turns, so that every
-shaft order falls on a bin. The *residual* is what is left without every mesh harmonic; the *tooth-segment ratio* is
-the largest over the median RMS of the 23 tooth segments of a turn.
+A record is the acceleration of the pinion's bearing along the line of action over 15 whole turns,
+so that every shaft order falls on a bin. The *residual* is what is left without every mesh
+harmonic; the *tooth-segment ratio* is the largest over the median RMS of the 23 tooth segments of
+a turn.
 """
 
 from __future__ import annotations
@@ -91,15 +92,20 @@ def _residual_rms(case: Case, at: str) -> float:
 
 
 def _residual_over_crack(case: Case, at: str) -> float:
-    """Residual of the fault over that of the paper's 1 mm crack; ``at`` says where the crack starts."""
+    """Residual of the fault over that of the paper's 1 mm crack.
+
+    ``at`` says where the crack starts.
+    """
     crack = with_fault(case, "fault=crack", f"fault.crack_start={at}")
     return _residual_rms(case, at) / _residual_rms(crack, at)
 
 
 def _fine(case: Case, signal: Array) -> Array:
-    """The same band-limited signal at 512 samples a tooth, (turn, tooth, sample): whatever the record's rate.
+    """The same band-limited signal at 512 samples a tooth, (turn, tooth, sample): whatever the
+    record's rate.
 
-    A rate that is a multiple of the mesh frequency always takes the same few instants of a mesh period.
+    A rate that is a multiple of the mesh frequency always takes the same few instants of a mesh
+    period.
     """
     n_teeth = case.pair.pinion.n_teeth
     fine = resample(signal - signal.mean(), RECORD_TURNS * n_teeth * SAMPLES_PER_TOOTH)
@@ -127,9 +133,11 @@ def _residual_kurtosis(case: Case, at: str) -> float:
 
 
 def _natural_frequency(case: Case, at: str) -> float:
-    """The n-th undamped frequency in Hz with the mesh held at a stiffness, rotation held by the drive left out.
+    """The n-th undamped frequency in Hz with the mesh held at a stiffness, rotation held by the
+    drive left out.
 
-    ``at`` is ``stiffness mode``; modes across the line of action and that of the drive are not counted.
+    ``at`` is ``stiffness mode``; modes across the line of action and that of the drive are not
+    counted.
     """
     stiffness, mode = at.split()
     dynamics = pair_dynamics(case)

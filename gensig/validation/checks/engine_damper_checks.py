@@ -1,4 +1,6 @@
-"""Quantities of an engine's tooth load, its dampers, spectra and waterfalls, by the names that the rows use."""
+"""Quantities of an engine's tooth load, its dampers, spectra and waterfalls, by the names that
+the rows use.
+"""
 
 from __future__ import annotations
 
@@ -85,7 +87,10 @@ class DamperCase:
         return dict(zip(WATERFALL_NODES, found, strict=True))
 
     def peak_on_order(self, at: str) -> float:
-        """Frequency in Hz at which an order is largest over the run; ``at`` is node and order with a slash."""
+        """Frequency in Hz at which an order is largest over the run.
+
+        ``at`` is node and order with a slash.
+        """
         node, order = at.split("/")
         run = self.waterfalls[int(node)]
         column = int(np.flatnonzero(run.orders == float(order))[0])

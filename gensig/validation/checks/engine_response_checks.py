@@ -45,8 +45,9 @@ def read_forced_case(overrides: tuple[str, ...]) -> ForcedCase:
 class ForcedCase:
     """An engine on its shaft line at the reference point of its excitation.
 
-    ``nodes`` (dof,) are the node numbers of the degrees of freedom, ``ratios`` their speeds over the crank's;
-    ``meshes`` the gear meshes, along their lines of action, by the names ``mesh_names``: the two nodes with a slash.
+    ``nodes`` (dof,) are the node numbers of the degrees of freedom, ``ratios`` their speeds over
+    the crank's; ``meshes`` the gear meshes, along their lines of action, by the names
+    ``mesh_names``: the two nodes with a slash.
     """
 
     line: LinearLine
@@ -84,7 +85,9 @@ class ForcedCase:
 
 
 def _fluctuation_ratio(case: ForcedCase, at: str) -> float:
-    """Of two nodes' speeds in r/min, as the paper divides those of shafts that turn at different speeds."""
+    """Of two nodes' speeds in r/min, as the paper divides those of shafts that turn at different
+    speeds.
+    """
     first, second = at.split("/")
     return case.fluctuation(first) / case.fluctuation(second)
 

@@ -1,7 +1,8 @@
 """Quantities of an engine's line in time, teeth free to part, by the names that the rows use.
 
-The drive rattles and is chaotic: on one machine the numbers come out bit for bit, on another they scatter by some per
-cent. So all are medians over the cycles or shares of the time, and ``docs/validation.md`` has two digits of them.
+The drive rattles and is chaotic: on one machine the numbers come out bit for bit, on another they
+scatter by some per cent. So all are medians over the cycles or shares of the time, and
+``docs/validation.md`` has two digits of them.
 """
 
 from __future__ import annotations

@@ -54,7 +54,10 @@ def _pit_over_crack(case: Case, at: str) -> float:
 
 
 def _smallest_step(case: Case, at: str) -> float:
-    """Smallest growth of the loss at C along a series of severities ``fault key: value value ...``."""
+    """Smallest growth of the loss at C along a series of severities ``fault key.
+
+    Value value ...``.
+    """
     key, _, values = at.partition(":")
     series = [
         0.0,
@@ -73,7 +76,9 @@ def _crack_tip_half_thickness(case: Case, at: str) -> float:
 
 
 def _pit_end(case: Case, at: str) -> float:
-    """Curvature radius of the flank at the ``lower`` or ``upper`` end of a pit on the pitch circle."""
+    """Curvature radius of the flank at the ``lower`` or ``upper`` end of a pit on the pitch
+    circle.
+    """
     tooth = _faulty_tooth(case)
     flank = tooth.profile.abscissa[tooth.profile.n_root_cells :]
     length = next(fault.pit_length for fault in case.faults if isinstance(fault, Pitting))
@@ -82,7 +87,9 @@ def _pit_end(case: Case, at: str) -> float:
 
 
 def _pit_abscissa(case: Case, at: str) -> float:
-    """Abscissa of the middle of the paper's pit, from the centre of the gear or from the root chord."""
+    """Abscissa of the middle of the paper's pit, from the centre of the gear or from the root
+    chord.
+    """
     gear = case.gear(case.faults[0].gear)
     return pitch_abscissa(gear) - (root_chord_abscissa(gear) if at == "root_chord" else 0.0)
 
@@ -104,7 +111,9 @@ def _share_without_stiffness(case: Case, at: str) -> float:
 
 
 def _remaining_pair_deviation(case: Case, at: str) -> float:
-    """Largest departure from the remaining pair's own stiffness where the missing tooth was one of two."""
+    """Largest departure from the remaining pair's own stiffness where the missing tooth was one
+    of two.
+    """
     pitch, zone = case.pair.base_pitch, case.pair.path_of_contact - case.pair.base_pitch
     inside = np.linspace(0.001, 0.999, 500) * zone
     # tooth 0 enters at roll 0 while its forerunner leaves, and leaves while its follower enters

@@ -40,7 +40,9 @@ def _junction_gap(gear: Gear) -> float:
 
 
 def _junction_slope_step(gear: Gear) -> float:
-    """Angle between root curve and involute where they join, by central differences of their points."""
+    """Angle between root curve and involute where they join, by central differences of their
+    points.
+    """
     shift = 1e-5
     root = root_curve(gear, gear.pressure_angle + shift * np.array([1.0, -1.0]))
     flank = involute_point(

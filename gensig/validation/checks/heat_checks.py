@@ -93,7 +93,10 @@ def _even_flash(case: HotCase, at: str) -> float:
 
 
 def _surface_rise(case: HotCase, at: str) -> float:
-    """Rise above the oil of the surfaces that it cools, mean over them: heat over convection x surface."""
+    """Rise above the oil of the surfaces that it cools, mean over them.
+
+    Heat over convection x surface.
+    """
     gear = getattr(case.duty.system.pair, at)
     body: BodyHeat = getattr(case.state, at)
     heat = case.duty.heat.at_speed(case.duty.speed)
@@ -109,7 +112,9 @@ def _teeth_per_kelvin(case: HotCase, at: str) -> float:
 
 
 def _rise_for_printed(case: HotCase, at: str) -> float:
-    """Rise of both gears at which the apparent stiffness is above the cold one by as much as is printed."""
+    """Rise of both gears at which the apparent stiffness is above the cold one by as much as is
+    printed.
+    """
     printed = [
         printed_value("helical_heat_paper", f"{name}.reference_root")
         for name in ("cold.mesh_mean", "hot.mesh_mean")
@@ -132,7 +137,9 @@ def _torque_over_others(case: HotCase, at: str) -> float:
 
 
 def _mean_single_difference(case: HotCase, at: str) -> float:
-    """Mean difference of the single-pair curve to that of gensig's own mesh, over the latter, along one pair's way."""
+    """Mean difference of the single-pair curve to that of gensig's own mesh, over the latter,
+    along one pair's way.
+    """
     ours = read_hot_case(("system=helical_pair", "gear=chongqing_40_162", "heat=chongqing_rated"))
     curves = [one.variants[TRUE] for one in (case, ours)]
     place = np.linspace(0.0, 1.0, 201)[1:-1]

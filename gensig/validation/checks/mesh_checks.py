@@ -31,7 +31,9 @@ def _pair_stiffness(case: Case, position: Array) -> Array:
 
 
 def single_pair_stiffness(case: Case, at: str) -> float:
-    """Stiffness of one pair under the whole load, faulty where the case has a fault, at a named point, N/m."""
+    """Stiffness of one pair under the whole load, faulty where the case has a fault, at a named
+    point, N/m.
+    """
     return float(_pair_stiffness(case, np.array([case.position(at)]))[0])
 
 
@@ -42,7 +44,9 @@ def _zone(case: Case, name: str) -> tuple[float, float]:
 
 
 def _mean_stiffness(case: Case, at: str) -> float:
-    """Mean over a cycle, the single or the double zone, of a train of pairs that are all alike and add up."""
+    """Mean over a cycle, the single or the double zone, of a train of pairs that are all alike
+    and add up.
+    """
     pair = case.pair
     share = (np.arange(N_MEAN) + 0.5) / N_MEAN
     if at == "cycle":
@@ -118,7 +122,10 @@ def _stiffness_harmonic(case: Case, at: str) -> float:
 
 
 def largest_pair_stiffness(case: Case) -> float:
-    """Largest stiffness of a single pair along the path, N/m: what standards call the single stiffness."""
+    """Largest stiffness of a single pair along the path, N/m.
+
+    What standards call the single stiffness.
+    """
     return float(_pair_stiffness(case, np.linspace(0.0, case.pair.path_of_contact, 501)).max())
 
 

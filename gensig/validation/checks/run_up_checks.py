@@ -1,4 +1,7 @@
-"""Vibration at mesh orders over speed, of plain and modified flanks: it stands for the noise that a paper measured."""
+"""Vibration at mesh orders over speed, of plain and modified flanks.
+
+It stands for the noise that a paper measured.
+"""
 
 from __future__ import annotations
 
@@ -38,7 +41,8 @@ class RunUpCase:
     def level(self) -> Array:
         """Mean square acceleration of the bearings at the mesh orders, (speed,) dB.
 
-        The static transmission error at the mean load pushes the linear machine with the mesh's mean stiffness.
+        The static transmission error at the mean load pushes the linear machine with the mesh's
+        mean stiffness.
         """
         system = self.system
         gears = system.pair.pinion, system.pair.wheel

@@ -1,4 +1,6 @@
-"""ISO 6336-1, Method B, and our own stiffness per face width beside it, by the names that the rows use."""
+"""ISO 6336-1, Method B, and our own stiffness per face width beside it, by the names that the
+rows use.
+"""
 
 from __future__ import annotations
 
@@ -17,7 +19,10 @@ def _line_load(case: Case, at: str = "") -> float:
 
 
 def _per_width(stiffness: Callable[..., float]) -> Check:
-    """``at`` is ``stiff``, at 100 N/mm or more; ``own_load``, at that of the torque; or ``theoretical``, C_M = 1."""
+    """``at`` is ``stiff``, at 100 N/mm or more.
+
+    ``own_load``, at that of the torque; or ``theoretical``, C_M = 1.
+    """
 
     def check(case: Case, at: str) -> float:
         return stiffness(

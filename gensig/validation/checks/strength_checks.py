@@ -55,7 +55,10 @@ def _safety(convention: str) -> StrengthCheck:
 
 
 def _drop(case: RootStrength, at: str) -> float:
-    """``at`` is two stresses: how much the second is below the first, by the forces that give them."""
+    """``at`` is two stresses.
+
+    How much the second is below the first, by the forces that give them.
+    """
     before, after = (case.force_for(float(word)) for word in at.split())
     return 1.0 - after / before
 
@@ -66,7 +69,9 @@ def _hours(case: RootStrength, at: str) -> float:
 
 
 def _place_of_largest(case: RootStrength, at: str) -> float:
-    """Where the decisive gear's largest stress lies in the zone of single contact, from 0 at B to 1 at D."""
+    """Where the decisive gear's largest stress lies in the zone of single contact, from 0 at B to
+    1 at D.
+    """
     loaded = _under(case, at) if at else case
     history = loaded.history()
     place = history.roll[history.stress[loaded.decisive].argmax()]

@@ -40,7 +40,8 @@ EQ_26 = FittedLaw(
     speed=(1.57, 12.57),
     largest_error=0,
 )
-# even grids on which fits of the paper's own law come out with its printed figures: found, not printed
+# even grids on which fits of the paper's own law come out with its printed figures: found, not
+# printed
 TORQUES = tuple(np.arange(10.0, 101.0, 10.0))
 SPEEDS = tuple(0.5 * math.pi * np.arange(1, 9))
 
@@ -158,13 +159,19 @@ def _radius_ratio(kind: str) -> WearCheck:
 
 
 def _fit(point: WearPoint, at: str) -> float:
-    """Of the fits to our lives on the grids: level over slope of the logarithm, or decay of the exponential."""
+    """Of the fits to our lives on the grids.
+
+    Level over slope of the logarithm, or decay of the exponential.
+    """
     _, logarithm, exponential = fitted_laws(point.lives, TORQUES[-1], SPEEDS[-1])
     return logarithm.a / logarithm.b if at == "logarithm" else exponential.b
 
 
 def _printed_exponent(point: WearPoint, at: str) -> float:
-    """Local exponent of the printed fits: b / L at a torque of eq. (25), b w at a speed of eq. (26)."""
+    """Local exponent of the printed fits.
+
+    B / L at a torque of eq. (25), b w at a speed of eq. (26).
+    """
     equation, value = at.split()
     if equation == "(25)":
         return EQ_25.b / float(EQ_25.formula(float(value), 0.0))
