@@ -32,7 +32,7 @@ from typing import assert_type
 
 import gensig
 from gensig.dataset.reader import Dataset
-from gensig.streaming import RecordStream
+from gensig.production.streaming import RecordStream
 
 with gensig.open_dataset("runs/quick") as data:
     assert_type(data, Dataset)
