@@ -71,7 +71,7 @@ def drive_matrices(dynamics):
     rate = 2 * math.pi * dynamics.operating.drive_frequency
     reduced = dynamics.system().rotation ** 2 @ dynamics.system().mass
     return (
-        place * reduced * rate** 2,
+        place * reduced * rate**2,
         place * 2 * dynamics.operating.drive_damping_ratio * reduced * rate,
     )
 
