@@ -7,8 +7,8 @@ from typing import final
 import numpy as np
 from numpy.typing import NDArray
 
-from diagnose.baselines.base import Baseline, Input, MethodText, Parts, Role, Source
-from diagnose.baselines.estimators import ChosenModel, choose_model
+from diagnose.baselines.base import Input, MethodText, Parts, Role, Source
+from diagnose.baselines.chosen_model import ChosenModelBaseline
 from diagnose.baselines.features import LEVEL, FeatureTable, feature_table
 
 FloatArray = NDArray[np.floating]
@@ -30,7 +30,7 @@ INDICATOR_INPUT = Input(name="indicators", make=indicator_tables)
 
 
 @final
-class IndicatorModel(Baseline):
+class IndicatorModel(ChosenModelBaseline):
     """Logistic regression or gradient boosting on all indicators."""
 
     text = MethodText(
@@ -43,20 +43,10 @@ class IndicatorModel(Baseline):
     )
     role = Role.RIVAL
     reads = INDICATOR_INPUT
-    _model: ChosenModel
-
-    def fit(self, train: FeatureTable, validation: FeatureTable, n_classes: int) -> str:
-        """Fit all candidates and keep the best one."""
-        self._model = choose_model(train, validation, n_classes)
-        return self._model.name
-
-    def predict_proba(self, table: FeatureTable) -> FloatArray:
-        """Probabilities (row, class) of the chosen model."""
-        return self._model.probability(table)
 
 
 @final
-class IndicatorModelWithoutLevel(Baseline):
+class IndicatorModelWithoutLevel(ChosenModelBaseline):
     """The same without the RMS: a fair comparison with windows divided by theirs."""
 
     text = MethodText(
@@ -67,13 +57,4 @@ class IndicatorModelWithoutLevel(Baseline):
     )
     role = Role.RIVAL
     reads = INDICATOR_INPUT
-    _model: ChosenModel
-
-    def fit(self, train: FeatureTable, validation: FeatureTable, n_classes: int) -> str:
-        """Fit all candidates and keep the best one."""
-        self._model = choose_model(train, validation, n_classes, without=LEVEL)
-        return self._model.name
-
-    def predict_proba(self, table: FeatureTable) -> FloatArray:
-        """Probabilities (row, class) of the chosen model."""
-        return self._model.probability(table)
+    without = LEVEL

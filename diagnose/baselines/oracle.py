@@ -11,8 +11,8 @@ from typing import TYPE_CHECKING, final
 import numpy as np
 from numpy.typing import NDArray
 
-from diagnose.baselines.base import Baseline, Input, MethodText, Parts, Role, Source
-from diagnose.baselines.estimators import ChosenModel, choose_model
+from diagnose.baselines.base import Input, MethodText, Parts, Role, Source
+from diagnose.baselines.chosen_model import ChosenModelBaseline
 from diagnose.baselines.features import INDICATORS, Cache, FeatureTable, indicators, known_rotation
 from diagnose.data.inputs import NetworkInput
 from diagnose.data.windows import Segments, Task, WindowSet, read_signal
@@ -109,7 +109,7 @@ TWIN_INPUT = Input(name="with_twins", make=twin_tables)
 
 
 @final
-class OracleIndicators(Baseline):
+class OracleIndicators(ChosenModelBaseline):
     """Logistic regression or gradient boosting on `oracle_table`."""
 
     text = MethodText(
@@ -121,13 +121,3 @@ class OracleIndicators(Baseline):
     )
     role = Role.BOUND
     reads = TWIN_INPUT
-    _model: ChosenModel
-
-    def fit(self, train: FeatureTable, validation: FeatureTable, n_classes: int) -> str:
-        """Fit all candidates and keep the best one."""
-        self._model = choose_model(train, validation, n_classes)
-        return self._model.name
-
-    def predict_proba(self, table: FeatureTable) -> FloatArray:
-        """Probabilities (row, class) of the chosen model."""
-        return self._model.probability(table)

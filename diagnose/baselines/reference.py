@@ -12,8 +12,8 @@ from typing import final
 import numpy as np
 from numpy.typing import NDArray
 
-from diagnose.baselines.base import Baseline, Input, MethodText, Parts, Role, Source
-from diagnose.baselines.estimators import ChosenModel, choose_model
+from diagnose.baselines.base import Input, MethodText, Parts, Role, Source
+from diagnose.baselines.chosen_model import ChosenModelBaseline
 from diagnose.baselines.features import GEARS, FeatureTable, known_rotation
 from diagnose.data.windows import Segments, Task, read_signal
 from gensig.errors import ConfigError
@@ -118,7 +118,7 @@ TOOTH_INPUT = Input(name="tooth_changes", make=reference_tables)
 
 
 @final
-class Reference(Baseline):
+class Reference(ChosenModelBaseline):
     """Logistic regression or gradient boosting on changes of teeth against a sound record."""
 
     text = MethodText(
@@ -131,16 +131,6 @@ class Reference(Baseline):
     )
     role = Role.RIVAL
     reads = TOOTH_INPUT
-    _model: ChosenModel
-
-    def fit(self, train: FeatureTable, validation: FeatureTable, n_classes: int) -> str:
-        """Fit all candidates and keep the best one."""
-        self._model = choose_model(train, validation, n_classes)
-        return self._model.name
-
-    def predict_proba(self, table: FeatureTable) -> FloatArray:
-        """Probabilities (row, class) of the chosen model."""
-        return self._model.probability(table)
 
 
 def _names(task: Task) -> tuple[str, ...]:
